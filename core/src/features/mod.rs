@@ -1,0 +1,7 @@
+//! Points that can be recognised in a scan.
+
+mod keypoint;
+mod point_scan;
+
+pub use keypoint::{Keypoint, KeypointKind};
+pub use point_scan::PointScan;

@@ -1,0 +1,46 @@
+//! A scan as points, organised by beam.
+
+use heapless::Vec;
+
+use crate::geometry::ScanPoint;
+use crate::measurement::Scan;
+
+/// The points of a scan, organised by beam, with room for `BEAMS` beams.
+#[derive(Clone, Debug, Default)]
+pub struct PointScan<const BEAMS: usize> {
+    /// Position of each beam's return, m; the origin where the return is absent.
+    pub points: Vec<ScanPoint, BEAMS>,
+    /// Measured range of each beam, m; zero where the return is absent.
+    pub ranges: Vec<f32, BEAMS>,
+    /// Angle between neighbouring beams, rad, positive.
+    pub bearing_step: f32,
+    /// Whether the last beam and the first one are neighbours.
+    pub is_full_circle: bool,
+}
+
+impl<const BEAMS: usize> PointScan<BEAMS> {
+    /// An empty scan.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { points: Vec::new(), ranges: Vec::new(), bearing_step: 0.0, is_full_circle: false }
+    }
+
+    /// Replaces the content by the points of `scan` in S, as if all beams were simultaneous. Ranges that are not
+    /// finite or lie outside `nearest..=farthest` (m) count as absent; beams beyond the capacity are left out.
+    pub fn set(&mut self, scan: &Scan, nearest: f32, farthest: f32) {
+        self.points.clear();
+        self.ranges.clear();
+        self.bearing_step = libm::fabs(scan.bearing_step) as f32;
+        self.is_full_circle = scan.is_full_circle() && scan.ranges.len() <= BEAMS;
+        let (step_sine, step_cosine) = libm::sincos(scan.bearing_step);
+        let (mut sine, mut cosine) = libm::sincos(scan.first_bearing);
+        for &range in scan.ranges.iter().take(BEAMS) {
+            let range = if range >= nearest && range <= farthest && range > 0.0 { range } else { 0.0 };
+            let point = ScanPoint::new(range * cosine as f32, range * sine as f32);
+            // The loop takes no more beams than there is room for.
+            let _ = self.points.push(point);
+            let _ = self.ranges.push(range);
+            (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
+        }
+    }
+}

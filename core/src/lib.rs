@@ -1,0 +1,31 @@
+//! Localisation of automated guided vehicles.
+//!
+//! Everything that the vehicle computes and nothing that it touches: events go in, outputs come out. The crate has no
+//! allocator, no clock and no input or output, and every loop in it is bounded, so the same code gives the same bits on
+//! a desktop and on a controller.
+//!
+//! Rooms, floor by floor; a room imports only from floors below its own:
+//!
+//! | floor | rooms |
+//! |---|---|
+//! | 5 | [`record`] |
+//! | 4 | [`localizer`] |
+//! | 3 | [`features`], [`filter`] |
+//! | 2 | [`odometry`], [`landmarks`] |
+//! | 1 | [`geometry`], [`measurement`] |
+//!
+//! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.
+//! Units: SI and radians. Poses and covariances are f64, scans and features f32.
+//!
+//! Equation numbers with `K` are those of F. Kallasi, "FALKO features and AGV localisation" (thesis, Parma, 2016).
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod features;
+pub mod filter;
+pub mod geometry;
+pub mod landmarks;
+pub mod localizer;
+pub mod measurement;
+pub mod odometry;
+pub mod record;

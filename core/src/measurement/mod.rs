@@ -1,0 +1,11 @@
+//! What a sensor said, and when it was true.
+
+mod encoder;
+mod reflectors;
+mod scan;
+mod time;
+
+pub use encoder::{EncoderSample, PoseIncrement, SpeedSample};
+pub use reflectors::{ReflectorObservation, Reflectors};
+pub use scan::Scan;
+pub use time::Time;

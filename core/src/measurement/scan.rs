@@ -1,0 +1,52 @@
+//! One revolution, or one sweep, of a planar laser.
+
+use core::f64::consts::TAU;
+
+use serde::Serialize;
+
+use super::Time;
+
+/// Ranges of one sweep. Beam `i` was measured at `start + i * beam_interval` in the direction
+/// `first_bearing + i * bearing_step` of S, from wherever S was then: motion is not corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Scan<'a> {
+    /// When the first beam was measured.
+    pub start: Time,
+    /// Time between neighbouring beams, s; zero if all beams are simultaneous.
+    pub beam_interval: f64,
+    /// Direction of the first beam in S, rad.
+    pub first_bearing: f64,
+    /// Angle between neighbouring beams, rad, positive counter-clockwise.
+    pub bearing_step: f64,
+    /// Range of each beam, m. Zero, negative, infinite and NaN ranges are absent returns.
+    pub ranges: &'a [f32],
+    /// Strength of each return in the device's own unit, or empty if the device reports none.
+    pub intensities: &'a [u16],
+}
+
+impl Scan<'_> {
+    /// Direction of beam `index` in S, rad, not wrapped.
+    #[must_use]
+    pub fn bearing(&self, index: usize) -> f64 {
+        self.first_bearing + index as f64 * self.bearing_step
+    }
+
+    /// When beam `index` was measured.
+    #[must_use]
+    pub fn beam_time(&self, index: usize) -> Time {
+        self.start.offset(index as f64 * self.beam_interval)
+    }
+
+    /// When the last beam was measured.
+    #[must_use]
+    pub fn end(&self) -> Time {
+        self.beam_time(self.ranges.len().saturating_sub(1))
+    }
+
+    /// Whether the last beam and the first one are neighbours, as in a full revolution.
+    #[must_use]
+    pub fn is_full_circle(&self) -> bool {
+        let gap = TAU - libm::fabs(self.bearing_step) * self.ranges.len() as f64;
+        libm::fabs(gap) < 0.5 * libm::fabs(self.bearing_step)
+    }
+}

@@ -1,0 +1,8 @@
+//! The localiser on a desktop: simulation, replay, import, evaluation and reports.
+
+pub mod data;
+pub mod evaluate;
+pub mod import;
+pub mod replay;
+pub mod report;
+pub mod simulate;
