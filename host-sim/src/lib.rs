@@ -3,6 +3,7 @@
 pub mod data;
 pub mod evaluate;
 pub mod import;
+pub mod recording;
 pub mod replay;
 pub mod report;
 pub mod simulate;

@@ -1,1 +1,7 @@
-//! To come.
+//! The vehicle's own account of its motion.
+
+mod counter;
+mod vehicle;
+
+pub use counter::CounterRange;
+pub use vehicle::{Ackermann, Tricycle, Vehicle};

@@ -1,0 +1,30 @@
+//! One point of the map.
+
+use serde::{Deserialize, Serialize};
+
+/// What a landmark is; an observation is only compared with landmarks of its own kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LandmarkKind {
+    /// An artificial reflector.
+    Reflector,
+    /// A natural corner.
+    Corner,
+    /// The end of a face that stands in front of something.
+    EndPoint,
+}
+
+/// One point of the map, in W.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Landmark {
+    /// Name of the landmark, unique in its map.
+    pub id: u16,
+    /// What it is.
+    pub kind: LandmarkKind,
+    /// Position, m.
+    pub x: f64,
+    /// Position, m.
+    pub y: f64,
+    /// Standard deviation of the position along each axis, m.
+    pub deviation: f32,
+}

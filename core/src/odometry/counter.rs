@@ -1,0 +1,47 @@
+//! Encoder counters that wrap.
+
+use serde::{Deserialize, Serialize};
+
+/// How many values a counter takes before it starts again at zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct CounterRange(u64);
+
+impl CounterRange {
+    /// A counter of 16 bits.
+    pub const BITS_16: Self = Self(1 << 16);
+    /// A counter of 24 bits.
+    pub const BITS_24: Self = Self(1 << 24);
+    /// A counter of 32 bits.
+    pub const BITS_32: Self = Self(1 << 32);
+
+    /// A counter that takes `values` values, from 0 to `values - 1`. None unless 2 to 2^32.
+    #[must_use]
+    pub const fn new(values: u64) -> Option<Self> {
+        if values >= 2 && values <= 1 << 32 { Some(Self(values)) } else { None }
+    }
+
+    /// The number of values.
+    #[must_use]
+    pub const fn values(self) -> u64 {
+        self.0
+    }
+
+    /// The shortest way from one reading to the next, ticks, in `-values/2 .. values/2`. Readings at or beyond the
+    /// range are taken modulo the range.
+    #[must_use]
+    pub const fn step(self, from: u32, to: u32) -> i64 {
+        let values = self.0 as i64;
+        if values == 0 {
+            return 0;
+        }
+        let forward = (to as i64 - from as i64).rem_euclid(values);
+        if forward >= values - values / 2 { forward - values } else { forward }
+    }
+
+    /// The reading as a signed number around zero, ticks.
+    #[must_use]
+    pub const fn signed(self, reading: u32) -> i64 {
+        self.step(0, reading)
+    }
+}

@@ -1,0 +1,92 @@
+//! A drive in memory: what the sensors said, in the order of arrival, and apart from that where the vehicle really was.
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::Landmark;
+use agv_core::localizer::{Event, Parameters, PoseFix};
+use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
+
+/// A scan that owns its ranges; the fields are those of [`Scan`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedScan {
+    /// When the first beam was measured.
+    pub start: Time,
+    /// Time between neighbouring beams, s.
+    pub beam_interval: f64,
+    /// Direction of the first beam in S, rad.
+    pub first_bearing: f64,
+    /// Angle between neighbouring beams, rad.
+    pub bearing_step: f64,
+    /// Range of each beam, m.
+    pub ranges: Vec<f32>,
+    /// Strength of each return, or empty.
+    pub intensities: Vec<u16>,
+}
+
+impl RecordedScan {
+    /// The scan as the core takes it.
+    #[must_use]
+    pub fn view(&self) -> Scan<'_> {
+        Scan {
+            start: self.start,
+            beam_interval: self.beam_interval,
+            first_bearing: self.first_bearing,
+            bearing_step: self.bearing_step,
+            ranges: &self.ranges,
+            intensities: &self.intensities,
+        }
+    }
+}
+
+/// An event that owns what it carries.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RecordedEvent {
+    /// Counters of a tricycle's encoders.
+    Encoders(EncoderSample),
+    /// Speed and steering angle.
+    Speed(SpeedSample),
+    /// Motion that the vehicle has integrated itself.
+    Increment(PoseIncrement),
+    /// Reflectors of one revolution.
+    Reflectors(Vec<ReflectorObservation>),
+    /// Ranges of one sweep.
+    Scan(RecordedScan),
+    /// A pose from outside.
+    SetPose(PoseFix),
+}
+
+impl RecordedEvent {
+    /// The event as the core takes it.
+    #[must_use]
+    pub fn view(&self) -> Event<'_> {
+        match self {
+            Self::Encoders(sample) => Event::Encoders(*sample),
+            Self::Speed(sample) => Event::Speed(*sample),
+            Self::Increment(increment) => Event::Increment(*increment),
+            Self::Reflectors(observations) => Event::Reflectors(Reflectors { observations }),
+            Self::Scan(scan) => Event::Scan(scan.view()),
+            Self::SetPose(fix) => Event::SetPose(*fix),
+        }
+    }
+}
+
+/// Where the vehicle really was. The localiser never sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// When.
+    pub time: Time,
+    /// Pose of R in W.
+    pub pose: Pose,
+}
+
+/// A drive in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// What the localiser believes of its vehicle.
+    pub parameters: Parameters,
+    /// The map that the localiser is given.
+    pub landmarks: Vec<Landmark>,
+    /// What happened, in the order of arrival.
+    pub events: Vec<RecordedEvent>,
+    /// Where the vehicle really was, in order of time; empty if nobody knows.
+    pub truth: Vec<Truth>,
+}
