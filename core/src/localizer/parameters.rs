@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::features::ReflectorDetection;
+use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
-use crate::odometry::Vehicle;
+use crate::landmarks::DynamicMapParameters;
+use crate::odometry::{Integration, OdometryNoise, Vehicle};
 
 /// What the localiser believes of its vehicle and its sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,4 +15,150 @@ pub struct Parameters {
     pub vehicle: Vehicle,
     /// Pose of S in R (K: l).
     pub laser: Pose,
+    /// How odometry is integrated.
+    pub integration: Integration,
+    /// How wrong odometry may be.
+    pub odometry_noise: OdometryNoise,
+    /// Which maps are used.
+    pub maps: MapUse,
+    /// Reflectors.
+    pub reflectors: ReflectorParameters,
+    /// Natural features.
+    pub features: FeatureParameters,
+    /// Which observation belongs to which landmark.
+    pub association: AssociationParameters,
+    /// The map that is made while driving.
+    pub dynamic_map: DynamicMapParameters,
+    /// When the evidence is against the pose.
+    pub consistency: ConsistencyParameters,
+    /// When the vehicle is dead reckoning, and when it is lost.
+    pub limits: Limits,
+}
+
+impl Parameters {
+    /// Default parameters for a vehicle with its sensor at `laser` in R.
+    #[must_use]
+    pub fn new(vehicle: Vehicle, laser: Pose) -> Self {
+        Self {
+            vehicle,
+            laser,
+            integration: Integration::default(),
+            odometry_noise: OdometryNoise::default(),
+            maps: MapUse::default(),
+            reflectors: ReflectorParameters::default(),
+            features: FeatureParameters::default(),
+            association: AssociationParameters::default(),
+            dynamic_map: DynamicMapParameters::default(),
+            consistency: ConsistencyParameters::default(),
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// Which maps correct the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MapUse {
+    /// The fixed map of reflectors.
+    pub reflectors: bool,
+    /// The fixed map of natural features.
+    pub features: bool,
+    /// The dynamic map of natural features.
+    pub dynamic: bool,
+}
+
+impl Default for MapUse {
+    fn default() -> Self {
+        Self { reflectors: true, features: true, dynamic: false }
+    }
+}
+
+/// How reflectors are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReflectorParameters {
+    /// Standard deviation of the distance, m.
+    pub range_deviation: f64,
+    /// Standard deviation of the direction, rad.
+    pub bearing_deviation: f64,
+    /// How they are found in scans that report the strength of returns; None if the sensor finds them itself.
+    pub detection: Option<ReflectorDetection>,
+}
+
+impl Default for ReflectorParameters {
+    fn default() -> Self {
+        Self { range_deviation: 0.01, bearing_deviation: 1e-3, detection: None }
+    }
+}
+
+/// How natural features are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeatureParameters {
+    /// Nearest range that counts, m.
+    pub nearest: f32,
+    /// Farthest range that counts, m.
+    pub farthest: f32,
+    /// Standard deviation that is added to what the detector states, along each axis, m.
+    pub added_deviation: f64,
+    /// Whether the scan is corrected for the motion of the vehicle within the revolution.
+    pub motion_correction: bool,
+}
+
+impl Default for FeatureParameters {
+    fn default() -> Self {
+        Self { nearest: 0.5, farthest: 30.0, added_deviation: 0.005, motion_correction: true }
+    }
+}
+
+/// Which observation belongs to which landmark.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AssociationParameters {
+    /// Reflectors further than this from where one was seen are not considered, m.
+    pub reflector_radius: f64,
+    /// The same for natural features, m.
+    pub feature_radius: f64,
+    /// Largest squared Mahalanobis distance, chi-square with two degrees of freedom.
+    pub gate: f64,
+    /// By how much the second best landmark must be worse, in squared Mahalanobis distance.
+    pub margin: f64,
+}
+
+impl Default for AssociationParameters {
+    /// The gate lets 99.7 per cent of the right ones pass.
+    fn default() -> Self {
+        Self { reflector_radius: 1.5, feature_radius: 0.3, gate: 11.83, margin: 9.0 }
+    }
+}
+
+/// When the vehicle is dead reckoning, and when it is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Faster motions are taken as faults of the odometry, m/s.
+    pub fastest: f64,
+    /// Way without a landmark after which the vehicle says that it is dead reckoning, m.
+    pub dead_reckoning_from: f64,
+    /// Way without a landmark after which it is lost, m.
+    pub lost_after: f64,
+    /// Standard deviation of the position above which it is lost, m.
+    pub largest_position_deviation: f64,
+    /// Standard deviation of the heading above which it is lost, rad.
+    pub largest_heading_deviation: f64,
+    /// How far ahead of the odometry a measurement may be, s.
+    pub longest_extrapolation: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            fastest: 5.0,
+            dead_reckoning_from: 0.5,
+            lost_after: 50.0,
+            largest_position_deviation: 1.0,
+            largest_heading_deviation: 0.2,
+            longest_extrapolation: 0.1,
+        }
+    }
 }

@@ -1,7 +1,15 @@
 //! The vehicle's own account of its motion.
 
 mod counter;
+mod integration;
+mod motion;
+mod noise;
+mod odometer;
 mod vehicle;
 
 pub use counter::CounterRange;
+pub use integration::{Control, Integration};
+pub use motion::Motion;
+pub use noise::OdometryNoise;
+pub use odometer::{Odometer, OdometryError};
 pub use vehicle::{Ackermann, Tricycle, Vehicle};

@@ -1,0 +1,120 @@
+//! Correction of a scan for the motion of the vehicle within the revolution.
+
+use heapless::Vec;
+
+use super::PointScan;
+use crate::geometry::{Point, Pose, ScanPoint};
+use crate::measurement::{Scan, Time};
+
+/// Nodes of a path; more than the odometry delivers in one revolution.
+const NODES: usize = 48;
+
+/// Nodes closer in time than this, s, add nothing.
+const LEAST_SPACING: f64 = 2e-3;
+
+/// Where the sensor was during a scan, relative to where it was at the first beam; linear between nodes.
+#[derive(Clone, Debug, Default)]
+pub struct SensorPath {
+    nodes: Vec<Node, NODES>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    time: f64,
+    x: f64,
+    y: f64,
+    sine: f64,
+    cosine: f64,
+}
+
+/// A pose as the matrix that it stands for.
+#[derive(Clone, Copy, Debug)]
+struct Transform {
+    x: f64,
+    y: f64,
+    sine: f64,
+    cosine: f64,
+}
+
+impl SensorPath {
+    /// The path of a sensor at `laser` in R, from the displacements of R since `start`.
+    pub fn set(&mut self, start: Time, laser: &Pose, displacements: impl Iterator<Item = (Time, Pose)>) {
+        self.nodes.clear();
+        let back = laser.inverse();
+        let mut last = f64::NEG_INFINITY;
+        for (time, displacement) in displacements {
+            let time = time.since(start);
+            if time - last < LEAST_SPACING {
+                continue;
+            }
+            last = time;
+            let pose = back.compose(&displacement.compose(laser));
+            let (sine, cosine) = libm::sincos(pose.theta);
+            // A path that is too long is held at its last node.
+            let _ = self.nodes.push(Node { time, x: pose.x, y: pose.y, sine, cosine });
+        }
+    }
+
+    /// Where a point that was seen `time` seconds after the first beam is in the frame of the first beam, m.
+    #[must_use]
+    pub fn to_start(&self, time: f64, point: &Point) -> Point {
+        self.transform(time, &mut 0).apply(point)
+    }
+
+    /// Where a point of the frame of the first beam is seen from the sensor `time` seconds later, m.
+    #[must_use]
+    pub fn from_start(&self, time: f64, point: &Point) -> Point {
+        let transform = self.transform(time, &mut 0);
+        let (dx, dy) = (point.x - transform.x, point.y - transform.y);
+        Point::new(transform.cosine * dx + transform.sine * dy, transform.cosine * dy - transform.sine * dx)
+    }
+
+    /// Moves all points of a scan into the frame of its first beam.
+    pub fn correct<const BEAMS: usize>(&self, scan: &Scan, points: &mut PointScan<BEAMS>) {
+        let mut segment = 0;
+        for (beam, (point, range)) in points.points.iter_mut().zip(&points.ranges).enumerate() {
+            if *range > 0.0 {
+                let transform = self.transform(beam as f64 * scan.beam_interval, &mut segment);
+                *point = transform.apply_single(point);
+            }
+        }
+    }
+
+    /// The sensor's pose `time` seconds after the first beam; `segment` is where the search begins and where it ended.
+    fn transform(&self, time: f64, segment: &mut usize) -> Transform {
+        while self.nodes.get(*segment + 1).is_some_and(|node| node.time < time) {
+            *segment += 1;
+        }
+        match (self.nodes.get(*segment), self.nodes.get(*segment + 1)) {
+            (Some(before), Some(after)) => {
+                let share = ((time - before.time) / (after.time - before.time)).clamp(0.0, 1.0);
+                let between = |from: f64, to: f64| from + share * (to - from);
+                Transform {
+                    x: between(before.x, after.x),
+                    y: between(before.y, after.y),
+                    sine: between(before.sine, after.sine),
+                    cosine: between(before.cosine, after.cosine),
+                }
+            }
+            (Some(only), None) => Transform { x: only.x, y: only.y, sine: only.sine, cosine: only.cosine },
+            _ => Transform { x: 0.0, y: 0.0, sine: 0.0, cosine: 1.0 },
+        }
+    }
+}
+
+impl Transform {
+    fn apply(&self, point: &Point) -> Point {
+        Point::new(
+            self.x + self.cosine * point.x - self.sine * point.y,
+            self.y + self.sine * point.x + self.cosine * point.y,
+        )
+    }
+
+    fn apply_single(&self, point: &ScanPoint) -> ScanPoint {
+        let (sine, cosine) = (self.sine as f32, self.cosine as f32);
+        ScanPoint::new(
+            self.x as f32 + cosine * point.x - sine * point.y,
+            self.y as f32 + sine * point.x + cosine * point.y,
+        )
+    }
+}

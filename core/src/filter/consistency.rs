@@ -1,0 +1,76 @@
+//! Whether what the filter believes fits what it sees.
+
+use serde::{Deserialize, Serialize};
+
+/// When the evidence is against the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConsistencyParameters {
+    /// How much of the evidence of the past remains after each scan, 0 to 1.
+    pub memory: f64,
+    /// Least number of remembered observations for a verdict.
+    pub least_observations: f64,
+    /// Least share of observations of the fixed map that must have been accepted.
+    pub least_acceptance: f64,
+    /// Largest mean of the accepted observations' normalised squared innovation; 2 is expected.
+    pub largest_normalised_square: f64,
+}
+
+impl Default for ConsistencyParameters {
+    fn default() -> Self {
+        Self { memory: 0.8, least_observations: 6.0, least_acceptance: 0.4, largest_normalised_square: 6.0 }
+    }
+}
+
+/// Evidence of the last scans, with exponential forgetting.
+#[derive(Clone, Copy, Debug)]
+pub struct Consistency {
+    parameters: ConsistencyParameters,
+    expected: f64,
+    accepted: f64,
+    used: f64,
+    normalised_square: f64,
+}
+
+impl Consistency {
+    /// No evidence yet.
+    #[must_use]
+    pub fn new(parameters: ConsistencyParameters) -> Self {
+        Self { parameters, expected: 0.0, accepted: 0.0, used: 0.0, normalised_square: 0.0 }
+    }
+
+    /// Takes the evidence of one scan: how many observations should have had a fixed landmark, how many of these were
+    /// accepted, and of all that were used their number and the sum of their normalised squared innovations.
+    pub fn add(&mut self, expected: usize, accepted: usize, used: usize, normalised_square_sum: f64) {
+        let memory = self.parameters.memory;
+        self.expected = memory * self.expected + expected as f64;
+        self.accepted = memory * self.accepted + accepted as f64;
+        self.used = memory * self.used + used as f64;
+        self.normalised_square = memory * self.normalised_square + normalised_square_sum;
+    }
+
+    /// Share of the observations of the fixed map that were accepted; one if there are none.
+    #[must_use]
+    pub fn acceptance(&self) -> f64 {
+        if self.expected > 0.0 { self.accepted / self.expected } else { 1.0 }
+    }
+
+    /// Mean normalised squared innovation of what was used; two if nothing was.
+    #[must_use]
+    pub fn mean_normalised_square(&self) -> f64 {
+        if self.used > 0.0 { self.normalised_square / self.used } else { 2.0 }
+    }
+
+    /// Whether most observations fit no landmark.
+    #[must_use]
+    pub fn is_rejecting(&self) -> bool {
+        self.expected >= self.parameters.least_observations && self.acceptance() < self.parameters.least_acceptance
+    }
+
+    /// Whether the innovations are larger than the filter believes.
+    #[must_use]
+    pub fn is_surprised(&self) -> bool {
+        self.used >= self.parameters.least_observations
+            && self.mean_normalised_square() > self.parameters.largest_normalised_square
+    }
+}

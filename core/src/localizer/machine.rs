@@ -1,0 +1,392 @@
+//! One event in, outputs out.
+
+use heapless::Vec;
+
+use super::maps::{Association, Maps};
+use super::output::OBSERVATIONS;
+use super::{Event, LandmarkSource, LandmarkUse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
+use crate::features::{PointScan, SensorPath, detect_reflectors};
+use crate::filter::{Consistency, Ekf, Observation, RangeBearing, Timeline};
+use crate::geometry::{Pose, difference};
+use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
+use crate::measurement::{ReflectorObservation, Scan, Time};
+use crate::odometry::{Motion, Odometer, OdometryError};
+
+/// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
+const ENTRIES: usize = 160;
+
+/// Localises one vehicle. All of its memory is in this value.
+///
+/// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, and `DYNAMIC` landmarks
+/// that are found while driving.
+#[derive(Clone, Debug)]
+pub struct Localizer<
+    const BEAMS: usize = 1440,
+    const REFLECTORS: usize = 1000,
+    const FEATURES: usize = 1500,
+    const DYNAMIC: usize = 256,
+> {
+    parameters: Parameters,
+    odometer: Odometer,
+    maps: Maps<REFLECTORS, FEATURES, DYNAMIC>,
+    timeline: Option<Timeline<ENTRIES>>,
+    consistency: Consistency,
+    lost: Option<Reason>,
+    is_odometry_implausible: bool,
+    distance: DistanceSince,
+    workspace: Workspace<BEAMS>,
+    outputs: Outputs,
+}
+
+/// Memory that is used within one event only.
+#[derive(Clone, Debug)]
+struct Workspace<const BEAMS: usize> {
+    points: PointScan<BEAMS>,
+    path: SensorPath,
+    reflectors: Vec<ReflectorObservation, OBSERVATIONS>,
+    sightings: Vec<Sighting, OBSERVATIONS>,
+}
+
+/// One observation of one event.
+#[derive(Clone, Copy, Debug)]
+struct Sighting {
+    time: Time,
+    kind: LandmarkKind,
+    observation: Observation,
+    /// What is left to do for the dynamic map: the landmark that it belongs to, or none if it is new.
+    matched: Option<u16>,
+    verdict: Verdict,
+}
+
+/// Way since something last happened, m.
+#[derive(Clone, Copy, Debug)]
+struct DistanceSince {
+    reflector: f64,
+    feature: f64,
+    fix: f64,
+}
+
+impl DistanceSince {
+    const NEVER: Self = Self { reflector: f64::INFINITY, feature: f64::INFINITY, fix: f64::INFINITY };
+
+    fn any(&self) -> f64 {
+        self.reflector.min(self.feature).min(self.fix)
+    }
+
+    fn advance(&mut self, distance: f64) {
+        self.reflector += distance;
+        self.feature += distance;
+        self.fix += distance;
+    }
+}
+
+impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize>
+    Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC>
+{
+    /// A localiser with empty maps that does not know where it is.
+    #[must_use]
+    pub fn new(parameters: Parameters) -> Self {
+        let pose = PoseOutput {
+            time: Time::default(),
+            pose: Pose::default(),
+            covariance: [0.0; 6],
+            mode: Mode::NotLocalised,
+            reason: Reason::NoPose,
+            dead_reckoning_distance: 0.0,
+            acceptance: 1.0,
+            normalised_square: 2.0,
+        };
+        Self {
+            odometer: Odometer::new(
+                parameters.vehicle,
+                parameters.odometry_noise,
+                parameters.integration,
+                parameters.limits.fastest,
+            ),
+            maps: Maps {
+                reflectors: FixedMap::new(),
+                features: FixedMap::new(),
+                dynamic: DynamicMap::new(parameters.dynamic_map),
+            },
+            timeline: None,
+            consistency: Consistency::new(parameters.consistency),
+            lost: None,
+            is_odometry_implausible: false,
+            distance: DistanceSince::NEVER,
+            workspace: Workspace {
+                points: PointScan::new(),
+                path: SensorPath::default(),
+                reflectors: Vec::new(),
+                sightings: Vec::new(),
+            },
+            outputs: Outputs { pose, uses: Vec::new() },
+            parameters,
+        }
+    }
+
+    /// Adds landmarks to the fixed maps, each to the one of its kind.
+    ///
+    /// # Errors
+    /// [`MapError`] if a landmark does not fit; those before it are in the map.
+    pub fn add_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
+        let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
+        // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
+        for run in landmarks.chunk_by(|a, b| is_reflector(a) == is_reflector(b)) {
+            if run.first().is_some_and(is_reflector) {
+                self.maps.reflectors.extend(run)?;
+            } else {
+                self.maps.features.extend(run)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the localiser believes of its vehicle and its sensors.
+    #[must_use]
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// The landmarks that were found while driving.
+    #[must_use]
+    pub fn dynamic_landmarks(&self) -> &[DynamicLandmark] {
+        self.maps.dynamic.landmarks()
+    }
+
+    /// What the last event gave.
+    #[must_use]
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
+    }
+
+    /// Takes one event. Events of one sensor come in order of time; those of different sensors may overtake each other
+    /// by as much as the filter remembers, about 0.4 s.
+    pub fn handle(&mut self, event: &Event) -> &Outputs {
+        self.outputs.uses.clear();
+        match event {
+            Event::Encoders(sample) => {
+                let motion = self.odometer.encoders(sample);
+                self.move_by(sample.time, motion);
+            }
+            Event::Speed(sample) => {
+                let motion = self.odometer.speed(sample);
+                self.move_by(sample.time, motion);
+            }
+            Event::Increment(increment) => {
+                let motion = self.odometer.increment(increment);
+                self.move_by(increment.time, motion);
+            }
+            Event::Reflectors(reflectors) => {
+                self.workspace.sightings.clear();
+                see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
+                self.fuse();
+            }
+            Event::Scan(scan) => self.scan(scan),
+            Event::SetPose(fix) => self.set_pose(fix),
+        }
+        self.publish();
+        &self.outputs
+    }
+
+    fn set_pose(&mut self, fix: &PoseFix) {
+        let is_sound = fix.pose.is_finite() && fix.position_deviation >= 0.0 && fix.heading_deviation >= 0.0;
+        if !is_sound {
+            return;
+        }
+        let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
+        let limits = &self.parameters.limits;
+        self.timeline = Some(Timeline::new(fix.time, state, self.parameters.laser, limits.longest_extrapolation));
+        self.consistency = Consistency::new(self.parameters.consistency);
+        self.lost = None;
+        self.is_odometry_implausible = false;
+        self.distance = DistanceSince { fix: 0.0, ..DistanceSince::NEVER };
+        self.maps.dynamic.clear();
+    }
+
+    fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
+        let Some(timeline) = &mut self.timeline else {
+            return;
+        };
+        match motion {
+            // A pose may be given for a time between two samples; only what follows it counts.
+            Ok(motion) if motion.end > timeline.start() => {
+                let motion = if motion.start < timeline.start() { motion.split(timeline.start()).1 } else { motion };
+                self.is_odometry_implausible = false;
+                self.distance.advance(motion.distance);
+                timeline.advance(&motion);
+            }
+            Err(OdometryError::Implausible) => {
+                self.is_odometry_implausible = true;
+                timeline.hold(time);
+            }
+            _ => {}
+        }
+    }
+
+    fn scan(&mut self, scan: &Scan) {
+        if self.timeline.is_none() {
+            return;
+        }
+        if let Some(detection) = &self.parameters.reflectors.detection
+            && self.parameters.maps.reflectors
+            && !scan.intensities.is_empty()
+        {
+            let workspace = &mut self.workspace;
+            detect_reflectors(scan, detection, &mut workspace.reflectors);
+            workspace.sightings.clear();
+            see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
+            self.fuse();
+        }
+    }
+
+    /// Fuses the sightings of the workspace, each at its own time, and brings the dynamic map up to date.
+    fn fuse(&mut self) {
+        let Some(timeline) = self.timeline.as_mut().filter(|_| self.lost.is_none()) else {
+            return;
+        };
+        let (mut expected, mut accepted, mut used, mut square_sum) = (0, 0, 0, 0.0);
+        for sighting in &mut self.workspace.sightings {
+            let mut association = Association::NONE;
+            let outcome = timeline.correct(sighting.time, |state| {
+                association = self.maps.associate(&self.parameters, state, sighting.kind, &sighting.observation);
+                association.correction(&sighting.observation)
+            });
+            if outcome.is_err() {
+                association.verdict = Verdict::OutOfTime;
+            }
+            let is_accepted = outcome == Ok(true);
+            let is_fixed = association.nearest.is_none_or(|landmark| landmark.source == LandmarkSource::Fixed);
+            let is_reflector = sighting.kind == LandmarkKind::Reflector;
+            if outcome.is_ok() && is_fixed && (is_reflector || association.nearest.is_some()) {
+                expected += 1;
+                accepted += usize::from(is_accepted);
+            }
+            if let Some(landmark) = association.nearest.filter(|_| is_accepted) {
+                used += 1;
+                square_sum += landmark.innovation.normalised_square;
+                if is_reflector {
+                    self.distance.reflector = 0.0;
+                } else {
+                    self.distance.feature = 0.0;
+                }
+            }
+            sighting.verdict = association.verdict;
+            sighting.matched = association
+                .nearest
+                .filter(|landmark| is_accepted && landmark.source == LandmarkSource::Dynamic)
+                .map(|landmark| landmark.id);
+            let position = sighting.observation.position();
+            let _ = self.outputs.uses.push(LandmarkUse {
+                time: sighting.time,
+                kind: sighting.kind,
+                landmark: association.nearest.map(|landmark| (landmark.source, landmark.id)),
+                verdict: association.verdict,
+                position: [position.x as f32, position.y as f32],
+                residual: association.nearest.map_or([0.0; 2], |landmark| landmark.innovation.residual.into()),
+                test_ratio: association
+                    .nearest
+                    .map_or(0.0, |landmark| landmark.innovation.normalised_square / self.parameters.association.gate),
+            });
+        }
+        self.consistency.add(expected, accepted, used, square_sum);
+        if self.consistency.is_rejecting() {
+            self.lost = Some(Reason::LandmarksRejected);
+        } else if self.consistency.is_surprised() {
+            self.lost = Some(Reason::InnovationsTooLarge);
+        }
+    }
+
+    /// Algorithm 1 (K 5.4.1) for the natural features of one scan, at the poses that the whole scan has led to.
+    fn update_dynamic_map(&mut self) {
+        let Some(timeline) = self.timeline.as_mut().filter(|_| self.parameters.maps.dynamic) else {
+            return;
+        };
+        for sighting in &self.workspace.sightings {
+            let Ok(state) = timeline.state_at(sighting.time) else {
+                continue;
+            };
+            let position = sighting.observation.locate(&state.pose, &self.parameters.laser);
+            match (sighting.matched, sighting.verdict) {
+                (Some(id), _) => self.maps.dynamic.update(id, position),
+                (None, Verdict::Unknown | Verdict::Gated) => self.maps.dynamic.insert(sighting.kind, position),
+                _ => {}
+            }
+        }
+        self.maps.dynamic.finish();
+    }
+
+    fn publish(&mut self) {
+        let Some(timeline) = &mut self.timeline else {
+            return;
+        };
+        let state = timeline.state();
+        let limits = &self.parameters.limits;
+        let distance = self.distance;
+        if self.lost.is_none() {
+            let is_uncertain = state.position_deviation() > limits.largest_position_deviation
+                || state.heading_deviation() > limits.largest_heading_deviation;
+            if is_uncertain {
+                self.lost = Some(Reason::Uncertain);
+            } else if distance.any() > limits.lost_after {
+                self.lost = Some(Reason::NoLandmarks);
+            }
+        }
+        let by_reflectors = distance.reflector <= limits.dead_reckoning_from;
+        let by_features = distance.feature <= limits.dead_reckoning_from;
+        let (mode, reason) = match (self.lost, by_reflectors, by_features) {
+            (Some(reason), _, _) => (Mode::Lost, reason),
+            (None, true, true) => (Mode::Mixed, Reason::None),
+            (None, true, false) => (Mode::Reflectors, Reason::None),
+            (None, false, true) => (Mode::Features, Reason::None),
+            (None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
+        };
+        let reason =
+            if self.is_odometry_implausible && self.lost.is_none() { Reason::OdometryImplausible } else { reason };
+        let covariance = &state.covariance;
+        self.outputs.pose = PoseOutput {
+            time: timeline.now(),
+            pose: state.pose,
+            covariance: [
+                covariance.m11,
+                covariance.m12,
+                covariance.m22,
+                covariance.m13,
+                covariance.m23,
+                covariance.m33,
+            ],
+            mode,
+            reason,
+            dead_reckoning_distance: distance.any(),
+            acceptance: self.consistency.acceptance(),
+            normalised_square: self.consistency.mean_normalised_square(),
+        };
+    }
+}
+
+/// Observations of reflectors as the filter takes them.
+fn see_reflectors(
+    parameters: &Parameters,
+    observations: &[ReflectorObservation],
+    sightings: &mut Vec<Sighting, OBSERVATIONS>,
+) {
+    let reflectors = &parameters.reflectors;
+    for observation in observations {
+        if !(observation.range.is_finite() && observation.bearing.is_finite()) {
+            continue;
+        }
+        let observation_model = Observation::RangeBearing(RangeBearing {
+            range: f64::from(observation.range),
+            bearing: difference(f64::from(observation.bearing), 0.0),
+            range_variance: reflectors.range_deviation * reflectors.range_deviation,
+            bearing_variance: reflectors.bearing_deviation * reflectors.bearing_deviation,
+        });
+        // A revolution with more reflectors than there is room for keeps the first ones.
+        let _ = sightings.push(Sighting {
+            time: observation.time,
+            kind: LandmarkKind::Reflector,
+            observation: observation_model,
+            matched: None,
+            verdict: Verdict::Unknown,
+        });
+    }
+}

@@ -1,0 +1,63 @@
+//! How wrong the vehicle's own account may be.
+
+use nalgebra::{Matrix2, Matrix3};
+use serde::{Deserialize, Serialize};
+
+use super::Control;
+
+/// Noise of the odometry. Noise of the controls enters through their Jacobian, unlike K 5.3, where it is added to the
+/// state; the other terms are the floor for what the model of the vehicle does not know.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OdometryNoise {
+    /// Standard deviation of the speed of the wheel, independent from sample to sample, m/s.
+    pub speed: f64,
+    /// Standard deviation of the steering angle, independent from sample to sample, rad.
+    pub steering: f64,
+    /// Random walk of the way of the wheel (slip), m for a square root of a metre.
+    pub slip: f64,
+    /// Random walk across the direction of travel, m for a square root of a metre.
+    pub side_slip: f64,
+    /// Random walk of the heading, rad for a square root of a metre.
+    pub yaw: f64,
+}
+
+impl Default for OdometryNoise {
+    /// A vehicle that was calibrated with some care.
+    fn default() -> Self {
+        Self { speed: 0.0, steering: 2e-4, slip: 4e-3, side_slip: 1e-3, yaw: 1e-3 }
+    }
+}
+
+impl OdometryNoise {
+    /// Covariance of the displacement that `control` makes in `duration` seconds, in R at the start.
+    #[must_use]
+    pub fn of_control(&self, control: &Control, wheelbase: f64, duration: f64) -> Matrix3<f64> {
+        let speed = self.speed * duration;
+        let controls = Matrix2::new(
+            speed * speed + self.slip * self.slip * libm::fabs(control.distance),
+            0.0,
+            0.0,
+            self.steering * self.steering,
+        );
+        let jacobian = control.jacobian(wheelbase);
+        jacobian * controls * jacobian.transpose() + self.floor(libm::fabs(control.distance))
+    }
+
+    /// Covariance of a displacement of that length, m, that the vehicle has integrated itself.
+    #[must_use]
+    pub fn of_displacement(&self, distance: f64, duration: f64) -> Matrix3<f64> {
+        let speed = self.speed * duration;
+        let mut covariance = self.floor(distance);
+        covariance.m11 += speed * speed + self.slip * self.slip * distance;
+        covariance
+    }
+
+    fn floor(&self, distance: f64) -> Matrix3<f64> {
+        Matrix3::from_diagonal(&nalgebra::Vector3::new(
+            0.0,
+            self.side_slip * self.side_slip * distance,
+            self.yaw * self.yaw * distance,
+        ))
+    }
+}
