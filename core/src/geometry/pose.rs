@@ -39,7 +39,9 @@ fn arc_factors(theta: f64) -> (f64, f64) {
         (1.0 - square / 6.0 * (1.0 - square / 20.0), theta * 0.5 * (1.0 - square / 12.0))
     } else {
         let (sine, cosine) = libm::sincos(theta);
-        (sine / theta, (1.0 - cosine) / theta)
+        // The second form does not cancel for small rotations.
+        let versine = if cosine < 0.0 { 1.0 - cosine } else { sine * sine / (1.0 + cosine) };
+        (sine / theta, versine / theta)
     }
 }
 

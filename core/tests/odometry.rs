@@ -1,0 +1,250 @@
+//! Counters, integration and control noise, against closed forms and finite differences.
+
+use agv_core::geometry::{Pose, difference};
+use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
+use agv_core::odometry::{
+    Ackermann, Control, CounterRange, Integration, Odometer, OdometryError, OdometryNoise, Tricycle, Vehicle,
+};
+use proptest::prelude::*;
+
+const WHEELBASE: f64 = 1.5;
+
+proptest! {
+    #[test]
+    fn counters_of_any_range_find_the_shortest_step(
+        values in prop_oneof![Just(1u64 << 16), Just(1 << 24), Just(1 << 32), 2u64..=1 << 32],
+        from in any::<u64>(),
+        step in any::<i64>(),
+    ) {
+        let range = CounterRange::new(values).unwrap();
+        let half = (values / 2) as i64;
+        let step = step.rem_euclid(values as i64) - half;
+        let from = from % values;
+        let to = (from as i64 + step).rem_euclid(values as i64) as u32;
+        prop_assert_eq!(range.step(from as u32, to), step);
+    }
+
+    #[test]
+    fn the_control_jacobian_is_a_finite_difference(
+        distance in -0.5f64..0.5, start in -1.2f64..1.2, change in -0.1f64..0.1,
+    ) {
+        let control = |distance: f64, shift: f64| Control {
+            distance,
+            steering_start: start + shift,
+            steering_end: start + change + shift,
+        };
+        let jacobian = control(distance, 0.0).jacobian(WHEELBASE);
+        let step = 1e-6;
+        let at = |distance: f64, shift: f64| {
+            let end = control(distance, shift).displacement(WHEELBASE, Integration::RungeKutta2);
+            [end.x, end.y, end.theta]
+        };
+        let by_distance = (at(distance + step, 0.0), at(distance - step, 0.0));
+        let by_steering = (at(distance, step), at(distance, -step));
+        for (column, (above, below)) in [by_distance, by_steering].into_iter().enumerate() {
+            for row in 0..3 {
+                let slope = (above[row] - below[row]) / (2.0 * step);
+                prop_assert!((jacobian[(row, column)] - slope).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn all_integrations_agree_on_straight_motion(distance in -2.0f64..2.0) {
+        let control = Control { distance, steering_start: 0.0, steering_end: 0.0 };
+        for integration in [Integration::RungeKutta2, Integration::Arc, Integration::RungeKutta4] {
+            let end = control.displacement(WHEELBASE, integration);
+            prop_assert!((end.x - distance).abs() < 1e-15 && end.y == 0.0 && end.theta == 0.0);
+        }
+    }
+
+    #[test]
+    fn a_motion_split_anywhere_adds_up(distance in -0.3f64..0.3, steering in -1.0f64..1.0, micros in 0u64..10_000) {
+        let mut odometer = tricycle_odometer();
+        let ticks = (distance / 1e-4) as i64;
+        let sample = |time, drive: i64| EncoderSample {
+            time: Time::from_micros(time),
+            drive: drive as u32,
+            steering: (steering / 1e-3) as i64 as u32 & 0xFFFF,
+        };
+        prop_assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
+        let motion = odometer.encoders(&sample(10_000, ticks)).unwrap();
+        let (first, second) = motion.split(Time::from_micros(micros));
+        let end = first.displacement.compose(&second.displacement);
+        prop_assert!(same(&end, &motion.displacement, 1e-14));
+        prop_assert!(((first.covariance + second.covariance) - motion.covariance).norm() < 1e-15);
+        prop_assert_eq!((first.start, first.end, second.end), (motion.start, second.start, motion.end));
+        // Where an extrapolation has guessed wrongly, the remainder still leads to the same end.
+        let guess = Pose::new(0.01, -0.002, 0.003);
+        let rest = motion.remainder(&guess, Time::from_micros(micros));
+        prop_assert!(same(&guess.compose(&rest.displacement), &motion.displacement, 1e-14));
+    }
+}
+
+fn same(a: &Pose, b: &Pose, tolerance: f64) -> bool {
+    (a.x - b.x).abs() < tolerance && (a.y - b.y).abs() < tolerance && difference(a.theta, b.theta).abs() < tolerance
+}
+
+fn tricycle() -> Tricycle {
+    Tricycle {
+        wheelbase: WHEELBASE,
+        drive_scale: 1e-4,
+        drive_range: CounterRange::BITS_32,
+        steering_scale: 1e-3,
+        steering_range: CounterRange::BITS_16,
+        steering_offset_forward: 0.0,
+        steering_offset_backward: 0.0,
+    }
+}
+
+fn tricycle_odometer() -> Odometer {
+    Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::RungeKutta2, 100.0)
+}
+
+/// Error of the end pose after a drive of 2 m whose steering angle is `rate * way`, in `steps` steps, against the
+/// integral of the same drive in a million steps of the midpoint rule.
+fn error_of(integration: Integration, steps: usize, rate: f64) -> f64 {
+    let drive = |steps: usize, integration: Integration| {
+        (0..steps).fold(Pose::default(), |pose, step| {
+            let way = |step: usize| 2.0 * step as f64 / steps as f64;
+            let control = Control {
+                distance: 2.0 / steps as f64,
+                steering_start: rate * way(step),
+                steering_end: rate * way(step + 1),
+            };
+            pose.compose(&control.displacement(WHEELBASE, integration))
+        })
+    };
+    let mut truth = (0.0, 0.0, 0.0f64);
+    let fine = 1_000_000;
+    let ds = 2.0 / fine as f64;
+    for step in 0..fine {
+        let steering = rate * (step as f64 + 0.5) * ds;
+        let middle = truth.2 + 0.5 * ds / WHEELBASE * steering.sin();
+        truth.0 += ds * steering.cos() * middle.cos();
+        truth.1 += ds * steering.cos() * middle.sin();
+        truth.2 += ds / WHEELBASE * steering.sin();
+    }
+    let end = drive(steps, integration);
+    (end.x - truth.0).hypot(end.y - truth.1)
+}
+
+#[test]
+fn integrations_converge_with_their_order() {
+    for (integration, order) in
+        [(Integration::RungeKutta2, 2.0), (Integration::Arc, 2.0), (Integration::RungeKutta4, 4.0)]
+    {
+        let measured = (error_of(integration, 8, 0.5) / error_of(integration, 16, 0.5)).log2();
+        assert!((measured - order).abs() < 0.25, "{integration:?} has order {measured:.2}");
+    }
+}
+
+#[test]
+fn an_arc_of_constant_steering_is_exact() {
+    // K 2.8, 2.9: radius L / tan(alpha).
+    let steering: f64 = 0.6;
+    let control = Control { distance: 1.2, steering_start: steering, steering_end: steering };
+    let end = control.displacement(WHEELBASE, Integration::Arc);
+    let turned = 1.2 * steering.sin() / WHEELBASE;
+    let radius = WHEELBASE / steering.tan();
+    let expected = Pose::new(radius * turned.sin(), radius * (1.0 - turned.cos()), turned);
+    assert!(same(&end, &expected, 1e-14));
+}
+
+#[test]
+fn the_asymmetric_model_uses_the_offset_of_the_direction() {
+    let asymmetric =
+        Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
+    let mut odometer =
+        Odometer::new(Vehicle::Tricycle(asymmetric), OdometryNoise::default(), Integration::Arc, 100.0);
+    let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
+    assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
+    let forward = odometer.encoders(&sample(1_000_000, 10_000)).unwrap();
+    let backward = odometer.encoders(&sample(2_000_000, 0)).unwrap();
+    assert!((forward.displacement.theta - 0.01f64.sin() / WHEELBASE).abs() < 1e-15);
+    assert!((backward.displacement.theta - 0.02f64.sin() / WHEELBASE).abs() < 1e-15);
+}
+
+#[test]
+fn a_drive_counter_that_wraps_goes_on() {
+    let small = Tricycle { drive_range: CounterRange::new(5_000).unwrap(), ..tricycle() };
+    let mut odometer = Odometer::new(Vehicle::Tricycle(small), OdometryNoise::default(), Integration::Arc, 100.0);
+    let mut way = 0.0;
+    for step in 0u64..100 {
+        let drive = (step * 700 % 5_000) as u32;
+        let sample = EncoderSample { time: Time::from_micros(step * 10_000), drive, steering: 0 };
+        if let Ok(motion) = odometer.encoders(&sample) {
+            way += motion.displacement.x;
+        }
+    }
+    assert!((way - 99.0 * 700.0 * 1e-4).abs() < 1e-12);
+}
+
+#[test]
+fn a_car_turns_about_the_point_that_its_wheels_agree_on() {
+    // Rear-left wheel at radius R - H, rear axle's centre at R = L / tan(steering).
+    let car = Ackermann { wheelbase: 2.83, encoder_offset: 0.76 };
+    let mut odometer = Odometer::new(Vehicle::Ackermann(car), OdometryNoise::default(), Integration::Arc, 100.0);
+    let steering: f64 = 0.3;
+    let radius = 2.83 / steering.tan();
+    let turn_rate = 0.4;
+    let speed = turn_rate * (radius - 0.76);
+    let sample = |time| SpeedSample { time: Time::from_micros(time), speed, steering };
+    assert_eq!(odometer.speed(&sample(0)), Err(OdometryError::First));
+    let motion = odometer.speed(&sample(500_000)).unwrap();
+    let turned: f64 = 0.5 * turn_rate;
+    let expected = Pose::new(radius * turned.sin(), radius * (1.0 - turned.cos()), turned);
+    assert!(same(&motion.displacement, &expected, 1e-12));
+}
+
+#[test]
+fn samples_that_cannot_be_are_refused() {
+    let mut odometer = Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::Arc, 2.0);
+    let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
+    assert_eq!(odometer.encoders(&sample(100, 0)), Err(OdometryError::First));
+    assert_eq!(odometer.encoders(&sample(100, 1)), Err(OdometryError::OutOfOrder));
+    assert_eq!(odometer.encoders(&sample(10_100, 60_000)), Err(OdometryError::Implausible));
+    assert!(odometer.encoders(&sample(20_100, 60_010)).is_ok());
+    let speed = SpeedSample { time: Time::from_micros(0), speed: 1.0, steering: 0.0 };
+    assert_eq!(odometer.speed(&speed), Err(OdometryError::WrongVehicle));
+    let increment = PoseIncrement { time: Time::from_micros(0), displacement: Pose::default() };
+    assert_eq!(odometer.increment(&increment), Err(OdometryError::WrongVehicle));
+}
+
+#[test]
+fn the_stated_covariance_is_the_spread_of_noisy_controls() {
+    // 20,000 draws of the controls, propagated through the integration itself.
+    let noise = OdometryNoise { speed: 0.1, steering: 0.02, slip: 0.0, side_slip: 0.0, yaw: 0.0 };
+    let control = Control { distance: 0.3, steering_start: 0.4, steering_end: 0.45 };
+    let stated = noise.of_control(&control, WHEELBASE, 0.1);
+    let mut state = 0x1234_5678_9ABC_DEF0u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+    let centre = control.displacement(WHEELBASE, Integration::RungeKutta2);
+    let draws = 20_000;
+    let mut spread = [[0.0; 3]; 3];
+    for _ in 0..draws {
+        let shift = 0.02 * normal();
+        let noisy = Control {
+            distance: control.distance + 0.1 * 0.1 * normal(),
+            steering_start: control.steering_start + shift,
+            steering_end: control.steering_end + shift,
+        };
+        let end = noisy.displacement(WHEELBASE, Integration::RungeKutta2);
+        let error = [end.x - centre.x, end.y - centre.y, end.theta - centre.theta];
+        for row in 0..3 {
+            for column in 0..3 {
+                spread[row][column] += error[row] * error[column] / f64::from(draws);
+            }
+        }
+    }
+    for row in 0..3 {
+        for column in 0..3 {
+            let scale = (stated[(row, row)] * stated[(column, column)]).sqrt();
+            assert!((spread[row][column] - stated[(row, column)]).abs() < 0.05 * scale, "entry {row} {column}");
+        }
+    }
+}
