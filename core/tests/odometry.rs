@@ -153,10 +153,8 @@ fn an_arc_of_constant_steering_is_exact() {
 
 #[test]
 fn the_asymmetric_model_uses_the_offset_of_the_direction() {
-    let asymmetric =
-        Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
-    let mut odometer =
-        Odometer::new(Vehicle::Tricycle(asymmetric), OdometryNoise::default(), Integration::Arc, 100.0);
+    let asymmetric = Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
+    let mut odometer = Odometer::new(Vehicle::Tricycle(asymmetric), OdometryNoise::default(), Integration::Arc, 100.0);
     let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
     assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
     let forward = odometer.encoders(&sample(1_000_000, 10_000)).unwrap();

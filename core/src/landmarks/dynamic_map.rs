@@ -24,9 +24,9 @@ pub struct DynamicMapParameters {
 }
 
 impl Default for DynamicMapParameters {
-    /// Update rate of K 5.6; a landmark counts as soon as it exists, as Algorithm 1 has it.
+    /// Update rate of K 5.6; a landmark counts as long as it exists, as Algorithm 1 has it.
     fn default() -> Self {
-        Self { update_rate: 0.1, first_hits: 1, most_hits: u16::MAX, least_hits: 1, deviation: 0.0 }
+        Self { update_rate: 0.1, first_hits: 1, most_hits: u16::MAX, least_hits: 0, deviation: 0.0 }
     }
 }
 
