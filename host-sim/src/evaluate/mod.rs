@@ -1,1 +1,3 @@
-//! To come.
+//! Experiments: how good it is, one file an experiment.
+
+pub mod accuracy;

@@ -1,1 +1,59 @@
-//! To come.
+//! The core against a recording.
+
+use std::time::{Duration, Instant};
+
+use agv_core::landmarks::MapError;
+use agv_core::localizer::{LandmarkUse, Localizer, PoseOutput};
+use thiserror::Error;
+
+use crate::recording::Recording;
+
+/// What the localiser said of a whole recording.
+#[derive(Clone, Debug, Default)]
+pub struct Replay {
+    /// The pose after each event.
+    pub poses: Vec<PoseOutput>,
+    /// What became of each observation.
+    pub uses: Vec<LandmarkUse>,
+    /// Landmarks that were found while driving, as they are at the end.
+    pub dynamic_landmarks: Vec<[f64; 2]>,
+    /// Processor time that the core took.
+    pub elapsed: Duration,
+}
+
+/// Why a recording cannot be replayed.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum ReplayError {
+    /// The map is larger than the localiser's memory.
+    #[error("the map of the recording has more landmarks than the localiser has room for")]
+    MapTooLarge,
+    /// A landmark is not finite.
+    #[error("the map of the recording holds a position that is not a number")]
+    MapNotFinite,
+}
+
+/// Feeds all events of a recording to a new localiser. `progress` is called with the number of events done.
+///
+/// # Errors
+/// [`ReplayError`] if the recording's map cannot be used.
+pub fn replay(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<Replay, ReplayError> {
+    let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
+    localizer.add_landmarks(&recording.landmarks).map_err(|error| match error {
+        MapError::Full => ReplayError::MapTooLarge,
+        MapError::NotFinite => ReplayError::MapNotFinite,
+    })?;
+    let mut replay = Replay { poses: Vec::with_capacity(recording.events.len()), ..Replay::default() };
+    let start = Instant::now();
+    for (index, event) in recording.events.iter().enumerate() {
+        let outputs = localizer.handle(&event.view());
+        replay.poses.push(outputs.pose);
+        replay.uses.extend_from_slice(&outputs.uses);
+        if index % 1024 == 0 {
+            progress(index);
+        }
+    }
+    replay.elapsed = start.elapsed();
+    replay.dynamic_landmarks = localizer.dynamic_landmarks().iter().map(|landmark| landmark.position.into()).collect();
+    progress(recording.events.len());
+    Ok(replay)
+}
