@@ -1,1 +1,254 @@
-//! To come.
+//! Drives that never happened: a world, a vehicle in it, and what its sensors would have said.
+//!
+//! A scenario and its seed fix every bit of a simulation, on every machine: random numbers have a specified sequence and
+//! elementary functions are those of `libm`.
+
+pub mod block_storage;
+pub mod laser;
+pub mod odometer;
+pub mod path;
+pub mod people;
+pub mod random;
+pub mod raycast;
+pub mod reflector_detector;
+pub mod scenario;
+pub mod speed_profile;
+pub mod vehicle;
+pub mod warehouse_hall;
+pub mod world;
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::localizer::{Parameters, PoseFix};
+use agv_core::measurement::Time;
+use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
+
+use crate::recording::{RecordedEvent, Recording, Truth};
+use laser::{LaserTrack, Scene};
+use path::Path;
+use random::{Random, Stream};
+use raycast::RayCaster;
+use scenario::{MotionReport, Scenario, ScenarioError};
+use vehicle::Motion;
+use world::World;
+
+/// Why a drive cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulateError {
+    /// The scenario makes no sense.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+}
+
+/// A simulated drive and the truth behind it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// What the localiser is told, and where the vehicle was.
+    pub recording: Recording,
+    /// What stood where.
+    pub world: World,
+    /// The way that the vehicle was meant to drive.
+    pub path: Path,
+    /// The true tricycle.
+    pub true_tricycle: Tricycle,
+    /// True mounting of the laser, S in R.
+    pub true_laser: Pose,
+}
+
+/// Time of a drive's first event. Not zero, so that instants a little earlier exist.
+pub const START: Time = Time::from_micros(1_000_000);
+
+/// Simulates the drive of `scenario`.
+///
+/// # Errors
+/// The scenario makes no sense.
+pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
+    scenario.check()?;
+    let world = scenario.build_world();
+    let path = scenario.build_path();
+    let true_tricycle = true_tricycle(scenario);
+    let true_laser = true_laser(scenario);
+    let mut odometry_random = Random::new(scenario.seed, Stream::Odometry);
+    let motion = vehicle::drive(
+        &path,
+        true_tricycle.wheelbase,
+        &scenario.drive,
+        &scenario.odometry,
+        1.0 / scenario.odometry.rate,
+        &mut odometry_random,
+    );
+
+    let mut arrivals = Arrivals::default();
+    if scenario.start.given {
+        arrivals.add(START, RecordedEvent::SetPose(start_fix(scenario, &path.start)));
+    }
+    report_motion(&mut arrivals, scenario, &motion, &true_tricycle, &mut odometry_random);
+    report_laser(&mut arrivals, scenario, &world, &LaserTrack::new(&motion, &true_laser));
+
+    let truth = motion
+        .states
+        .iter()
+        .enumerate()
+        .map(|(index, state)| Truth { time: START.offset(index as f64 * motion.interval), pose: state.pose })
+        .collect();
+    let recording = Recording {
+        parameters: believed_parameters(scenario),
+        landmarks: survey(scenario, &world),
+        events: arrivals.in_order(),
+        truth,
+    };
+    Ok(Simulation { recording, world, path, true_tricycle, true_laser })
+}
+
+/// What the localiser believes of vehicle and laser.
+#[must_use]
+pub fn believed_parameters(scenario: &Scenario) -> Parameters {
+    let believed = &scenario.vehicle.believed;
+    let vehicle = match scenario.vehicle.reports {
+        MotionReport::Encoders => Vehicle::Tricycle(believed_tricycle(scenario)),
+        MotionReport::Speed => {
+            Vehicle::Ackermann(Ackermann { wheelbase: believed.wheelbase, encoder_offset: believed.encoder_offset })
+        }
+        MotionReport::Increments => Vehicle::Increments,
+    };
+    Parameters { vehicle, laser: scenario.laser.mounting.pose() }
+}
+
+fn believed_tricycle(scenario: &Scenario) -> Tricycle {
+    let believed = &scenario.vehicle.believed;
+    Tricycle {
+        wheelbase: believed.wheelbase,
+        drive_scale: believed.drive_scale,
+        drive_range: CounterRange::new(believed.drive_counter).unwrap_or(CounterRange::BITS_32),
+        steering_scale: std::f64::consts::TAU / believed.steering_counter as f64,
+        steering_range: CounterRange::new(believed.steering_counter).unwrap_or(CounterRange::BITS_32),
+        steering_offset_forward: believed.steering_offset_forward_deg.to_radians(),
+        steering_offset_backward: believed.steering_offset_backward_deg.to_radians(),
+    }
+}
+
+fn true_tricycle(scenario: &Scenario) -> Tricycle {
+    let errors = &scenario.vehicle.truth;
+    let mut random = Random::new(scenario.seed, Stream::Vehicle);
+    let signs = if errors.random_signs { [random.sign(), random.sign()] } else { [1.0, 1.0] };
+    let offset_error = signs[1] * errors.steering_offset_error_deg.to_radians();
+    let believed = believed_tricycle(scenario);
+    Tricycle {
+        wheelbase: believed.wheelbase + errors.wheelbase_error,
+        drive_scale: believed.drive_scale * (1.0 + signs[0] * errors.drive_scale_error),
+        steering_offset_forward: believed.steering_offset_forward + offset_error,
+        steering_offset_backward: believed.steering_offset_backward + offset_error,
+        ..believed
+    }
+}
+
+fn true_laser(scenario: &Scenario) -> Pose {
+    let (believed, error) = (scenario.laser.mounting, scenario.vehicle.truth.laser_error);
+    Pose::new(believed.x + error.x, believed.y + error.y, (believed.heading_deg + error.heading_deg).to_radians())
+}
+
+fn start_fix(scenario: &Scenario, truth: &Pose) -> PoseFix {
+    let position_deviation = scenario.start.position_deviation;
+    let heading_deviation = scenario.start.heading_deviation_deg.to_radians();
+    let mut random = Random::new(scenario.seed, Stream::Start);
+    let pose = Pose::new(
+        truth.x + position_deviation * random.normal(),
+        truth.y + position_deviation * random.normal(),
+        truth.theta + heading_deviation * random.normal(),
+    );
+    PoseFix { time: START, pose, position_deviation, heading_deviation }
+}
+
+fn survey(scenario: &Scenario, world: &World) -> Vec<Landmark> {
+    let deviation = scenario.reflectors.survey_deviation;
+    let mut random = Random::new(scenario.seed, Stream::Survey);
+    world
+        .reflectors
+        .iter()
+        .zip(0_u16..)
+        .map(|(reflector, id)| Landmark {
+            id,
+            kind: LandmarkKind::Reflector,
+            x: reflector.body.centre.x + deviation * random.normal(),
+            y: reflector.body.centre.y + deviation * random.normal(),
+            deviation: deviation as f32,
+        })
+        .collect()
+}
+
+fn report_motion(
+    arrivals: &mut Arrivals,
+    scenario: &Scenario,
+    motion: &Motion,
+    tricycle: &Tricycle,
+    random: &mut Random,
+) {
+    let options = &scenario.odometry;
+    let scale = tricycle.drive_scale / scenario.vehicle.believed.drive_scale;
+    let believed_offset = scenario.vehicle.believed.steering_offset_forward_deg.to_radians();
+    let offset_error = tricycle.steering_offset_forward - believed_offset;
+    match scenario.vehicle.reports {
+        MotionReport::Encoders => {
+            for sample in odometer::encoders(motion, tricycle, options, START, random) {
+                arrivals.add(sample.time, RecordedEvent::Encoders(sample));
+            }
+        }
+        MotionReport::Speed => {
+            let car =
+                Ackermann { wheelbase: tricycle.wheelbase, encoder_offset: scenario.vehicle.believed.encoder_offset };
+            for sample in odometer::speeds(motion, &car, scale, offset_error, options, START, random) {
+                arrivals.add(sample.time, RecordedEvent::Speed(sample));
+            }
+        }
+        MotionReport::Increments => {
+            let turn = libm::tan(offset_error) / tricycle.wheelbase;
+            for sample in odometer::increments(motion, scale, turn, options, START, random) {
+                arrivals.add(sample.time, RecordedEvent::Increment(sample));
+            }
+        }
+    }
+}
+
+fn report_laser(arrivals: &mut Arrivals, scenario: &Scenario, world: &World, track: &LaserTrack) {
+    let caster = RayCaster::new(world);
+    let scene = Scene { fixed: &caster, people: &world.people };
+    let mut noise = Random::new(scenario.seed, Stream::Laser);
+    let mut faults = Random::new(scenario.seed, Stream::LaserFaults);
+    let mut reflector_random = Random::new(scenario.seed, Stream::Reflectors);
+    for revolution in 0..laser::revolutions(&scenario.laser, track) {
+        let end = START.offset((revolution + 1) as f64 / scenario.laser.frequency);
+        if !world.reflectors.is_empty() {
+            let observations = reflector_detector::detect(
+                revolution,
+                &scene,
+                &world.reflectors,
+                track,
+                &scenario.laser,
+                &scenario.reflectors,
+                START,
+                &mut reflector_random,
+            );
+            arrivals.add(end.offset(scenario.reflectors.latency), RecordedEvent::Reflectors(observations));
+        }
+        if scenario.laser.scans {
+            let scan = laser::scan(revolution, &scene, track, &scenario.laser, START, &mut noise, &mut faults);
+            arrivals.add(end.offset(scenario.laser.latency), RecordedEvent::Scan(scan));
+        }
+    }
+}
+
+/// Events with the time at which they reach the localiser.
+#[derive(Default)]
+struct Arrivals(Vec<(Time, RecordedEvent)>);
+
+impl Arrivals {
+    fn add(&mut self, arrival: Time, event: RecordedEvent) {
+        self.0.push((arrival, event));
+    }
+
+    /// Events that arrive at once keep the order in which they were added.
+    fn in_order(mut self) -> Vec<RecordedEvent> {
+        self.0.sort_by_key(|(arrival, _)| *arrival);
+        self.0.into_iter().map(|(_, event)| event).collect()
+    }
+}

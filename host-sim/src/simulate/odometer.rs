@@ -1,0 +1,103 @@
+//! What the vehicle's own sensors say of its motion.
+
+use agv_core::geometry::Pose;
+use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
+use agv_core::odometry::{Ackermann, CounterRange, Tricycle};
+
+use super::path::Direction;
+use super::random::Random;
+use super::scenario::OdometryOptions;
+use super::vehicle::Motion;
+
+/// Counters of a tricycle with the true parameters `tricycle`, one sample a state of `motion`; `start` is the time of the
+/// first. Slip and steering noise are in the counters; the driving counter starts anywhere.
+#[must_use]
+pub fn encoders(
+    motion: &Motion,
+    tricycle: &Tricycle,
+    options: &OdometryOptions,
+    start: Time,
+    random: &mut Random,
+) -> Vec<EncoderSample> {
+    let steering_noise = options.steering_noise_deg.to_radians();
+    let mut counted_way = tricycle.drive_scale * random.uniform() * tricycle.drive_range.values() as f64;
+    let mut wheel_way = 0.0;
+    let mut samples = Vec::with_capacity(motion.states.len());
+    for (index, state) in motion.states.iter().enumerate() {
+        let moved = state.wheel_way - wheel_way;
+        wheel_way = state.wheel_way;
+        counted_way += moved + options.slip * libm::sqrt(moved.abs()) * random.normal();
+        let offset = match state.direction {
+            Direction::Forward => tricycle.steering_offset_forward,
+            Direction::Backward => tricycle.steering_offset_backward,
+        };
+        let steering = state.steering - offset + steering_noise * random.normal();
+        samples.push(EncoderSample {
+            time: start.offset(index as f64 * motion.interval),
+            drive: counter(libm::floor(counted_way / tricycle.drive_scale), tricycle.drive_range),
+            steering: counter(libm::round(steering / tricycle.steering_scale), tricycle.steering_range),
+        });
+    }
+    samples
+}
+
+/// Speed of the rear wheel and steering angle of a car whose virtual front wheel is the tricycle's wheel. A sample tells
+/// the mean speed since the one before; `speed_scale` is the true way over the reported one and `steering_offset` (rad)
+/// is what is missing in the reported angle.
+#[must_use]
+pub fn speeds(
+    motion: &Motion,
+    car: &Ackermann,
+    speed_scale: f64,
+    steering_offset: f64,
+    options: &OdometryOptions,
+    start: Time,
+    random: &mut Random,
+) -> Vec<SpeedSample> {
+    let steering_noise = options.steering_noise_deg.to_radians();
+    let mut previous = motion.states.first().copied();
+    let mut samples = Vec::with_capacity(motion.states.len());
+    for (index, state) in motion.states.iter().enumerate() {
+        let before = previous.replace(*state).unwrap_or(*state);
+        let mean_steering = 0.5 * (before.steering + state.steering);
+        let centre_way = (state.wheel_way - before.wheel_way) * libm::cos(mean_steering);
+        let rotation = centre_way * libm::tan(mean_steering) / car.wheelbase;
+        let rear_wheel_way = centre_way - rotation * car.encoder_offset;
+        let counted = rear_wheel_way + options.slip * libm::sqrt(rear_wheel_way.abs()) * random.normal();
+        samples.push(SpeedSample {
+            time: start.offset(index as f64 * motion.interval),
+            speed: counted / speed_scale / motion.interval,
+            steering: state.steering - steering_offset + steering_noise * random.normal(),
+        });
+    }
+    samples
+}
+
+/// Displacements between states, with the way too long or short by `way_scale` and turned by `turn` (rad) a metre.
+#[must_use]
+pub fn increments(
+    motion: &Motion,
+    way_scale: f64,
+    turn: f64,
+    options: &OdometryOptions,
+    start: Time,
+    random: &mut Random,
+) -> Vec<PoseIncrement> {
+    let mut previous = motion.states.first().map(|state| state.pose);
+    let mut samples = Vec::with_capacity(motion.states.len());
+    for (index, state) in motion.states.iter().enumerate() {
+        let before = previous.replace(state.pose).unwrap_or(state.pose);
+        let moved = before.between(&state.pose);
+        let slip = options.slip * libm::sqrt(moved.x.abs()) * random.normal();
+        samples.push(PoseIncrement {
+            time: start.offset(index as f64 * motion.interval),
+            displacement: Pose::new((moved.x + slip) / way_scale, moved.y / way_scale, moved.theta - turn * moved.x),
+        });
+    }
+    samples
+}
+
+/// What a counter shows after that many ticks.
+fn counter(ticks: f64, range: CounterRange) -> u32 {
+    (ticks as i64).rem_euclid(range.values() as i64) as u32
+}

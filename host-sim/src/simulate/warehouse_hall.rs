@@ -1,0 +1,135 @@
+//! A hall of 60 x 40 m with double racks, a column grid and reflectors, and a loop through two of its aisles.
+//!
+//! W starts in a corner of the hall; the racks run along its first axis.
+
+use std::f64::consts::FRAC_PI_2;
+
+use agv_core::geometry::{Point, Pose};
+use serde::{Deserialize, Serialize};
+
+use super::path::{Direction, Leg, Path, PathSegment};
+use super::random::{Random, Stream};
+use super::world::{Circle, Rectangle, Reflector, World};
+
+/// What differs between halls.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WarehouseHall {
+    /// Seed of dimensions and positions; the scenario's seed if absent.
+    pub seed: Option<u64>,
+    /// Whether there are reflectors.
+    pub reflectors: bool,
+    /// Share of the racks' places that are taken, 0 to 1.
+    pub filled_share: f64,
+}
+
+impl Default for WarehouseHall {
+    fn default() -> Self {
+        Self { seed: None, reflectors: true, filled_share: 0.8 }
+    }
+}
+
+const LENGTH: f64 = 60.0;
+const WIDTH: f64 = 40.0;
+const RACK_START: f64 = 14.0;
+const RACK_AXES: [f64; 4] = [8.0, 16.0, 24.0, 32.0];
+const BAYS: usize = 11;
+const BAY: f64 = 2.75;
+/// From a double rack's axis to its faces.
+const RACK_HALF_DEPTH: f64 = 1.15;
+const UPRIGHT: f64 = 0.1;
+const COLUMN: f64 = 0.4;
+const REFLECTOR_RADIUS: f64 = 0.04;
+const REFLECTOR_FARTHEST: f64 = 30.0;
+const WALL_SPACING: f64 = 7.0;
+const TURN_RADIUS: f64 = 2.5;
+
+impl WarehouseHall {
+    /// Builds the hall. `seed` is the scenario's.
+    #[must_use]
+    pub fn world(&self, seed: u64) -> World {
+        let mut random = Random::new(self.seed.unwrap_or(seed), Stream::World);
+        let mut world = World::default();
+        world.add_hall(Point::zeros(), Point::new(LENGTH, WIDTH));
+        for axis in RACK_AXES {
+            for side in [-1.0, 1.0] {
+                self.add_rack_side(&mut world, axis, side, &mut random);
+            }
+        }
+        for x in [7.0, 53.0] {
+            for y in [4.0, 16.0, 24.0, 36.0] {
+                let pose = Pose::new(x, y + random.between(-0.1, 0.1), 0.0);
+                world.add_rectangle(&Rectangle { pose, length: COLUMN, width: COLUMN });
+                let reflector = pose.position() + Point::new(0.0, 0.5 * COLUMN + 1.5 * REFLECTOR_RADIUS);
+                self.add_reflector(&mut world, reflector);
+            }
+        }
+        self.add_wall_reflectors(&mut world, &mut random);
+        world
+    }
+
+    fn add_rack_side(&self, world: &mut World, axis: f64, side: f64, random: &mut Random) {
+        let face = axis + side * RACK_HALF_DEPTH;
+        for bay in 0..=BAYS {
+            let x = RACK_START + bay as f64 * BAY;
+            let pose = Pose::new(x, face - side * 0.5 * UPRIGHT, 0.0);
+            world.add_rectangle(&Rectangle { pose, length: UPRIGHT, width: UPRIGHT });
+            let has_reflector = random.happens(0.25) || bay == 0 || bay == BAYS;
+            if has_reflector {
+                self.add_reflector(world, Point::new(x, face + side * 1.5 * REFLECTOR_RADIUS));
+            }
+            if bay == BAYS {
+                break;
+            }
+            for place in [0.28, 0.72] {
+                let is_filled = random.happens(self.filled_share);
+                let yaw = random.between(-0.8, 0.8).to_radians();
+                let x = x + place * BAY + random.between(-0.04, 0.04);
+                let y = face - side * (0.56 + random.between(0.0, 0.05));
+                if is_filled {
+                    world.add_rectangle(&Rectangle { pose: Pose::new(x, y, yaw), length: 0.8, width: 1.0 });
+                }
+            }
+        }
+    }
+
+    fn add_wall_reflectors(&self, world: &mut World, random: &mut Random) {
+        let inset = 1.5 * REFLECTOR_RADIUS;
+        let mut way = 0.5 * WALL_SPACING;
+        while way < LENGTH - 1.0 {
+            for y in [inset, WIDTH - inset] {
+                self.add_reflector(world, Point::new(way + random.between(-1.5, 1.5), y));
+            }
+            way += WALL_SPACING;
+        }
+        way = 0.5 * WALL_SPACING;
+        while way < WIDTH - 1.0 {
+            for x in [inset, LENGTH - inset] {
+                self.add_reflector(world, Point::new(x, way + random.between(-1.5, 1.5)));
+            }
+            way += WALL_SPACING;
+        }
+    }
+
+    fn add_reflector(&self, world: &mut World, centre: Point) {
+        if self.reflectors {
+            let body = Circle { centre, radius: REFLECTOR_RADIUS };
+            world.reflectors.push(Reflector { body, farthest: REFLECTOR_FARTHEST, sector: None });
+        }
+    }
+}
+
+/// Once round the second rack, 90 m, counter-clockwise.
+#[must_use]
+pub fn loop_path() -> Path {
+    let turn = PathSegment::arc(TURN_RADIUS, FRAC_PI_2);
+    let long = PathSegment::straight(34.0);
+    let short = PathSegment::straight(8.0 - 2.0 * TURN_RADIUS);
+    Path {
+        start: Pose::new(12.0, 12.0, 0.0),
+        legs: vec![Leg {
+            direction: Direction::Forward,
+            segments: vec![long, turn, short, turn, long, turn, short, turn],
+        }],
+    }
+}
