@@ -1,5 +1,7 @@
 //! Frames: how a record is found, numbered and checked in a stream of bytes.
 
+use core::fmt;
+
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 /// First bytes of every frame. The first of them is no ASCII, so a text file never begins like a log.
@@ -77,6 +79,31 @@ pub struct Damage {
     pub skipped: u64,
     /// What is wrong at its beginning.
     pub reason: DamageReason,
+}
+
+impl fmt::Display for DamageReason {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Magic => write!(formatter, "no record begins there"),
+            Self::Length => write!(formatter, "the record's length is wrong"),
+            Self::Checksum => write!(formatter, "the record's checksum is wrong"),
+            Self::Cut => write!(formatter, "the log is cut off"),
+            Self::Version(version) => {
+                write!(formatter, "the record has format version {version}, this program reads {FORMAT_VERSION}")
+            }
+            Self::Kind(kind) => write!(formatter, "records of kind {kind} are unknown"),
+            Self::Payload => write!(formatter, "the record's content is not what its kind demands"),
+            Self::Sequence { expected, found } => {
+                write!(formatter, "record {expected} should have come, but {found} came")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "at byte {}: {}, {} bytes skipped", self.offset, self.reason, self.skipped)
+    }
 }
 
 /// What [`FrameReader::step`] found.

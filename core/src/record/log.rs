@@ -1,6 +1,6 @@
 //! A log: records in frames, one after the other.
 
-use super::frame::{Damage, DamageReason, FrameReader, FrameStep, seal};
+use super::frame::{Damage, DamageReason, Frame, FrameReader, FrameStep, seal};
 use super::payload::{DecodeError, EncodeError, Record, Scratch};
 
 /// Writes `record` as a frame to the beginning of `buffer` and returns its length, bytes. A buffer of
@@ -11,6 +11,22 @@ use super::payload::{DecodeError, EncodeError, Record, Scratch};
 pub fn encode(record: &Record, sequence: u32, buffer: &mut [u8]) -> Result<usize, EncodeError> {
     let payload_length = record.write_payload(buffer)?;
     seal(record.kind(), sequence, payload_length, buffer).ok_or(EncodeError::Buffer)
+}
+
+impl<'a> Frame<'a> {
+    /// The record in the frame; what cannot be borrowed from the frame's bytes is copied to `scratch`.
+    ///
+    /// # Errors
+    /// If this version knows no such kind, if the payload is not what the kind demands, or if the scratch is too small.
+    pub fn record<const BEAMS: usize, const REFLECTORS: usize>(
+        &self,
+        scratch: &'a mut Scratch<BEAMS, REFLECTORS>,
+    ) -> Result<Record<'a>, DamageReason> {
+        Record::read_payload(self.kind, self.payload, scratch).map_err(|error| match error {
+            DecodeError::Kind => DamageReason::Kind(self.kind),
+            DecodeError::Content | DecodeError::Capacity => DamageReason::Payload,
+        })
+    }
 }
 
 /// One thing found in a log.
@@ -69,18 +85,10 @@ impl LogReader {
     ) -> (usize, Step<'a>) {
         let (consumed, step) = self.frames.step(bytes, is_last);
         let step = match step {
-            FrameStep::Frame { offset, frame } => {
-                Step::Item(match Record::read_payload(frame.kind, frame.payload, scratch) {
-                    Ok(record) => Item::Record { offset, sequence: frame.sequence, record },
-                    Err(error) => {
-                        let reason = match error {
-                            DecodeError::Kind => DamageReason::Kind(frame.kind),
-                            DecodeError::Content | DecodeError::Capacity => DamageReason::Payload,
-                        };
-                        Item::Damage(Damage { offset, skipped: frame.length() as u64, reason })
-                    }
-                })
-            }
+            FrameStep::Frame { offset, frame } => Step::Item(match frame.record(scratch) {
+                Ok(record) => Item::Record { offset, sequence: frame.sequence, record },
+                Err(reason) => Item::Damage(Damage { offset, skipped: frame.length() as u64, reason }),
+            }),
             FrameStep::Damage(damage) => Step::Item(Item::Damage(damage)),
             FrameStep::NeedMore => Step::NeedMore,
             FrameStep::End => Step::End,
