@@ -2,7 +2,9 @@
 
 pub mod data;
 pub mod evaluate;
+pub mod file_kind;
 pub mod import;
+pub mod log;
 pub mod recording;
 pub mod replay;
 pub mod report;

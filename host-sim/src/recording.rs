@@ -1,9 +1,9 @@
 //! A drive in memory: what the sensors said, in the order of arrival, and apart from that where the vehicle really was.
 
-use agv_core::geometry::Pose;
 use agv_core::landmarks::Landmark;
 use agv_core::localizer::{Event, Parameters, PoseFix};
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
+pub use agv_core::record::{Reference, Truth};
 
 /// A scan that owns its ranges; the fields are those of [`Scan`].
 #[derive(Clone, Debug, PartialEq)]
@@ -69,13 +69,24 @@ impl RecordedEvent {
     }
 }
 
-/// Where the vehicle really was. The localiser never sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
-    /// When.
-    pub time: Time,
-    /// Pose of R in W.
-    pub pose: Pose,
+impl From<Event<'_>> for RecordedEvent {
+    fn from(event: Event<'_>) -> Self {
+        match event {
+            Event::Encoders(sample) => Self::Encoders(sample),
+            Event::Speed(sample) => Self::Speed(sample),
+            Event::Increment(increment) => Self::Increment(increment),
+            Event::Reflectors(reflectors) => Self::Reflectors(reflectors.observations.to_vec()),
+            Event::Scan(scan) => Self::Scan(RecordedScan {
+                start: scan.start,
+                beam_interval: scan.beam_interval,
+                first_bearing: scan.first_bearing,
+                bearing_step: scan.bearing_step,
+                ranges: scan.ranges.to_vec(),
+                intensities: scan.intensities.to_vec(),
+            }),
+            Event::SetPose(fix) => Self::SetPose(fix),
+        }
+    }
 }
 
 /// A drive in memory.
@@ -89,4 +100,6 @@ pub struct Recording {
     pub events: Vec<RecordedEvent>,
     /// Where the vehicle really was, in order of time; empty if nobody knows.
     pub truth: Vec<Truth>,
+    /// Where another instrument has seen the laser, in order of time; empty if there was none.
+    pub references: Vec<Reference>,
 }

@@ -1,0 +1,287 @@
+//! Records, and their payloads as bytes.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
+use super::truth::{Reference, Truth};
+use crate::landmarks::Landmark;
+use crate::localizer::{Event, Parameters};
+use crate::measurement::{ReflectorObservation, Reflectors, Scan, Time};
+
+/// Greatest number of landmarks in one record; a map is written in pieces.
+pub const LANDMARKS_A_RECORD: usize = 50;
+
+/// How much the localiser that wrote a log had room for. Another size may answer differently.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Capacities {
+    /// Landmarks of the map.
+    pub landmarks: u32,
+    /// Beams of a scan.
+    pub beams: u32,
+    /// Increments of the history.
+    pub history: u32,
+}
+
+/// What a log begins with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header<'a> {
+    /// Name and version of the program that wrote the log.
+    pub software: &'a str,
+    /// What the localiser believed of its vehicle.
+    pub parameters: Parameters,
+    /// What the localiser had room for.
+    pub capacities: Capacities,
+}
+
+/// One record of a log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Record<'a> {
+    /// What the log begins with.
+    Header(Header<'a>),
+    /// A piece of the map, at most [`LANDMARKS_A_RECORD`] landmarks.
+    Landmarks(&'a [Landmark]),
+    /// What the localiser was told.
+    Event(Event<'a>),
+    /// What the localiser answered to the event before, in the postcard encoding.
+    Output(&'a [u8]),
+    /// Where the vehicle really was; only a host writes it.
+    Truth(Truth),
+    /// Where another instrument has seen the laser; only a host writes it.
+    Reference(Reference),
+    /// A short text for people.
+    Note(&'a str),
+    /// The log is complete.
+    End,
+}
+
+/// Why a record cannot be encoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncodeError {
+    /// The buffer is too short for the frame.
+    Buffer,
+    /// The record is longer than a frame can be.
+    TooLong,
+}
+
+/// Room for the parts of a record that cannot be borrowed from its bytes, for at most `BEAMS` beams and `REFLECTORS`
+/// reflectors.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch<const BEAMS: usize = 4096, const REFLECTORS: usize = 1024> {
+    ranges: Vec<f32, BEAMS>,
+    intensities: Vec<u16, BEAMS>,
+    observations: Vec<ReflectorObservation, REFLECTORS>,
+    landmarks: Vec<Landmark, LANDMARKS_A_RECORD>,
+}
+
+impl<const BEAMS: usize, const REFLECTORS: usize> Scratch<BEAMS, REFLECTORS> {
+    /// Empty room.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { ranges: Vec::new(), intensities: Vec::new(), observations: Vec::new(), landmarks: Vec::new() }
+    }
+}
+
+mod kind {
+    pub const HEADER: u8 = 0;
+    pub const LANDMARKS: u8 = 1;
+    pub const ENCODERS: u8 = 2;
+    pub const SPEED: u8 = 3;
+    pub const INCREMENT: u8 = 4;
+    pub const REFLECTORS: u8 = 5;
+    pub const SCAN: u8 = 6;
+    pub const SET_POSE: u8 = 7;
+    pub const OUTPUT: u8 = 8;
+    pub const TRUTH: u8 = 9;
+    pub const REFERENCE: u8 = 10;
+    pub const NOTE: u8 = 11;
+    pub const END: u8 = 12;
+}
+
+/// What stands before the beams of a scan.
+#[derive(Serialize, Deserialize)]
+struct ScanHead {
+    start: Time,
+    beam_interval: f64,
+    first_bearing: f64,
+    bearing_step: f64,
+    ranges: u16,
+    intensities: u16,
+}
+
+/// Why a payload is not a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DecodeError {
+    /// No such kind.
+    Kind,
+    /// The bytes are not what the kind demands.
+    Content,
+    /// More elements than the scratch has room for.
+    Capacity,
+}
+
+impl Record<'_> {
+    /// Number of the record's kind in the frame.
+    pub(super) fn kind(&self) -> u8 {
+        match self {
+            Self::Header(_) => kind::HEADER,
+            Self::Landmarks(_) => kind::LANDMARKS,
+            Self::Event(Event::Encoders(_)) => kind::ENCODERS,
+            Self::Event(Event::Speed(_)) => kind::SPEED,
+            Self::Event(Event::Increment(_)) => kind::INCREMENT,
+            Self::Event(Event::Reflectors(_)) => kind::REFLECTORS,
+            Self::Event(Event::Scan(_)) => kind::SCAN,
+            Self::Event(Event::SetPose(_)) => kind::SET_POSE,
+            Self::Output(_) => kind::OUTPUT,
+            Self::Truth(_) => kind::TRUTH,
+            Self::Reference(_) => kind::REFERENCE,
+            Self::Note(_) => kind::NOTE,
+            Self::End => kind::END,
+        }
+    }
+
+    /// Writes the payload to the place that it has in a frame at the beginning of `buffer`; returns its length.
+    pub(super) fn write_payload(&self, buffer: &mut [u8]) -> Result<usize, EncodeError> {
+        let room = buffer.get_mut(HEADER_LENGTH..).ok_or(EncodeError::Buffer)?;
+        let full = if room.len() < MAX_PAYLOAD { EncodeError::Buffer } else { EncodeError::TooLong };
+        let length = room.len().min(MAX_PAYLOAD);
+        let room = room.get_mut(..length).ok_or(EncodeError::Buffer)?;
+        let written = match self {
+            Self::Header(header) => put(header, room),
+            Self::Landmarks(landmarks) if landmarks.len() > LANDMARKS_A_RECORD => return Err(EncodeError::TooLong),
+            Self::Landmarks(landmarks) => put_all(landmarks, room),
+            Self::Event(Event::Encoders(sample)) => put(sample, room),
+            Self::Event(Event::Speed(sample)) => put(sample, room),
+            Self::Event(Event::Increment(increment)) => put(increment, room),
+            Self::Event(Event::Reflectors(reflectors)) => put_all(reflectors.observations, room),
+            Self::Event(Event::Scan(scan)) => put_scan(scan, room),
+            Self::Event(Event::SetPose(fix)) => put(fix, room),
+            Self::Output(bytes) => put_bytes(bytes, room),
+            Self::Truth(truth) => put(truth, room),
+            Self::Reference(reference) => put(reference, room),
+            Self::Note(text) => put_bytes(text.as_bytes(), room),
+            Self::End => Some(0),
+        };
+        written.ok_or(full)
+    }
+
+    /// The record that a payload of that kind holds.
+    pub(super) fn read_payload<'a, const BEAMS: usize, const REFLECTORS: usize>(
+        kind: u8,
+        payload: &'a [u8],
+        scratch: &'a mut Scratch<BEAMS, REFLECTORS>,
+    ) -> Result<Record<'a>, DecodeError> {
+        let record = match kind {
+            kind::HEADER => Record::Header(take_all(postcard::take_from_bytes(payload))?),
+            kind::LANDMARKS => {
+                take_each(payload, &mut scratch.landmarks)?;
+                Record::Landmarks(&scratch.landmarks)
+            }
+            kind::ENCODERS => Record::Event(Event::Encoders(take(payload)?)),
+            kind::SPEED => Record::Event(Event::Speed(take(payload)?)),
+            kind::INCREMENT => Record::Event(Event::Increment(take(payload)?)),
+            kind::REFLECTORS => {
+                take_each(payload, &mut scratch.observations)?;
+                Record::Event(Event::Reflectors(Reflectors { observations: &scratch.observations }))
+            }
+            kind::SCAN => Record::Event(Event::Scan(take_scan(payload, scratch)?)),
+            kind::SET_POSE => Record::Event(Event::SetPose(take(payload)?)),
+            kind::OUTPUT => Record::Output(payload),
+            kind::TRUTH => Record::Truth(take(payload)?),
+            kind::REFERENCE => Record::Reference(take(payload)?),
+            kind::NOTE => Record::Note(core::str::from_utf8(payload).map_err(|_| DecodeError::Content)?),
+            kind::END if payload.is_empty() => Record::End,
+            kind::END => return Err(DecodeError::Content),
+            _ => return Err(DecodeError::Kind),
+        };
+        Ok(record)
+    }
+}
+
+fn put<T: Serialize>(value: &T, room: &mut [u8]) -> Option<usize> {
+    postcard::to_slice(value, room).ok().map(|written| written.len())
+}
+
+fn put_bytes(bytes: &[u8], room: &mut [u8]) -> Option<usize> {
+    room.get_mut(..bytes.len())?.copy_from_slice(bytes);
+    Some(bytes.len())
+}
+
+/// The number of elements, then the elements.
+fn put_all<T: Serialize>(values: &[T], room: &mut [u8]) -> Option<usize> {
+    put(&values, room)
+}
+
+fn put_scan(scan: &Scan, room: &mut [u8]) -> Option<usize> {
+    let head = ScanHead {
+        start: scan.start,
+        beam_interval: scan.beam_interval,
+        first_bearing: scan.first_bearing,
+        bearing_step: scan.bearing_step,
+        ranges: u16::try_from(scan.ranges.len()).ok()?,
+        intensities: u16::try_from(scan.intensities.len()).ok()?,
+    };
+    let head_length = put(&head, room)?;
+    let (ranges, rest) = room.get_mut(head_length..)?.split_at_mut_checked(scan.ranges.len() * 4)?;
+    for (bytes, range) in ranges.as_chunks_mut::<4>().0.iter_mut().zip(scan.ranges) {
+        *bytes = range.to_le_bytes();
+    }
+    let intensities = rest.get_mut(..scan.intensities.len() * 2)?;
+    for (bytes, intensity) in intensities.as_chunks_mut::<2>().0.iter_mut().zip(scan.intensities) {
+        *bytes = intensity.to_le_bytes();
+    }
+    Some(head_length + scan.ranges.len() * 4 + scan.intensities.len() * 2)
+}
+
+fn take_all<T>(result: postcard::Result<(T, &[u8])>) -> Result<T, DecodeError> {
+    match result {
+        Ok((value, [])) => Ok(value),
+        _ => Err(DecodeError::Content),
+    }
+}
+
+fn take<T: DeserializeOwned>(payload: &[u8]) -> Result<T, DecodeError> {
+    take_all(postcard::take_from_bytes(payload))
+}
+
+fn take_each<T: DeserializeOwned, const N: usize>(payload: &[u8], values: &mut Vec<T, N>) -> Result<(), DecodeError> {
+    let (count, mut rest): (usize, _) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+    if count > N {
+        return Err(DecodeError::Capacity);
+    }
+    values.clear();
+    for _ in 0..count {
+        let (value, remaining) = postcard::take_from_bytes(rest).map_err(|_| DecodeError::Content)?;
+        values.push(value).map_err(|_| DecodeError::Capacity)?;
+        rest = remaining;
+    }
+    if rest.is_empty() { Ok(()) } else { Err(DecodeError::Content) }
+}
+
+fn take_scan<'a, const BEAMS: usize, const REFLECTORS: usize>(
+    payload: &[u8],
+    scratch: &'a mut Scratch<BEAMS, REFLECTORS>,
+) -> Result<Scan<'a>, DecodeError> {
+    let (head, rest): (ScanHead, _) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+    let (range_count, intensity_count) = (usize::from(head.ranges), usize::from(head.intensities));
+    let (ranges, intensities) = rest.split_at_checked(range_count * 4).ok_or(DecodeError::Content)?;
+    if intensities.len() != intensity_count * 2 {
+        return Err(DecodeError::Content);
+    }
+    scratch.ranges.resize_default(range_count).map_err(|_| DecodeError::Capacity)?;
+    for (range, bytes) in scratch.ranges.iter_mut().zip(ranges.as_chunks::<4>().0) {
+        *range = f32::from_le_bytes(*bytes);
+    }
+    scratch.intensities.resize_default(intensity_count).map_err(|_| DecodeError::Capacity)?;
+    for (intensity, bytes) in scratch.intensities.iter_mut().zip(intensities.as_chunks::<2>().0) {
+        *intensity = u16::from_le_bytes(*bytes);
+    }
+    Ok(Scan {
+        start: head.start,
+        beam_interval: head.beam_interval,
+        first_bearing: head.first_bearing,
+        bearing_step: head.bearing_step,
+        ranges: &scratch.ranges,
+        intensities: &scratch.intensities,
+    })
+}

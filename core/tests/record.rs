@@ -1,0 +1,403 @@
+//! Frames and records: what is written is read, bit for bit, and damage stays where it is.
+// A test fails by a panic.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic)]
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::localizer::{Event, Parameters, PoseFix};
+use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
+use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
+use agv_core::record::{
+    Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Record, Reference, Scratch, Step, Truth,
+    encode,
+};
+use proptest::prelude::*;
+
+/// Everything that a record can hold, with its own memory.
+#[derive(Clone, Debug)]
+enum Owned {
+    Header(String, Parameters, Capacities),
+    Landmarks(Vec<Landmark>),
+    Encoders(EncoderSample),
+    Speed(SpeedSample),
+    Increment(PoseIncrement),
+    Reflectors(Vec<ReflectorObservation>),
+    Scan(Time, [f64; 3], Vec<f32>, Vec<u16>),
+    SetPose(PoseFix),
+    Output(Vec<u8>),
+    Truth(Truth),
+    Reference(Reference),
+    Note(String),
+    End,
+}
+
+impl Owned {
+    fn with<T>(&self, use_record: impl FnOnce(Record) -> T) -> T {
+        use_record(match self {
+            Self::Header(software, parameters, capacities) => {
+                Record::Header(Header { software, parameters: *parameters, capacities: *capacities })
+            }
+            Self::Landmarks(landmarks) => Record::Landmarks(landmarks),
+            Self::Encoders(sample) => Record::Event(Event::Encoders(*sample)),
+            Self::Speed(sample) => Record::Event(Event::Speed(*sample)),
+            Self::Increment(increment) => Record::Event(Event::Increment(*increment)),
+            Self::Reflectors(observations) => Record::Event(Event::Reflectors(Reflectors { observations })),
+            Self::Scan(start, [beam_interval, first_bearing, bearing_step], ranges, intensities) => {
+                Record::Event(Event::Scan(Scan {
+                    start: *start,
+                    beam_interval: *beam_interval,
+                    first_bearing: *first_bearing,
+                    bearing_step: *bearing_step,
+                    ranges,
+                    intensities,
+                }))
+            }
+            Self::SetPose(fix) => Record::Event(Event::SetPose(*fix)),
+            Self::Output(bytes) => Record::Output(bytes),
+            Self::Truth(truth) => Record::Truth(*truth),
+            Self::Reference(reference) => Record::Reference(*reference),
+            Self::Note(text) => Record::Note(text),
+            Self::End => Record::End,
+        })
+    }
+
+    fn frame(&self, sequence: u32) -> Vec<u8> {
+        let mut buffer = vec![0; MAX_FRAME];
+        let length = self.with(|record| encode(&record, sequence, &mut buffer)).unwrap();
+        buffer.truncate(length);
+        buffer
+    }
+}
+
+fn time() -> impl Strategy<Value = Time> {
+    any::<u64>().prop_map(Time::from_micros)
+}
+
+/// Any bit pattern but NaN, so that records can be compared by their values too.
+fn number() -> impl Strategy<Value = f64> {
+    any::<u64>().prop_map(f64::from_bits).prop_filter("comparable", |value| !value.is_nan())
+}
+
+fn single() -> impl Strategy<Value = f32> {
+    any::<u32>().prop_map(f32::from_bits).prop_filter("comparable", |value| !value.is_nan())
+}
+
+fn pose() -> impl Strategy<Value = Pose> {
+    (number(), number(), number()).prop_map(|(x, y, theta)| Pose { x, y, theta })
+}
+
+fn vehicle() -> impl Strategy<Value = Vehicle> {
+    let range = || (2_u64..=1 << 32).prop_map(|values| CounterRange::new(values).unwrap());
+    prop_oneof![
+        Just(Vehicle::Increments),
+        (number(), number())
+            .prop_map(|(wheelbase, encoder_offset)| Vehicle::Ackermann(Ackermann { wheelbase, encoder_offset })),
+        (prop::array::uniform5(number()), range(), range()).prop_map(|(numbers, drive_range, steering_range)| {
+            let [wheelbase, drive_scale, steering_scale, steering_offset_forward, steering_offset_backward] = numbers;
+            Vehicle::Tricycle(Tricycle {
+                wheelbase,
+                drive_scale,
+                drive_range,
+                steering_scale,
+                steering_range,
+                steering_offset_forward,
+                steering_offset_backward,
+            })
+        }),
+    ]
+}
+
+fn landmark() -> impl Strategy<Value = Landmark> {
+    let kind = prop_oneof![Just(LandmarkKind::Reflector), Just(LandmarkKind::Corner), Just(LandmarkKind::EndPoint)];
+    (any::<u16>(), kind, number(), number(), single()).prop_map(|(id, kind, x, y, deviation)| Landmark {
+        id,
+        kind,
+        x,
+        y,
+        deviation,
+    })
+}
+
+fn record() -> impl Strategy<Value = Owned> {
+    let observation =
+        (time(), single(), single()).prop_map(|(time, range, bearing)| ReflectorObservation { time, range, bearing });
+    prop_oneof![
+        (".{0,40}", vehicle(), pose(), any::<[u32; 3]>()).prop_map(|(software, vehicle, laser, [a, b, c])| {
+            Owned::Header(software, Parameters { vehicle, laser }, Capacities { landmarks: a, beams: b, history: c })
+        }),
+        prop::collection::vec(landmark(), 0..=50).prop_map(Owned::Landmarks),
+        (time(), any::<u32>(), any::<u32>()).prop_map(|(time, drive, steering)| Owned::Encoders(EncoderSample {
+            time,
+            drive,
+            steering
+        })),
+        (time(), number(), number()).prop_map(|(time, speed, steering)| Owned::Speed(SpeedSample {
+            time,
+            speed,
+            steering
+        })),
+        (time(), pose()).prop_map(|(time, displacement)| Owned::Increment(PoseIncrement { time, displacement })),
+        prop::collection::vec(observation, 0..200).prop_map(Owned::Reflectors),
+        (
+            time(),
+            prop::array::uniform3(number()),
+            prop::collection::vec(any::<u32>().prop_map(f32::from_bits), 0..500),
+            prop::collection::vec(any::<u16>(), 0..500)
+        )
+            .prop_map(|(start, geometry, ranges, intensities)| Owned::Scan(
+                start,
+                geometry,
+                ranges,
+                intensities
+            )),
+        (time(), pose(), number(), number()).prop_map(|(time, pose, position_deviation, heading_deviation)| {
+            Owned::SetPose(PoseFix { time, pose, position_deviation, heading_deviation })
+        }),
+        prop::collection::vec(any::<u8>(), 0..300).prop_map(Owned::Output),
+        (time(), pose()).prop_map(|(time, pose)| Owned::Truth(Truth { time, pose })),
+        (time(), number(), number(), prop::option::of(number()))
+            .prop_map(|(time, x, y, heading)| Owned::Reference(Reference { time, x, y, heading })),
+        ".{0,100}".prop_map(Owned::Note),
+        Just(Owned::End),
+    ]
+}
+
+/// Reads a log that is handed over in pieces, and gives each item to `see`.
+fn read(log: &[u8], piece: usize, mut see: impl FnMut(Item)) {
+    let mut reader = LogReader::new();
+    let mut scratch = Box::new(Scratch::<4096, 1024>::new());
+    let (mut consumed, mut given) = (0, 0);
+    loop {
+        let (count, step) = reader.step(&log[consumed..given], given == log.len(), &mut scratch);
+        consumed += count;
+        assert_eq!(reader.offset(), consumed as u64);
+        match step {
+            Step::Item(item) => see(item),
+            Step::NeedMore => {
+                assert!(given < log.len(), "asked for more although it has all");
+                given = (given + piece).min(log.len());
+            }
+            Step::End => break,
+        }
+    }
+    assert_eq!(consumed, log.len());
+}
+
+/// Frames of all records that are whole, each encoded again, and all damage.
+fn read_again(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<agv_core::record::Damage>) {
+    let (mut frames, mut damages) = (Vec::new(), Vec::new());
+    read(log, piece, |item| match item {
+        Item::Record { sequence, record, .. } => {
+            let mut buffer = vec![0; MAX_FRAME];
+            let length = encode(&record, sequence, &mut buffer).unwrap();
+            buffer.truncate(length);
+            frames.push(buffer);
+        }
+        Item::Damage(damage) => damages.push(damage),
+    });
+    (frames, damages)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, rng_seed: prop::test_runner::RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_record_is_read_as_it_was_written(record in record(), sequence: u32) {
+        let frame = record.frame(sequence);
+        let mut seen = 0;
+        read(&frame, usize::MAX >> 1, |item| {
+            let Item::Record { offset: 0, sequence: found, record: again } = item else { panic!("{item:?}") };
+            assert_eq!(found, sequence);
+            // NaN ranges are equal to nothing: those scans are compared by their bytes alone.
+            let is_comparable = !matches!(again, Record::Event(Event::Scan(_)));
+            record.with(|record| assert!(!is_comparable || record == again, "{record:?} became {again:?}"));
+            let mut buffer = vec![0; MAX_FRAME];
+            let length = encode(&again, sequence, &mut buffer).unwrap();
+            assert_eq!(&buffer[..length], &frame[..]);
+            seen += 1;
+        });
+        prop_assert_eq!(seen, 1);
+    }
+
+    #[test]
+    fn ranges_keep_their_bits(bits in prop::collection::vec(any::<u32>(), 0..1440), intensities in prop::collection::vec(any::<u16>(), 0..1440)) {
+        let frame = Owned::Scan(Time::from_micros(5), [0.1, 0.2, 0.3], bits.iter().map(|bits| f32::from_bits(*bits)).collect(), intensities.clone()).frame(0);
+        read(&frame, usize::MAX >> 1, |item| {
+            let Item::Record { record: Record::Event(Event::Scan(scan)), .. } = item else { panic!("{item:?}") };
+            assert_eq!(scan.ranges.iter().map(|range| range.to_bits()).collect::<Vec<_>>(), bits);
+            assert_eq!(scan.intensities, intensities);
+            assert_eq!((scan.start, scan.beam_interval, scan.first_bearing, scan.bearing_step), (Time::from_micros(5), 0.1, 0.2, 0.3));
+        });
+    }
+
+    #[test]
+    fn the_size_of_the_pieces_does_not_matter(records in prop::collection::vec(record(), 0..8), piece in 1_usize..5000) {
+        let frames: Vec<_> = records.iter().enumerate().map(|(index, record)| record.frame(index as u32)).collect();
+        let (again, damages) = read_again(&frames.concat(), piece);
+        prop_assert_eq!(again, frames);
+        prop_assert!(damages.is_empty());
+    }
+
+    #[test]
+    fn foreign_bytes_are_one_damage_and_hurt_nobody(before in record(), foreign in prop::collection::vec(any::<u8>(), 1..3000), after in record(), piece in 1_usize..5000) {
+        let (before, after) = (before.frame(7), after.frame(9));
+        let (again, damages) = read_again(&[&before[..], &foreign, &after].concat(), piece);
+        prop_assert_eq!(again, vec![before.clone(), after]);
+        prop_assert_eq!(damages.len(), 1);
+        prop_assert_eq!((damages[0].offset, damages[0].skipped), (before.len() as u64, foreign.len() as u64));
+    }
+
+    #[test]
+    fn arbitrary_payloads_are_records_or_damage(kind in 0_u8..16, payload in prop::collection::vec(any::<u8>(), 0..200)) {
+        // A frame with a good checksum around anything.
+        let mut frame = Owned::Output(payload).frame(3);
+        frame[5] = kind;
+        let end = frame.len() - 4;
+        let checksum = crc32(&frame[..end]);
+        frame[end..].copy_from_slice(&checksum.to_le_bytes());
+        let mut items = 0;
+        read(&frame, usize::MAX >> 1, |_| items += 1);
+        prop_assert_eq!(items, 1);
+    }
+}
+
+/// CRC-32 bit by bit, as in the PNG specification, annex D.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |state, byte| {
+        (0..8).fold(
+            state ^ u32::from(*byte),
+            |state, _| if state & 1 == 1 { 0xEDB8_8320 ^ (state >> 1) } else { state >> 1 },
+        )
+    })
+}
+
+/// A small log with some records of every sort, and where each frame begins.
+fn small_log() -> (Vec<Vec<u8>>, Vec<usize>) {
+    let records = [
+        Owned::Header(
+            "test".into(),
+            Parameters { vehicle: Vehicle::Increments, laser: Pose::new(1.0, 0.0, 0.5) },
+            Capacities::default(),
+        ),
+        Owned::Landmarks(vec![Landmark { id: 1, kind: LandmarkKind::Corner, x: 1.0, y: -2.0, deviation: 0.01 }; 3]),
+        Owned::Encoders(EncoderSample { time: Time::from_micros(1000), drive: 70_000, steering: 5 }),
+        Owned::Scan(Time::from_micros(2000), [0.0, -1.0, 0.1], vec![f32::NAN, 1.0, 0.0, -3.0], vec![4, 5]),
+        Owned::Output([&b"an output that holds the magic "[..], &agv_core::record::MAGIC, &[1, 2, 3]].concat()),
+        Owned::Truth(Truth { time: Time::from_micros(2500), pose: Pose::new(1.0, 2.0, 3.0) }),
+        Owned::End,
+    ];
+    let frames: Vec<_> = records.iter().enumerate().map(|(index, record)| record.frame(index as u32)).collect();
+    let starts = frames.iter().scan(0, |start, frame| Some(std::mem::replace(start, *start + frame.len()))).collect();
+    (frames, starts)
+}
+
+#[test]
+fn a_log_cut_anywhere_reads_up_to_the_cut() {
+    let (frames, starts) = small_log();
+    let log = frames.concat();
+    for cut in 0..log.len() {
+        let whole = frames.iter().zip(&starts).filter(|(frame, start)| **start + frame.len() <= cut).count();
+        let (again, damages) = read_again(&log[..cut], 64);
+        assert_eq!(again, frames[..whole], "cut at {cut}");
+        if cut == starts[whole] {
+            assert_eq!(damages, []);
+        } else {
+            assert_eq!(damages.len(), 1);
+            assert_eq!(damages[0].reason, DamageReason::Cut);
+            assert_eq!(damages[0].offset, starts[whole] as u64);
+            assert_eq!(damages[0].skipped, (cut - starts[whole]) as u64);
+        }
+    }
+}
+
+#[test]
+fn a_damaged_byte_costs_one_record() {
+    let (frames, starts) = small_log();
+    let log = frames.concat();
+    for position in 0..log.len() {
+        for flip in [0x01, 0x80, 0xFF] {
+            let mut damaged = log.clone();
+            damaged[position] ^= flip;
+            let hit = starts.iter().rposition(|start| *start <= position).unwrap();
+            let mut expected = frames.clone();
+            let lost = expected.remove(hit);
+            let (again, damages) = read_again(&damaged, 100);
+            assert_eq!(again, expected, "byte {position}");
+            assert_eq!(damages.len(), 1, "byte {position}: {damages:?}");
+            assert_eq!(damages[0].offset, starts[hit] as u64);
+            assert_eq!(damages[0].skipped, lost.len() as u64);
+            assert!(!matches!(
+                damages[0].reason,
+                DamageReason::Version(_) | DamageReason::Kind(_) | DamageReason::Sequence { .. }
+            ));
+        }
+    }
+}
+
+#[test]
+fn missing_and_repeated_frames_are_reported() {
+    let (frames, starts) = small_log();
+    let missing = [&frames[..2], &frames[4..]].concat();
+    let (again, damages) = read_again(&missing.concat(), 1000);
+    assert_eq!(again, missing);
+    let reason = DamageReason::Sequence { expected: 2, found: 4 };
+    assert_eq!(damages, [agv_core::record::Damage { offset: starts[2] as u64, skipped: 0, reason }]);
+
+    let repeated = [&frames[..3], &frames[2..]].concat();
+    let (again, damages) = read_again(&repeated.concat(), 1000);
+    assert_eq!(again, repeated);
+    assert_eq!(damages.len(), 1);
+    assert_eq!(damages[0].reason, DamageReason::Sequence { expected: 3, found: 2 });
+
+    let restarted = [&frames[..], &frames[..]].concat();
+    assert_eq!(read_again(&restarted.concat(), 1000), (restarted, vec![]));
+}
+
+#[test]
+fn another_version_is_told_apart_from_damage() {
+    let (frames, _) = small_log();
+    let mut frame = frames[2].clone();
+    frame[4] = 9;
+    let end = frame.len() - 4;
+    let checksum = crc32(&frame[..end]);
+    frame[end..].copy_from_slice(&checksum.to_le_bytes());
+    let (again, damages) = read_again(&frame, 1000);
+    assert!(again.is_empty());
+    assert_eq!(damages[0].reason, DamageReason::Version(9));
+}
+
+#[test]
+fn the_bytes_of_a_frame_are_as_documented() {
+    let frame =
+        Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
+    let body = [0xD6, 0x41, 0x47, 0x56, 1, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    assert_eq!(frame[..17], body);
+    assert_eq!(frame[17..], crc32(&body).to_le_bytes());
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let note = "x".repeat(33_000);
+    let mut buffer = vec![0; 100_000];
+    assert_eq!(encode(&Record::Note(&note), 0, &mut buffer), Err(EncodeError::TooLong));
+    assert_eq!(encode(&Record::Note("four"), 0, &mut buffer[..19]), Err(EncodeError::Buffer));
+    assert_eq!(encode(&Record::Note("four"), 0, &mut buffer[..20]), Ok(20));
+    assert_eq!(encode(&Record::End, 0, &mut []), Err(EncodeError::Buffer));
+    let landmark = Landmark { id: 0, kind: LandmarkKind::Reflector, x: 0.0, y: 0.0, deviation: 0.0 };
+    assert_eq!(encode(&Record::Landmarks(&[landmark; 51]), 0, &mut buffer), Err(EncodeError::TooLong));
+    assert!(encode(&Record::Note(&note[..32_768]), 0, &mut buffer).is_ok());
+
+    let ranges = [1.0; 5];
+    let scan = Scan {
+        start: Time::default(),
+        beam_interval: 0.0,
+        first_bearing: 0.0,
+        bearing_step: 0.1,
+        ranges: &ranges,
+        intensities: &[],
+    };
+    let length = encode(&Record::Event(Event::Scan(scan)), 0, &mut buffer).unwrap();
+    let mut scratch = Scratch::<4, 4>::new();
+    let (_, step) = LogReader::new().step(&buffer[..length], true, &mut scratch);
+    assert!(matches!(step, Step::Item(Item::Damage(damage)) if damage.reason == DamageReason::Payload), "{step:?}");
+}

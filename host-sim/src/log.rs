@@ -1,0 +1,389 @@
+//! Logs as files.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use agv_core::localizer::Event;
+use agv_core::measurement::Time;
+use agv_core::record::{
+    self, Capacities, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
+    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Record, Scratch,
+};
+
+use crate::file_kind;
+use crate::recording::{RecordedEvent, Recording};
+
+/// Name and version that this program leaves in its logs.
+pub const SOFTWARE: &str = concat!("agv ", env!("CARGO_PKG_VERSION"));
+
+/// How many bytes a reader holds. A file whose first so many bytes hold no good record is foreign.
+const BUFFER: usize = 1 << 20;
+
+/// Why a log could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The file does not exist.
+    #[error("{}: there is no such file", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: io::Error,
+    },
+    /// The file is empty.
+    #[error("{}: the file is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is no log.
+    #[error("{}: this is not a log of this program but {looks_like}", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it seems to be.
+        looks_like: &'static str,
+    },
+    /// The log was written by a program with another format.
+    #[error("{}: the log has format version {found}, this program reads {FORMAT_VERSION}", path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Version of the log.
+        found: u8,
+    },
+    /// The header cannot be read, so nobody knows what vehicle it was.
+    #[error("{}: the log's header is missing{}", path.display(), damage.map(|damage| format!(" ({damage})")).unwrap_or_default())]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// What may have happened to it.
+        damage: Option<Damage>,
+    },
+    /// The log holds two drives that do not belong together.
+    #[error("{}: a second drive with other parameters begins at byte {offset}", path.display())]
+    SecondDrive {
+        /// The file.
+        path: PathBuf,
+        /// Where its header is, bytes from the start.
+        offset: u64,
+    },
+    /// A record is longer than a frame can be.
+    #[error("{}: a record is too long for a log", path.display())]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+fn io_error(path: &Path, source: io::Error) -> LogError {
+    let path = path.to_owned();
+    if source.kind() == io::ErrorKind::NotFound { LogError::Missing { path } } else { LogError::Io { path, source } }
+}
+
+/// Reads a log record by record.
+pub struct Reader {
+    path: PathBuf,
+    file: File,
+    frames: FrameReader,
+    buffer: Vec<u8>,
+    /// The part of the buffer that is not consumed yet.
+    rest: Range<usize>,
+    is_last: bool,
+    /// Room for everything that a frame can hold.
+    scratch: Box<Scratch<8192, 4096>>,
+}
+
+/// What a frame reader found, without the bytes.
+enum Found {
+    Frame { offset: u64, kind: u8, sequence: u32, payload: Range<usize> },
+    Damage(Damage),
+    End,
+}
+
+impl Reader {
+    /// Opens a log.
+    ///
+    /// # Errors
+    /// If the file is missing, empty, foreign, or a log of another version.
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let file = File::open(path).map_err(|source| io_error(path, source))?;
+        let mut reader = Self {
+            path: path.to_owned(),
+            file,
+            frames: FrameReader::new(),
+            buffer: vec![0; BUFFER],
+            rest: 0..0,
+            is_last: false,
+            scratch: Box::default(),
+        };
+        reader.fill()?;
+        let beginning = &reader.buffer[reader.rest.clone()];
+        if beginning.is_empty() {
+            return Err(LogError::Empty { path: path.to_owned() });
+        }
+        match FrameReader::new().step(beginning, reader.is_last) {
+            (_, FrameStep::Damage(Damage { offset: 0, reason: DamageReason::Version(found), .. })) => {
+                Err(LogError::Version { path: path.to_owned(), found })
+            }
+            (_, FrameStep::Frame { .. }) => Ok(reader),
+            // Damage that ends before the beginning does is followed by a good frame.
+            (consumed, FrameStep::Damage(_)) if consumed < beginning.len() => Ok(reader),
+            _ if beginning.iter().zip(MAGIC).all(|(byte, magic)| *byte == magic) => Ok(reader),
+            _ => {
+                let looks_like = file_kind::describe(&beginning[..beginning.len().min(4096)]);
+                Err(LogError::Foreign { path: path.to_owned(), looks_like })
+            }
+        }
+    }
+
+    /// How many bytes have been used up: the end of the last record or damage.
+    #[must_use]
+    pub fn position(&self) -> u64 {
+        self.frames.offset()
+    }
+
+    /// The next record or damage. None at the end.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    #[expect(clippy::should_implement_trait, reason = "the items borrow from the reader")]
+    pub fn next(&mut self) -> Result<Option<Item<'_>>, LogError> {
+        let (offset, kind, sequence, payload) = match self.find()? {
+            Found::Frame { offset, kind, sequence, payload } => (offset, kind, sequence, payload),
+            Found::Damage(damage) => return Ok(Some(Item::Damage(damage))),
+            Found::End => return Ok(None),
+        };
+        let frame = Frame { kind, sequence, payload: &self.buffer[payload] };
+        let skipped = frame.length() as u64;
+        Ok(Some(match frame.record(&mut self.scratch) {
+            Ok(record) => Item::Record { offset, sequence, record },
+            Err(reason) => Item::Damage(Damage { offset, skipped, reason }),
+        }))
+    }
+
+    fn find(&mut self) -> Result<Found, LogError> {
+        loop {
+            if self.rest.len() < MAX_FRAME && !self.is_last {
+                self.fill()?;
+            }
+            let (consumed, step) = self.frames.step(&self.buffer[self.rest.clone()], self.is_last);
+            let found = match step {
+                FrameStep::Frame { offset, frame } => {
+                    let start = self.rest.start + consumed - frame.length() + HEADER_LENGTH;
+                    let payload = start..start + frame.payload.len();
+                    Some(Found::Frame { offset, kind: frame.kind, sequence: frame.sequence, payload })
+                }
+                FrameStep::Damage(damage) => Some(Found::Damage(damage)),
+                FrameStep::NeedMore => None,
+                FrameStep::End => Some(Found::End),
+            };
+            self.rest.start += consumed;
+            if let Some(found) = found {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Moves the rest to the front of the buffer and reads as much behind it as there is room for.
+    fn fill(&mut self) -> Result<(), LogError> {
+        self.buffer.copy_within(self.rest.clone(), 0);
+        self.rest = 0..self.rest.len();
+        while self.rest.end < self.buffer.len() && !self.is_last {
+            match self.file.read(&mut self.buffer[self.rest.end..]) {
+                Ok(0) => self.is_last = true,
+                Ok(count) => self.rest.end += count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(io_error(&self.path, error)),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes a log record by record. What was written before the last [`Writer::flush`] survives a loss of power; of what
+/// came later, every whole record that reached the disk does.
+pub struct Writer {
+    path: PathBuf,
+    file: BufWriter<File>,
+    sequence: u32,
+    frame: Vec<u8>,
+}
+
+impl Writer {
+    /// Begins a log; an older file of that name is replaced.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn create(path: &Path, header: &Header) -> Result<Self, LogError> {
+        let file = File::create(path).map_err(|source| io_error(path, source))?;
+        let mut writer = Self::new(path, file, 0);
+        writer.write(&Record::Header(*header))?;
+        Ok(writer)
+    }
+
+    /// Goes on with a log behind its last good record. What stands behind that, and an end record, is cut off; all
+    /// damage found on the way is returned.
+    ///
+    /// # Errors
+    /// If the file is not a log with at least one good record, or cannot be written.
+    pub fn append(path: &Path) -> Result<(Self, Vec<Damage>), LogError> {
+        let mut reader = Reader::open(path)?;
+        let mut damages = Vec::new();
+        let mut end = 0;
+        let mut next_sequence = None;
+        loop {
+            match reader.next()? {
+                Some(Item::Record { record: Record::End, .. }) => {}
+                Some(Item::Record { sequence, .. }) => {
+                    next_sequence = Some(sequence.wrapping_add(1));
+                    end = reader.position();
+                }
+                Some(Item::Damage(damage)) => damages.push(damage),
+                None => break,
+            }
+        }
+        let Some(sequence) = next_sequence else {
+            return Err(LogError::Header { path: path.to_owned(), damage: damages.first().copied() });
+        };
+        let open = || {
+            let mut file = OpenOptions::new().write(true).open(path)?;
+            file.set_len(end)?;
+            file.seek(SeekFrom::End(0))?;
+            Ok(file)
+        };
+        let file = open().map_err(|source| io_error(path, source))?;
+        Ok((Self::new(path, file, sequence), damages))
+    }
+
+    fn new(path: &Path, file: File, sequence: u32) -> Self {
+        Self {
+            path: path.to_owned(),
+            file: BufWriter::with_capacity(1 << 16, file),
+            sequence,
+            frame: vec![0; MAX_FRAME],
+        }
+    }
+
+    /// Adds a record.
+    ///
+    /// # Errors
+    /// If the record is too long, or the file cannot be written.
+    pub fn write(&mut self, record: &Record) -> Result<(), LogError> {
+        let length = record::encode(record, self.sequence, &mut self.frame)
+            .map_err(|_| LogError::TooLong { path: self.path.clone() })?;
+        self.file.write_all(&self.frame[..length]).map_err(|source| io_error(&self.path, source))?;
+        self.sequence = self.sequence.wrapping_add(1);
+        Ok(())
+    }
+
+    /// Brings everything to the disk.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn flush(&mut self) -> Result<(), LogError> {
+        self.file.flush().and_then(|()| self.file.get_ref().sync_data()).map_err(|source| io_error(&self.path, source))
+    }
+
+    /// Says that the log is complete, and brings it to the disk.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish(mut self) -> Result<(), LogError> {
+        self.write(&Record::End)?;
+        self.flush()
+    }
+}
+
+/// When an event happened; for a revolution, when it began.
+fn event_time(event: &RecordedEvent) -> Option<Time> {
+    match event.view() {
+        Event::Encoders(sample) => Some(sample.time),
+        Event::Speed(sample) => Some(sample.time),
+        Event::Increment(increment) => Some(increment.time),
+        Event::Reflectors(reflectors) => reflectors.observations.first().map(|observation| observation.time),
+        Event::Scan(scan) => Some(scan.start),
+        Event::SetPose(fix) => Some(fix.time),
+    }
+}
+
+/// Writes a drive as a log. Truth and references stand before the first event that is not earlier, so that a log that is
+/// cut has all of them up to the cut.
+///
+/// # Errors
+/// If the file cannot be written, or a scan is too long for a log.
+pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
+    let header = Header { software: SOFTWARE, parameters: recording.parameters, capacities: Capacities::default() };
+    let mut writer = Writer::create(path, &header)?;
+    for piece in recording.landmarks.chunks(LANDMARKS_A_RECORD) {
+        writer.write(&Record::Landmarks(piece))?;
+    }
+    let mut truth = recording.truth.iter().peekable();
+    let mut references = recording.references.iter().peekable();
+    for event in &recording.events {
+        if let Some(now) = event_time(event) {
+            while let Some(next) = truth.next_if(|next| next.time <= now) {
+                writer.write(&Record::Truth(*next))?;
+            }
+            while let Some(next) = references.next_if(|next| next.time <= now) {
+                writer.write(&Record::Reference(*next))?;
+            }
+        }
+        writer.write(&Record::Event(event.view()))?;
+    }
+    for next in truth {
+        writer.write(&Record::Truth(*next))?;
+    }
+    for next in references {
+        writer.write(&Record::Reference(*next))?;
+    }
+    writer.finish()
+}
+
+/// Reads a whole log, and everything that is wrong with it. A log without an end record is cut, even if it is cut between
+/// two records. Outputs and notes are left out.
+///
+/// # Errors
+/// If the file is missing, empty, foreign, of another version, without a readable header, or holds two different drives.
+pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
+    let mut reader = Reader::open(path)?;
+    let mut damages = Vec::new();
+    let mut parameters = None;
+    let mut is_complete = false;
+    let (mut landmarks, mut events, mut truth, mut references) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    while let Some(item) = reader.next()? {
+        match item {
+            Item::Damage(damage) => damages.push(damage),
+            Item::Record { offset, record, .. } => match record {
+                Record::Header(header) => match parameters {
+                    Some(known) if known != header.parameters => {
+                        return Err(LogError::SecondDrive { path: path.to_owned(), offset });
+                    }
+                    _ => parameters = Some(header.parameters),
+                },
+                Record::Landmarks(piece) => landmarks.extend_from_slice(piece),
+                Record::Event(event) => events.push(RecordedEvent::from(event)),
+                Record::Truth(one) => truth.push(one),
+                Record::Reference(one) => references.push(one),
+                Record::End => is_complete = true,
+                Record::Output(_) | Record::Note(_) => {}
+            },
+        }
+    }
+    let is_cut = damages.iter().any(|damage| damage.reason == DamageReason::Cut);
+    if !is_complete && !is_cut {
+        damages.push(Damage { offset: reader.position(), skipped: 0, reason: DamageReason::Cut });
+    }
+    match parameters {
+        Some(parameters) => Ok((Recording { parameters, landmarks, events, truth, references }, damages)),
+        None => Err(LogError::Header { path: path.to_owned(), damage: damages.first().copied() }),
+    }
+}
