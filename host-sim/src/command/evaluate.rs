@@ -1,12 +1,26 @@
 //! `agv evaluate`.
 
-/// Not there yet.
+mod warehouse;
+
+use clap::Subcommand;
+
+/// Measure how good it is.
 #[derive(clap::Args)]
-pub struct Evaluate {}
+pub struct Evaluate {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Subcommand)]
+enum Experiment {
+    Warehouse(warehouse::Warehouse),
+}
 
 impl Evaluate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        anyhow::bail!("`agv evaluate` is not there yet")
+        match self.experiment {
+            Experiment::Warehouse(experiment) => experiment.run(),
+        }
     }
 }

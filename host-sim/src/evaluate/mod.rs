@@ -1,3 +1,4 @@
 //! Experiments: how good it is, one file an experiment.
 
 pub mod accuracy;
+pub mod warehouse;

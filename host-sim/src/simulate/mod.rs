@@ -96,6 +96,7 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
         landmarks: survey(scenario, &world),
         events: arrivals.in_order(),
         truth,
+        references: Vec::new(),
     };
     Ok(Simulation { recording, world, path, true_tricycle, true_laser })
 }
@@ -111,7 +112,7 @@ pub fn believed_parameters(scenario: &Scenario) -> Parameters {
         }
         MotionReport::Increments => Vehicle::Increments,
     };
-    Parameters { vehicle, laser: scenario.laser.mounting.pose() }
+    Parameters::new(vehicle, scenario.laser.mounting.pose())
 }
 
 fn believed_tricycle(scenario: &Scenario) -> Tricycle {
