@@ -1,12 +1,24 @@
 //! `agv evaluate`.
 
-/// Not there yet.
+mod falko;
+
+/// Measure on recordings or in simulation what the parts achieve.
 #[derive(clap::Args)]
-pub struct Evaluate {}
+pub struct Evaluate {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(clap::Subcommand)]
+enum Experiment {
+    Falko(falko::Falko),
+}
 
 impl Evaluate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        anyhow::bail!("`agv evaluate` is not there yet")
+        match self.experiment {
+            Experiment::Falko(falko) => falko.run(),
+        }
     }
 }

@@ -1,1 +1,4 @@
-//! To come.
+//! Experiments, one file each.
+
+pub mod falko;
+pub mod repeatability;
