@@ -1,4 +1,10 @@
 //! Angles and poses: the laws of the group, and closed forms.
+#![allow(
+    clippy::indexing_slicing,
+    clippy::needless_range_loop,
+    clippy::unwrap_used,
+    reason = "a panic is how a test fails"
+)]
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,4 +1,10 @@
 //! Counters, integration and control noise, against closed forms and finite differences.
+#![allow(
+    clippy::indexing_slicing,
+    clippy::needless_range_loop,
+    clippy::unwrap_used,
+    reason = "a panic is how a test fails"
+)]
 
 use agv_core::geometry::{Pose, difference};
 use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};

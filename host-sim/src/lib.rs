@@ -5,6 +5,7 @@ pub mod evaluate;
 pub mod file_kind;
 pub mod import;
 pub mod log;
+pub mod mapping;
 pub mod recording;
 pub mod replay;
 pub mod report;

@@ -1,5 +1,6 @@
 //! Points that can be recognised in a scan.
 
+pub mod falko;
 mod keypoint;
 mod motion_correction;
 mod point_scan;

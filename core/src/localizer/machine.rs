@@ -1,13 +1,14 @@
 //! One event in, outputs out.
 
 use heapless::Vec;
+use nalgebra::Matrix2;
 
 use super::maps::{Association, Maps};
 use super::output::OBSERVATIONS;
 use super::{Event, LandmarkSource, LandmarkUse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
-use crate::features::{PointScan, SensorPath, detect_reflectors};
-use crate::filter::{Consistency, Ekf, Observation, RangeBearing, Timeline};
-use crate::geometry::{Pose, difference};
+use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, detect_reflectors, falko};
+use crate::filter::{Cartesian, Consistency, Ekf, Observation, RangeBearing, Timeline};
+use crate::geometry::{Point, Pose, difference};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
 use crate::measurement::{ReflectorObservation, Scan, Time};
 use crate::odometry::{Motion, Odometer, OdometryError};
@@ -43,6 +44,8 @@ pub struct Localizer<
 struct Workspace<const BEAMS: usize> {
     points: PointScan<BEAMS>,
     path: SensorPath,
+    detector: falko::Detector<BEAMS>,
+    keypoints: Vec<Keypoint, OBSERVATIONS>,
     reflectors: Vec<ReflectorObservation, OBSERVATIONS>,
     sightings: Vec<Sighting, OBSERVATIONS>,
 }
@@ -116,6 +119,8 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             workspace: Workspace {
                 points: PointScan::new(),
                 path: SensorPath::default(),
+                detector: falko::Detector::new(parameters.features.detector),
+                keypoints: Vec::new(),
                 reflectors: Vec::new(),
                 sightings: Vec::new(),
             },
@@ -224,18 +229,27 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
     }
 
     fn scan(&mut self, scan: &Scan) {
-        if self.timeline.is_none() {
+        let Some(timeline) = &self.timeline else {
             return;
+        };
+        let workspace = &mut self.workspace;
+        let maps = self.parameters.maps;
+        if maps.features || maps.dynamic {
+            workspace.path.set(scan.start, &self.parameters.laser, timeline.relative_path(scan.start, scan.end()));
         }
         if let Some(detection) = &self.parameters.reflectors.detection
-            && self.parameters.maps.reflectors
+            && maps.reflectors
             && !scan.intensities.is_empty()
         {
-            let workspace = &mut self.workspace;
             detect_reflectors(scan, detection, &mut workspace.reflectors);
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
             self.fuse();
+        }
+        if maps.features || maps.dynamic {
+            self.workspace.see_features(&self.parameters, scan);
+            self.fuse();
+            self.update_dynamic_map();
         }
     }
 
@@ -247,7 +261,9 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
         let (mut expected, mut accepted, mut used, mut square_sum) = (0, 0, 0, 0.0);
         for sighting in &mut self.workspace.sightings {
             let mut association = Association::NONE;
+            let mut located = [0.0; 2];
             let outcome = timeline.correct(sighting.time, |state| {
+                located = sighting.observation.locate(&state.pose, &self.parameters.laser).into();
                 association = self.maps.associate(&self.parameters, state, sighting.kind, &sighting.observation);
                 association.correction(&sighting.observation)
             });
@@ -282,6 +298,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 landmark: association.nearest.map(|landmark| (landmark.source, landmark.id)),
                 verdict: association.verdict,
                 position: [position.x as f32, position.y as f32],
+                located,
                 residual: association.nearest.map_or([0.0; 2], |landmark| landmark.innovation.residual.into()),
                 test_ratio: association
                     .nearest
@@ -360,6 +377,45 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             acceptance: self.consistency.acceptance(),
             normalised_square: self.consistency.mean_normalised_square(),
         };
+    }
+}
+
+impl<const BEAMS: usize> Workspace<BEAMS> {
+    /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
+    /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two.
+    fn see_features(&mut self, parameters: &Parameters, scan: &Scan) {
+        let features = &parameters.features;
+        self.points.set(scan, features.nearest, features.farthest);
+        if features.motion_correction {
+            self.path.correct(scan, &mut self.points);
+        }
+        self.detector.detect(&self.points, &mut self.keypoints);
+        self.keypoints.sort_unstable_by_key(|keypoint| keypoint.beam);
+        self.sightings.clear();
+        let added = features.added_deviation * features.added_deviation;
+        for keypoint in &self.keypoints {
+            let beam = usize::from(keypoint.beam);
+            let position = Point::new(f64::from(keypoint.position.x), f64::from(keypoint.position.y));
+            let position = if features.motion_correction {
+                self.path.from_start(beam as f64 * scan.beam_interval, &position)
+            } else {
+                position
+            };
+            let [xx, xy, yy] = keypoint.covariance.map(f64::from);
+            let _ = self.sightings.push(Sighting {
+                time: scan.beam_time(beam),
+                kind: match keypoint.kind {
+                    KeypointKind::Corner => LandmarkKind::Corner,
+                    KeypointKind::EndPoint => LandmarkKind::EndPoint,
+                },
+                observation: Observation::Cartesian(Cartesian {
+                    position,
+                    covariance: Matrix2::new(xx + added, xy, xy, yy + added),
+                }),
+                matched: None,
+                verdict: Verdict::Unknown,
+            });
+        }
     }
 }
 

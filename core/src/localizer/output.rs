@@ -52,6 +52,8 @@ pub struct LandmarkUse {
     pub verdict: Verdict,
     /// Where it was seen in S, m.
     pub position: [f32; 2],
+    /// Where that is in W, from the pose at its time before this observation was used, m.
+    pub located: [f64; 2],
     /// Observation minus expectation for the nearest landmark; m and rad, or m and m.
     pub residual: [f64; 2],
     /// Squared Mahalanobis distance to the nearest landmark, divided by the gate: below one is inside.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::features::ReflectorDetection;
+use crate::features::{ReflectorDetection, falko};
 use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
 use crate::landmarks::DynamicMapParameters;
@@ -95,6 +95,8 @@ impl Default for ReflectorParameters {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FeatureParameters {
+    /// How they are found.
+    pub detector: falko::Parameters,
     /// Nearest range that counts, m.
     pub nearest: f32,
     /// Farthest range that counts, m.
@@ -107,7 +109,13 @@ pub struct FeatureParameters {
 
 impl Default for FeatureParameters {
     fn default() -> Self {
-        Self { nearest: 0.5, farthest: 30.0, added_deviation: 0.005, motion_correction: true }
+        Self {
+            detector: falko::Parameters::default(),
+            nearest: 0.5,
+            farthest: 30.0,
+            added_deviation: 0.005,
+            motion_correction: true,
+        }
     }
 }
 

@@ -36,6 +36,7 @@ pub struct Header<'a> {
 
 /// One record of a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "passed by reference; there is no heap to put the header on")]
 pub enum Record<'a> {
     /// What the log begins with.
     Header(Header<'a>),

@@ -1,18 +1,18 @@
 //! `agv evaluate`.
 
+mod falko;
 mod warehouse;
 
-use clap::Subcommand;
-
-/// Measure how good it is.
+/// Measure on recordings and in simulation how good it is.
 #[derive(clap::Args)]
 pub struct Evaluate {
     #[command(subcommand)]
     experiment: Experiment,
 }
 
-#[derive(Subcommand)]
+#[derive(clap::Subcommand)]
 enum Experiment {
+    Falko(falko::Falko),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -20,6 +20,7 @@ impl Evaluate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.experiment {
+            Experiment::Falko(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

@@ -1,4 +1,6 @@
 //! Experiments: how good it is, one file an experiment.
 
 pub mod accuracy;
+pub mod falko;
+pub mod repeatability;
 pub mod warehouse;

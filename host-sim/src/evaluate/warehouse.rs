@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::accuracy::{PoseError, Spread, pose_error};
+use crate::mapping::{Clustering, map_features};
 use crate::replay::{ReplayError, replay};
 use crate::simulate::block_storage::ReflectorPlacement;
 use crate::simulate::scenario::{PathKind, Scenario, WorldOptions};
@@ -33,7 +34,12 @@ impl Map {
     /// All maps.
     pub const ALL: [Self; 5] = [Self::Odometry, Self::Reflectors, Self::Static, Self::Dynamic, Self::Mixed];
 
-    fn has_reflectors(self) -> bool {
+    /// Whether there are reflectors in the world: as landmarks, or to map by.
+    fn needs_reflectors(self) -> bool {
+        self.uses_reflectors() || self.has_static_features()
+    }
+
+    fn uses_reflectors(self) -> bool {
         matches!(self, Self::Reflectors | Self::Mixed)
     }
 
@@ -134,7 +140,7 @@ pub fn scenario(path: PathKind, map: Map, seed: u64) -> Scenario {
     let mut scenario = Scenario { seed, ..Scenario::default() };
     scenario.path.kind = path;
     if let WorldOptions::BlockStorage(storage) = &mut scenario.world
-        && map.has_reflectors()
+        && map.needs_reflectors()
     {
         storage.reflectors = ReflectorPlacement::AisleAndLaneEnd;
     }
@@ -145,7 +151,11 @@ fn run(path: PathKind, map: Map, seed: u64) -> Result<Run, WarehouseError> {
     let simulation = simulate(&scenario(path, map, seed))?;
     let mut recording = simulation.recording;
     recording.parameters.maps =
-        MapUse { reflectors: map.has_reflectors(), features: map.has_static_features(), dynamic: map == Map::Dynamic };
+        MapUse { reflectors: map.uses_reflectors(), features: map.has_static_features(), dynamic: map == Map::Dynamic };
+    if map.has_static_features() {
+        let mapping = simulate(&scenario(PathKind::Mapping, map, seed))?.recording;
+        recording.landmarks.extend(map_features(&mapping, &Clustering::default())?);
+    }
     let replay = replay(&recording, |_| {})?;
     let error = replay.poses.iter().rev().find_map(|pose| pose_error(pose, &recording.truth)).unwrap_or(PoseError {
         time: simulation_end(&recording),
