@@ -181,11 +181,12 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 let motion = self.odometer.increment(increment);
                 self.move_by(increment.time, motion);
             }
-            Event::Reflectors(reflectors) => {
+            Event::Reflectors(reflectors) if self.parameters.maps.reflectors => {
                 self.workspace.sightings.clear();
                 see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
                 self.fuse();
             }
+            Event::Reflectors(_) => {}
             Event::Scan(scan) => self.scan(scan),
             Event::SetPose(fix) => self.set_pose(fix),
         }
