@@ -246,8 +246,8 @@ impl BlockStoragePath {
                         forward(vec![straight(13.0)]),
                         backward(vec![
                             straight(4.0),
-                            PathSegment::arc(radius, angle),
                             PathSegment::arc(radius, -angle),
+                            PathSegment::arc(radius, angle),
                             straight(3.4),
                             PathSegment::arc(2.5, FRAC_PI_2),
                         ]),

@@ -1,0 +1,10 @@
+//! The simulation against independent truth: geometry, statistics of the stated noise, and determinism.
+
+mod determinism;
+mod laser;
+mod odometry;
+mod ray_casting;
+mod reflectors;
+mod scenario;
+mod support;
+mod world;
