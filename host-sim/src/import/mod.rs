@@ -1,1 +1,7 @@
-//! To come.
+//! Recordings of others.
+
+pub mod carpark;
+pub mod sapienza;
+mod table;
+
+pub use table::ImportError;
