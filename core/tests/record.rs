@@ -3,13 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic)]
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::localizer::{Event, Parameters, PoseFix};
+use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
+use agv_core::localizer::{Event, LandmarkSource, LandmarkUse, Mode, Parameters, PoseFix, PoseOutput, Reason};
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
-    Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Record, Reference, Scratch, Step, Truth,
-    encode,
+    Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Record, Reference, Scratch,
+    Step, Truth, encode,
 };
 use proptest::prelude::*;
 
@@ -24,7 +24,7 @@ enum Owned {
     Reflectors(Vec<ReflectorObservation>),
     Scan(Time, [f64; 3], Vec<f32>, Vec<u16>),
     SetPose(PoseFix),
-    Output(Vec<u8>),
+    Output(PoseOutput, Vec<LandmarkUse>),
     Truth(Truth),
     Reference(Reference),
     Note(String),
@@ -35,7 +35,7 @@ impl Owned {
     fn with<T>(&self, use_record: impl FnOnce(Record) -> T) -> T {
         use_record(match self {
             Self::Header(software, parameters, capacities) => {
-                Record::Header(Header { software, parameters: *parameters, capacities: *capacities })
+                Record::Header(Header { software, parameters, capacities: *capacities })
             }
             Self::Landmarks(landmarks) => Record::Landmarks(landmarks),
             Self::Encoders(sample) => Record::Event(Event::Encoders(*sample)),
@@ -53,7 +53,7 @@ impl Owned {
                 }))
             }
             Self::SetPose(fix) => Record::Event(Event::SetPose(*fix)),
-            Self::Output(bytes) => Record::Output(bytes),
+            Self::Output(pose, uses) => Record::Output(Output { pose: *pose, uses }),
             Self::Truth(truth) => Record::Truth(*truth),
             Self::Reference(reference) => Record::Reference(*reference),
             Self::Note(text) => Record::Note(text),
@@ -108,8 +108,7 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
 }
 
 fn landmark() -> impl Strategy<Value = Landmark> {
-    let kind = prop_oneof![Just(LandmarkKind::Reflector), Just(LandmarkKind::Corner), Just(LandmarkKind::EndPoint)];
-    (any::<u16>(), kind, number(), number(), single()).prop_map(|(id, kind, x, y, deviation)| Landmark {
+    (any::<u16>(), landmark_kind(), number(), number(), single()).prop_map(|(id, kind, x, y, deviation)| Landmark {
         id,
         kind,
         x,
@@ -118,12 +117,52 @@ fn landmark() -> impl Strategy<Value = Landmark> {
     })
 }
 
+fn landmark_kind() -> impl Strategy<Value = LandmarkKind> {
+    prop_oneof![Just(LandmarkKind::Reflector), Just(LandmarkKind::Corner), Just(LandmarkKind::EndPoint)]
+}
+
+fn pose_output() -> impl Strategy<Value = PoseOutput> {
+    let mode = prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::Lost)];
+    let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible)];
+    let numbers = prop::array::uniform9(number());
+    (time(), pose(), mode, reason, numbers).prop_map(|(time, pose, mode, reason, [a, b, c, d, e, f, g, h, i])| {
+        PoseOutput {
+            time,
+            pose,
+            covariance: [a, b, c, d, e, f],
+            mode,
+            reason,
+            dead_reckoning_distance: g,
+            acceptance: h,
+            normalised_square: i,
+        }
+    })
+}
+
+fn landmark_use() -> impl Strategy<Value = LandmarkUse> {
+    let source = prop_oneof![Just(LandmarkSource::Fixed), Just(LandmarkSource::Dynamic)];
+    let verdict = prop_oneof![Just(Verdict::Accepted), Just(Verdict::OutOfTime)];
+    let landmark = prop::option::of((source, any::<u16>()));
+    let numbers = (prop::array::uniform2(single()), prop::array::uniform2(number()), number());
+    (time(), landmark_kind(), landmark, verdict, numbers).prop_map(
+        |(time, kind, landmark, verdict, (position, residual, test_ratio))| LandmarkUse {
+            time,
+            kind,
+            landmark,
+            verdict,
+            position,
+            residual,
+            test_ratio,
+        },
+    )
+}
+
 fn record() -> impl Strategy<Value = Owned> {
     let observation =
         (time(), single(), single()).prop_map(|(time, range, bearing)| ReflectorObservation { time, range, bearing });
     prop_oneof![
         (".{0,40}", vehicle(), pose(), any::<[u32; 3]>()).prop_map(|(software, vehicle, laser, [a, b, c])| {
-            Owned::Header(software, Parameters { vehicle, laser }, Capacities { landmarks: a, beams: b, history: c })
+            Owned::Header(software, Parameters::new(vehicle, laser), Capacities { landmarks: a, beams: b, history: c })
         }),
         prop::collection::vec(landmark(), 0..=50).prop_map(Owned::Landmarks),
         (time(), any::<u32>(), any::<u32>()).prop_map(|(time, drive, steering)| Owned::Encoders(EncoderSample {
@@ -153,7 +192,8 @@ fn record() -> impl Strategy<Value = Owned> {
         (time(), pose(), number(), number()).prop_map(|(time, pose, position_deviation, heading_deviation)| {
             Owned::SetPose(PoseFix { time, pose, position_deviation, heading_deviation })
         }),
-        prop::collection::vec(any::<u8>(), 0..300).prop_map(Owned::Output),
+        (pose_output(), prop::collection::vec(landmark_use(), 0..128))
+            .prop_map(|(pose, uses)| Owned::Output(pose, uses)),
         (time(), pose()).prop_map(|(time, pose)| Owned::Truth(Truth { time, pose })),
         (time(), number(), number(), prop::option::of(number()))
             .prop_map(|(time, x, y, heading)| Owned::Reference(Reference { time, x, y, heading })),
@@ -250,8 +290,9 @@ proptest! {
     #[test]
     fn arbitrary_payloads_are_records_or_damage(kind in 0_u8..16, payload in prop::collection::vec(any::<u8>(), 0..200)) {
         // A frame with a good checksum around anything.
-        let mut frame = Owned::Output(payload).frame(3);
-        frame[5] = kind;
+        let mut frame = vec![0xD6, 0x41, 0x47, 0x56, 1, kind, payload.len() as u8, 0, 3, 0, 0, 0];
+        frame.extend(payload);
+        frame.extend([0; 4]);
         let end = frame.len() - 4;
         let checksum = crc32(&frame[..end]);
         frame[end..].copy_from_slice(&checksum.to_le_bytes());
@@ -276,13 +317,13 @@ fn small_log() -> (Vec<Vec<u8>>, Vec<usize>) {
     let records = [
         Owned::Header(
             "test".into(),
-            Parameters { vehicle: Vehicle::Increments, laser: Pose::new(1.0, 0.0, 0.5) },
+            Parameters::new(Vehicle::Increments, Pose::new(1.0, 0.0, 0.5)),
             Capacities::default(),
         ),
         Owned::Landmarks(vec![Landmark { id: 1, kind: LandmarkKind::Corner, x: 1.0, y: -2.0, deviation: 0.01 }; 3]),
         Owned::Encoders(EncoderSample { time: Time::from_micros(1000), drive: 70_000, steering: 5 }),
         Owned::Scan(Time::from_micros(2000), [0.0, -1.0, 0.1], vec![f32::NAN, 1.0, 0.0, -3.0], vec![4, 5]),
-        Owned::Output([&b"an output that holds the magic "[..], &agv_core::record::MAGIC, &[1, 2, 3]].concat()),
+        Owned::Scan(Time::from_micros(2300), [0.0; 3], vec![f32::from_le_bytes(agv_core::record::MAGIC)], vec![1, 2]),
         Owned::Truth(Truth { time: Time::from_micros(2500), pose: Pose::new(1.0, 2.0, 3.0) }),
         Owned::End,
     ];

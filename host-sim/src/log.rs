@@ -321,7 +321,7 @@ fn event_time(event: &RecordedEvent) -> Option<Time> {
 /// # Errors
 /// If the file cannot be written, or a scan is too long for a log.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
-    let header = Header { software: SOFTWARE, parameters: recording.parameters, capacities: Capacities::default() };
+    let header = Header { software: SOFTWARE, parameters: &recording.parameters, capacities: Capacities::default() };
     let mut writer = Writer::create(path, &header)?;
     for piece in recording.landmarks.chunks(LANDMARKS_A_RECORD) {
         writer.write(&Record::Landmarks(piece))?;
@@ -364,10 +364,10 @@ pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
             Item::Damage(damage) => damages.push(damage),
             Item::Record { offset, record, .. } => match record {
                 Record::Header(header) => match parameters {
-                    Some(known) if known != header.parameters => {
+                    Some(known) if known != *header.parameters => {
                         return Err(LogError::SecondDrive { path: path.to_owned(), offset });
                     }
-                    _ => parameters = Some(header.parameters),
+                    _ => parameters = Some(*header.parameters),
                 },
                 Record::Landmarks(piece) => landmarks.extend_from_slice(piece),
                 Record::Event(event) => events.push(RecordedEvent::from(event)),

@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use tempfile::TempDir;
 
 fn parameters() -> Parameters {
-    Parameters { vehicle: Vehicle::Increments, laser: Pose::new(0.9, 0.0, 0.01) }
+    Parameters::new(Vehicle::Increments, Pose::new(0.9, 0.0, 0.01))
 }
 
 /// A drive with every kind of event.
@@ -203,7 +203,7 @@ fn appending_goes_on_behind_the_last_good_record() {
 fn what_is_flushed_is_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");
-    let header = Header { software: "test", parameters: parameters(), capacities: Capacities::default() };
+    let header = Header { software: "test", parameters: &parameters(), capacities: Capacities::default() };
     let mut writer = Writer::create(&path, &header).unwrap();
     writer.write(&Record::Note("one")).unwrap();
     writer.flush().unwrap();

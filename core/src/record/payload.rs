@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
 use super::truth::{Reference, Truth};
 use crate::landmarks::Landmark;
-use crate::localizer::{Event, Parameters};
+use crate::localizer::{Event, LandmarkUse, Outputs, Parameters, PoseOutput};
 use crate::measurement::{ReflectorObservation, Reflectors, Scan, Time};
 
 /// Greatest number of landmarks in one record; a map is written in pieces.
@@ -24,14 +24,29 @@ pub struct Capacities {
 }
 
 /// What a log begins with.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Header<'a> {
     /// Name and version of the program that wrote the log.
     pub software: &'a str,
     /// What the localiser believed of its vehicle.
-    pub parameters: Parameters,
+    pub parameters: &'a Parameters,
     /// What the localiser had room for.
     pub capacities: Capacities,
+}
+
+/// What the localiser answered to one event.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output<'a> {
+    /// The pose after the event.
+    pub pose: PoseOutput,
+    /// What became of the event's observations, in order of time.
+    pub uses: &'a [LandmarkUse],
+}
+
+impl<'a> From<&'a Outputs> for Output<'a> {
+    fn from(outputs: &'a Outputs) -> Self {
+        Self { pose: outputs.pose, uses: &outputs.uses }
+    }
 }
 
 /// One record of a log.
@@ -44,8 +59,8 @@ pub enum Record<'a> {
     Landmarks(&'a [Landmark]),
     /// What the localiser was told.
     Event(Event<'a>),
-    /// What the localiser answered to the event before, in the postcard encoding.
-    Output(&'a [u8]),
+    /// What the localiser answered to the event before.
+    Output(Output<'a>),
     /// Where the vehicle really was; only a host writes it.
     Truth(Truth),
     /// Where another instrument has seen the laser; only a host writes it.
@@ -66,20 +81,29 @@ pub enum EncodeError {
 }
 
 /// Room for the parts of a record that cannot be borrowed from its bytes, for at most `BEAMS` beams and `REFLECTORS`
-/// reflectors.
+/// reflectors or other observations.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch<const BEAMS: usize = 4096, const REFLECTORS: usize = 1024> {
+    parameters: Option<Parameters>,
     ranges: Vec<f32, BEAMS>,
     intensities: Vec<u16, BEAMS>,
     observations: Vec<ReflectorObservation, REFLECTORS>,
     landmarks: Vec<Landmark, LANDMARKS_A_RECORD>,
+    uses: Vec<LandmarkUse, REFLECTORS>,
 }
 
 impl<const BEAMS: usize, const REFLECTORS: usize> Scratch<BEAMS, REFLECTORS> {
     /// Empty room.
     #[must_use]
     pub const fn new() -> Self {
-        Self { ranges: Vec::new(), intensities: Vec::new(), observations: Vec::new(), landmarks: Vec::new() }
+        Self {
+            parameters: None,
+            ranges: Vec::new(),
+            intensities: Vec::new(),
+            observations: Vec::new(),
+            landmarks: Vec::new(),
+            uses: Vec::new(),
+        }
     }
 }
 
@@ -157,7 +181,7 @@ impl Record<'_> {
             Self::Event(Event::Reflectors(reflectors)) => put_all(reflectors.observations, room),
             Self::Event(Event::Scan(scan)) => put_scan(scan, room),
             Self::Event(Event::SetPose(fix)) => put(fix, room),
-            Self::Output(bytes) => put_bytes(bytes, room),
+            Self::Output(output) => put(&(&output.pose, output.uses), room),
             Self::Truth(truth) => put(truth, room),
             Self::Reference(reference) => put(reference, room),
             Self::Note(text) => put_bytes(text.as_bytes(), room),
@@ -173,7 +197,11 @@ impl Record<'_> {
         scratch: &'a mut Scratch<BEAMS, REFLECTORS>,
     ) -> Result<Record<'a>, DecodeError> {
         let record = match kind {
-            kind::HEADER => Record::Header(take_all(postcard::take_from_bytes(payload))?),
+            kind::HEADER => {
+                let (software, parameters, capacities) = take_all(postcard::take_from_bytes(payload))?;
+                let parameters = scratch.parameters.insert(parameters);
+                Record::Header(Header { software, parameters, capacities })
+            }
             kind::LANDMARKS => {
                 take_each(payload, &mut scratch.landmarks)?;
                 Record::Landmarks(&scratch.landmarks)
@@ -187,7 +215,11 @@ impl Record<'_> {
             }
             kind::SCAN => Record::Event(Event::Scan(take_scan(payload, scratch)?)),
             kind::SET_POSE => Record::Event(Event::SetPose(take(payload)?)),
-            kind::OUTPUT => Record::Output(payload),
+            kind::OUTPUT => {
+                let (pose, rest) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+                take_each(rest, &mut scratch.uses)?;
+                Record::Output(Output { pose, uses: &scratch.uses })
+            }
             kind::TRUTH => Record::Truth(take(payload)?),
             kind::REFERENCE => Record::Reference(take(payload)?),
             kind::NOTE => Record::Note(core::str::from_utf8(payload).map_err(|_| DecodeError::Content)?),

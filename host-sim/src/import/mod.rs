@@ -1,7 +1,11 @@
 //! Recordings of others.
 
 pub mod carmen;
+pub mod carpark;
 pub mod graph_log;
 mod posed_scan;
+pub mod sapienza;
+mod table;
 
 pub use posed_scan::{PosedScan, ScanLog};
+pub use table::ImportError;
