@@ -240,8 +240,11 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         covariance[0] += floor;
         covariance[2] += floor;
         if let Some(gate) = gate {
+            let beam_width = scan.bearing_step * around.centre.norm();
             let sideways = libm::fabsf(ray.x * relative.y - ray.y * relative.x);
-            if sideways > gate.beams * scan.bearing_step * around.centre.norm() {
+            let is_concave = (before.centroid + after.centroid).dot(&ray) < 0.0;
+            let slant = libm::fabsf(before.normal().dot(&ray)).min(libm::fabsf(after.normal().dot(&ray)));
+            if sideways > gate.beams * beam_width || (is_concave && beam_width > gate.concave_spacing * slant) {
                 return None;
             }
             let residual = gate.residual * gate.residual;
