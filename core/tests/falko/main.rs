@@ -10,7 +10,8 @@ use scene::{Random, Scene};
 const BEAMS: usize = 1440;
 
 fn detect(ranges: &[f32], first_bearing: f64, bearing_step: f64, parameters: Parameters) -> Vec<Keypoint> {
-    let scan = Scan { start: Time::default(), beam_interval: 0.0, first_bearing, bearing_step, ranges, intensities: &[] };
+    let scan =
+        Scan { start: Time::default(), beam_interval: 0.0, first_bearing, bearing_step, ranges, intensities: &[] };
     let mut points = Box::new(PointScan::<BEAMS>::new());
     points.set(&scan, 0.05, 80.0);
     let mut keypoints = heapless::Vec::<Keypoint, 256>::new();
@@ -60,7 +61,14 @@ fn look_around(parameters: Parameters, worlds: u64, scans: usize) -> (Vec<Seen>,
                 }
                 let offset = scene.offset_from_corner(world);
                 let error = [cosine * offset[0] + sine * offset[1], cosine * offset[1] - sine * offset[0]];
-                seen.push(Seen { kind: keypoint.kind, error, covariance: keypoint.covariance.map(f64::from), local: [x, y], cosine: f64::from(keypoint.orientation).cos() * x + f64::from(keypoint.orientation).sin() * y, beam: keypoint.beam });
+                seen.push(Seen {
+                    kind: keypoint.kind,
+                    error,
+                    covariance: keypoint.covariance.map(f64::from),
+                    local: [x, y],
+                    cosine: f64::from(keypoint.orientation).cos() * x + f64::from(keypoint.orientation).sin() * y,
+                    beam: keypoint.beam,
+                });
             }
         }
     }
@@ -107,6 +115,18 @@ fn storage() {
 fn dump() {
     let (seen, _) = look_around(Parameters::mended(), 20, 10);
     for s in seen.iter().filter(|s| s.kind == KeypointKind::Corner && (s.distance() > 0.03 || s.cosine < 0.0)) {
-        println!("BAD d {:.1} mm e {:.1} {:.1} sd {:.1} {:.1} nees {:.1} | at {:.2} {:.2} beam n {} cos {:.2}", s.distance()*1e3, s.error[0]*1e3, s.error[1]*1e3, s.covariance[0].sqrt()*1e3, s.covariance[2].sqrt()*1e3, s.normalised(), s.local[0], s.local[1], s.beam, s.cosine);
+        println!(
+            "BAD d {:.1} mm e {:.1} {:.1} sd {:.1} {:.1} nees {:.1} | at {:.2} {:.2} beam n {} cos {:.2}",
+            s.distance() * 1e3,
+            s.error[0] * 1e3,
+            s.error[1] * 1e3,
+            s.covariance[0].sqrt() * 1e3,
+            s.covariance[2].sqrt() * 1e3,
+            s.normalised(),
+            s.local[0],
+            s.local[1],
+            s.beam,
+            s.cosine
+        );
     }
 }

@@ -102,7 +102,9 @@ impl Scene {
         random: &mut Random,
     ) -> Vec<f32> {
         let bearing = |beam: usize| pose[2] + first_bearing + TAU * beam as f64 / beams as f64;
-        (0..beams).map(|beam| (self.cast([pose[0], pose[1]], bearing(beam)) + deviation * random.normal()) as f32).collect()
+        (0..beams)
+            .map(|beam| (self.cast([pose[0], pose[1]], bearing(beam)) + deviation * random.normal()) as f32)
+            .collect()
     }
 
     /// Offset of a world point from the nearest true corner.
