@@ -2,6 +2,7 @@
 
 pub mod data;
 pub mod evaluate;
+pub mod export;
 pub mod file_kind;
 pub mod import;
 pub mod log;

@@ -1,5 +1,6 @@
 //! `agv evaluate`.
 
+mod carpark;
 mod falko;
 mod warehouse;
 
@@ -12,6 +13,7 @@ pub struct Evaluate {
 
 #[derive(clap::Subcommand)]
 enum Experiment {
+    Carpark(carpark::Carpark),
     Falko(falko::Falko),
     Warehouse(warehouse::Warehouse),
 }
@@ -20,6 +22,7 @@ impl Evaluate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.experiment {
+            Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }

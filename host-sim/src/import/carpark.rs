@@ -12,7 +12,7 @@ use agv_core::measurement::{SpeedSample, Time};
 use agv_core::odometry::{Ackermann, Vehicle};
 
 use super::table::{ImportError, Row, read_rows};
-use crate::recording::{RecordedEvent, RecordedScan, Recording, Reference};
+use crate::recording::{RecordedEvent, RecordedScan, Recording, Reference, Truth};
 
 /// Geometry of the vehicle as its owners state it; encoder offset and wheelbase, m.
 pub const VEHICLE: Ackermann = Ackermann { wheelbase: 2.83, encoder_offset: 0.76 };
@@ -92,6 +92,20 @@ pub fn read(folder: &Path, window: &RangeInclusive<f64>) -> Result<Recording, Im
         truth: Vec::new(),
         references,
     })
+}
+
+/// Reads the batch solution that comes with the data, `reference_smoothed.csv`: poses of R by odometry, laser and
+/// reflectors of the whole drive at once, without the receiver.
+///
+/// # Errors
+/// If the file is missing, empty, not a table, or has a bad row.
+pub fn read_batch_solution(folder: &Path) -> Result<Vec<Truth>, ImportError> {
+    let rows = read_rows(&folder.join("reference_smoothed.csv"), 4)?;
+    let pose = |row: &Row| Truth {
+        time: Time::from_seconds(row.numbers[0]),
+        pose: Pose::new(row.numbers[1], row.numbers[2], row.numbers[3]),
+    };
+    Ok(rows.iter().map(pose).collect())
 }
 
 /// The first column of both rows is the time; column k after it is the beam at 0.5 k - 90 degrees.

@@ -36,6 +36,7 @@ struct Neighbourhood {
 struct Corner {
     position: ScanPoint,
     covariance: [f32; 3],
+    misfit: f32,
 }
 
 impl<const BEAMS: usize> Detector<BEAMS> {
@@ -168,10 +169,9 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         let after = Side::after(scan, index, around.reach.after);
         let squared = around.radius * around.radius;
         let Some(orientation) = self.orientation(&around, &before, &after) else { return Cost::NONE };
-        if let Some(gate) = &self.parameters.gate
-            && self.corner(scan, index, &around, Some(gate)).is_none()
-        {
-            return Cost::NONE;
+        if let Some(gate) = &self.parameters.gate {
+            let Some(corner) = self.corner(scan, index, &around, Some(gate)) else { return Cost::NONE };
+            return Cost { cost: corner.misfit, height: around.height };
         }
         let origin = self.sectors.origin(orientation);
         let score = [before, after].map(|side| {
@@ -210,7 +210,7 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         around: &Neighbourhood,
         gate: Option<&LineGate>,
     ) -> Option<Corner> {
-        let own = Corner { position: around.centre, covariance: self.own_covariance() };
+        let own = Corner { position: around.centre, covariance: self.own_covariance(), misfit: f32::INFINITY };
         let refused = if gate.is_some() { None } else { Some(own) };
         let squared = around.radius * around.radius;
         let fit = |side: Side<'_>| {
@@ -240,6 +240,13 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         covariance[0] += floor;
         covariance[2] += floor;
         if let Some(gate) = gate {
+            let beam_width = scan.bearing_step * around.centre.norm();
+            let sideways = libm::fabsf(ray.x * relative.y - ray.y * relative.x);
+            let is_concave = (before.centroid + after.centroid).dot(&ray) < 0.0;
+            let slant = libm::fabsf(before.normal().dot(&ray)).min(libm::fabsf(after.normal().dot(&ray)));
+            if sideways > gate.beams * beam_width || (is_concave && beam_width > gate.concave_spacing * slant) {
+                return None;
+            }
             let residual = gate.residual * gate.residual;
             let sine = libm::fabsf(before.along.dot(&after.normal()));
             if before.mean_square() > residual
@@ -250,7 +257,8 @@ impl<const BEAMS: usize> Detector<BEAMS> {
                 return None;
             }
         }
-        Some(Corner { position: around.centre + relative, covariance })
+        let misfit = largest_variance(covariance);
+        Some(Corner { position: around.centre + relative, covariance, misfit })
     }
 
     /// Covariance of a corner that is known only to lie near its beam's return, m^2.

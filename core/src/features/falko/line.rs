@@ -82,7 +82,7 @@ impl Line {
     /// Variance of one point across the line, m^2, if a range has `range_variance` along the unit vector `ray`.
     fn point_variance(&self, ray: ScanPoint, range_variance: f32) -> f32 {
         let share = self.normal().dot(&ray);
-        let expected = range_variance * (share * share).max(0.04);
+        let expected = range_variance * (share * share).max(0.01);
         (PRIOR_WEIGHT * expected + self.squares) / (PRIOR_WEIGHT + self.count - 2.0)
     }
 

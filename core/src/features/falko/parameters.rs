@@ -22,6 +22,11 @@ pub struct LineGate {
     pub sine: f32,
     /// Largest standard deviation of the corner in any direction, m.
     pub deviation: f32,
+    /// Farthest that the corner may lie beside the candidate's beam, beams.
+    pub beams: f32,
+    /// Largest distance between the points where neighbouring beams meet a side of a concave corner, m. A gap narrower
+    /// than that is not seen, and the two surfaces need not touch.
+    pub concave_spacing: f32,
 }
 
 /// What an end of a face must look like.
@@ -134,7 +139,7 @@ impl Parameters {
             points_a_side: 3,
             lines_include_corner: false,
             jump: Some(0.06),
-            gate: Some(LineGate { residual: 0.02, sine: 0.5, deviation: 0.009 }),
+            gate: Some(LineGate { residual: 0.02, sine: 0.5, deviation: 0.009, beams: 1.0, concave_spacing: 0.05 }),
             end_points: Some(EndPointParameters {
                 length: 0.6,
                 shortest: 0.15,

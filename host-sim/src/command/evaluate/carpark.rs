@@ -1,0 +1,52 @@
+//! `agv evaluate carpark`.
+
+use agv_host_sim::data;
+use agv_host_sim::evaluate::carpark;
+use anyhow::Context;
+
+/// Reflectors on a real vehicle: the car park of ACFR against its satellite receiver.
+#[derive(clap::Args)]
+pub struct Carpark {
+    /// What is believed of the vehicle's own sensors.
+    #[arg(long, value_enum, default_value = "nominal")]
+    noise: Noise,
+    /// One JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Noise {
+    /// Wide enough for a car whose wheel slips.
+    Nominal,
+    /// 0.1 m/s and 1 degree: too sure of itself.
+    Tight,
+}
+
+impl Carpark {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let folder =
+            data::folder().context("the recordings are not there: set AGV_DATA to their folder")?.join("carpark");
+        let noise = match self.noise {
+            Noise::Nominal => carpark::Noise::Nominal,
+            Noise::Tight => carpark::Noise::Tight,
+        };
+        let (outcome, _, _) = carpark::run(&folder, noise)?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&outcome)?);
+            return Ok(());
+        }
+        let or_never = |time: Option<f64>| time.map_or("never".to_owned(), |time| format!("at {time:.1} s"));
+        println!(
+            "position     rms {:.3} m, median {:.3}, 95 % {:.3}, max {:.3}",
+            outcome.rmse_m, outcome.median_m, outcome.p95_m, outcome.max_m
+        );
+        println!("heading      rms {:.2} deg", outcome.heading_rmse_deg);
+        println!("reflectors   {} accepted, {} rejected", outcome.accepted, outcome.rejected);
+        println!("wrong        {}", or_never(outcome.wrong_at_s));
+        println!("lost         {}", or_never(outcome.lost_at_s));
+        println!("speed        {:.0} times real time", outcome.realtime_factor);
+        Ok(())
+    }
+}

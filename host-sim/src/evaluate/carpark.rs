@@ -1,0 +1,163 @@
+//! The car park: a real vehicle among surveyed reflectors, against a satellite receiver.
+//!
+//! The localiser gets odometry, scans, the nominal geometry and the surveyed reflectors, which its own detector finds in
+//! the scans. It starts at the receiver's first position with a rough heading. Nothing is fitted to the receiver.
+
+use std::path::Path;
+
+use agv_core::features::ReflectorDetection;
+use agv_core::geometry::{Pose, difference};
+use agv_core::landmarks::{LandmarkKind, Verdict};
+use agv_core::localizer::{MapUse, Mode, Parameters, PoseFix, PoseOutput};
+use agv_core::measurement::Time;
+use agv_core::odometry::OdometryNoise;
+use serde::Serialize;
+
+use super::accuracy::{Spread, truth_at};
+use crate::import::{ImportError, carpark};
+use crate::recording::{RecordedEvent, Recording, Truth};
+use crate::replay::{Replay, ReplayError, replay};
+
+/// What is believed of the vehicle's own sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Noise {
+    /// Wide enough for a car whose wheel slips.
+    #[default]
+    Nominal,
+    /// 0.1 m/s and 1 degree: too sure of itself.
+    Tight,
+}
+
+/// What came out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// Root mean square distance of the laser from the receiver, m.
+    pub rmse_m: f64,
+    /// Median of that distance, m.
+    pub median_m: f64,
+    /// 95th percentile of it, m.
+    pub p95_m: f64,
+    /// Largest, m.
+    pub max_m: f64,
+    /// Root mean square difference of the heading from that of a batch solution without the receiver, deg.
+    pub heading_rmse_deg: f64,
+    /// When the localiser said that it was lost, s of the recording; none if it never did.
+    pub lost_at_s: Option<f64>,
+    /// When the distance from the receiver first passed half a metre, s of the recording.
+    pub wrong_at_s: Option<f64>,
+    /// Observations that corrected the pose.
+    pub accepted: usize,
+    /// Observations that did not.
+    pub rejected: usize,
+    /// Recorded time by processor time.
+    pub realtime_factor: f64,
+}
+
+/// Why the experiment cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum CarparkError {
+    /// The data cannot be read.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// The recording cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// There is no satellite position to compare with.
+    #[error("the recording has no reference positions")]
+    NoReference,
+}
+
+/// Distance from the receiver that counts as wrong, m.
+const WRONG: f64 = 0.5;
+
+/// First heading as the data's description states it, rad.
+const FIRST_HEADING: f64 = -126.0 * std::f64::consts::PI / 180.0;
+
+/// What the localiser is told about the vehicle and its sensors.
+#[must_use]
+pub fn parameters(imported: &Parameters, noise: Noise) -> Parameters {
+    let mut parameters = *imported;
+    let (speed, steering) = match noise {
+        Noise::Nominal => (0.3, 4.0_f64.to_radians()),
+        Noise::Tight => (0.1, 1.0_f64.to_radians()),
+    };
+    parameters.odometry_noise = OdometryNoise { speed, steering, slip: 0.0, side_slip: 0.0, yaw: 0.0 };
+    parameters.maps = MapUse { reflectors: true, features: false, dynamic: false };
+    parameters.reflectors.range_deviation = 0.03;
+    parameters.reflectors.bearing_deviation = 0.3_f64.to_radians();
+    parameters.reflectors.detection = Some(ReflectorDetection::default());
+    parameters.limits.fastest = 10.0;
+    parameters
+}
+
+/// Reads the data from `folder` and makes the experiment.
+///
+/// # Errors
+/// See [`CarparkError`].
+pub fn run(folder: &Path, noise: Noise) -> Result<(Outcome, Recording, Replay), CarparkError> {
+    let mut recording = carpark::read(folder, &carpark::WINDOW)?;
+    recording.parameters = parameters(&recording.parameters, noise);
+    let headings = carpark::read_batch_solution(folder)?;
+    let first = recording.references.first().ok_or(CarparkError::NoReference)?;
+    let laser = Pose::new(first.x, first.y, FIRST_HEADING);
+    let fix = PoseFix {
+        time: first.time,
+        pose: laser.compose(&recording.parameters.laser.inverse()),
+        position_deviation: 0.3,
+        heading_deviation: 5.0_f64.to_radians(),
+    };
+    recording.events.insert(0, RecordedEvent::SetPose(fix));
+    let replay = replay(&recording, |_| {})?;
+    let outcome = judge(&recording, &replay, &headings);
+    Ok((outcome, recording, replay))
+}
+
+/// The pose that the localiser would publish at `time`: the last one, carried on by the odometry that follows.
+fn pose_at(poses: &[PoseOutput], time: Time) -> Option<Pose> {
+    let after = poses.partition_point(|pose| pose.time <= time);
+    let (last, next) = (poses.get(after.checked_sub(1)?)?, poses.get(after)?);
+    let interval = next.time.since(last.time);
+    let share = if interval > 0.0 { time.since(last.time) / interval } else { 0.0 };
+    Some(last.pose.compose(&last.pose.between(&next.pose).fraction(share)))
+}
+
+fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome {
+    let localised: Vec<PoseOutput> =
+        replay.poses.iter().filter(|pose| pose.mode != Mode::NotLocalised).copied().collect();
+    let errors: Vec<(Time, f64)> = recording
+        .references
+        .iter()
+        .filter_map(|reference| {
+            let laser = pose_at(&localised, reference.time)?.compose(&recording.parameters.laser);
+            Some((reference.time, (laser.position() - reference.position()).norm()))
+        })
+        .collect();
+    let turned: Vec<f64> = localised
+        .iter()
+        .filter_map(|pose| Some(difference(pose.pose.theta, truth_at(headings, pose.time)?.theta)))
+        .collect();
+    let spread = Spread::of(errors.iter().map(|error| error.1));
+    let accepted = replay.uses.iter().filter(|used| used.verdict == Verdict::Accepted).count();
+    let seen = replay.uses.iter().filter(|used| used.kind == LandmarkKind::Reflector).count();
+    let recorded = match (replay.poses.first(), replay.poses.last()) {
+        (Some(first), Some(last)) => last.time.since(first.time),
+        _ => 0.0,
+    };
+    Outcome {
+        rmse_m: root_mean_square(errors.iter().map(|error| error.1)),
+        median_m: spread.median,
+        p95_m: spread.p95,
+        max_m: spread.max,
+        heading_rmse_deg: root_mean_square(turned.iter().copied()).to_degrees(),
+        lost_at_s: localised.iter().find(|pose| pose.mode == Mode::Lost).map(|pose| pose.time.seconds()),
+        wrong_at_s: errors.iter().find(|error| error.1 > WRONG).map(|error| error.0.seconds()),
+        accepted,
+        rejected: seen - accepted,
+        realtime_factor: recorded / replay.elapsed.as_secs_f64(),
+    }
+}
+
+fn root_mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len();
+    (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt()
+}
