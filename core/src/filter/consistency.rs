@@ -6,9 +6,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConsistencyParameters {
-    /// How much of the evidence of the past remains after each scan, 0 to 1.
+    /// How many observations the evidence reaches back, at least one.
     pub memory: f64,
-    /// Least number of remembered observations for a verdict.
+    /// How much of the evidence remains at least after each scan, 0 to 1: however many observations it has, one scan
+    /// alone decides nothing.
+    pub least_remaining: f64,
+    /// Least weight of remembered observations for a verdict.
     pub least_observations: f64,
     /// Least share of observations of the fixed map that must have been accepted.
     pub least_acceptance: f64,
@@ -18,7 +21,13 @@ pub struct ConsistencyParameters {
 
 impl Default for ConsistencyParameters {
     fn default() -> Self {
-        Self { memory: 0.8, least_observations: 6.0, least_acceptance: 0.4, largest_normalised_square: 6.0 }
+        Self {
+            memory: 10.0,
+            least_remaining: 0.7,
+            least_observations: 5.0,
+            least_acceptance: 0.4,
+            largest_normalised_square: 5.0,
+        }
     }
 }
 
@@ -42,11 +51,18 @@ impl Consistency {
     /// Takes the evidence of one scan: how many observations should have had a fixed landmark, how many of these were
     /// accepted, and of all that were used their number and the sum of their normalised squared innovations.
     pub fn add(&mut self, expected: usize, accepted: usize, used: usize, normalised_square_sum: f64) {
-        let memory = self.parameters.memory;
-        self.expected = memory * self.expected + expected as f64;
-        self.accepted = memory * self.accepted + accepted as f64;
-        self.used = memory * self.used + used as f64;
-        self.normalised_square = memory * self.normalised_square + normalised_square_sum;
+        let remaining = self.remaining(expected);
+        self.expected = remaining * self.expected + expected as f64;
+        self.accepted = remaining * self.accepted + accepted as f64;
+        let remaining = self.remaining(used);
+        self.used = remaining * self.used + used as f64;
+        self.normalised_square = remaining * self.normalised_square + normalised_square_sum;
+    }
+
+    /// How much of the older evidence remains after that many observations.
+    fn remaining(&self, observations: usize) -> f64 {
+        let each = 1.0 - 1.0 / self.parameters.memory.max(1.0);
+        libm::pow(each, observations as f64).max(self.parameters.least_remaining)
     }
 
     /// Share of the observations of the fixed map that were accepted; one if there are none.
