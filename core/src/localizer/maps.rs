@@ -72,7 +72,8 @@ impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> Maps<
         };
         let fixed = |landmark: &crate::landmarks::Landmark| {
             let deviation = f64::from(landmark.deviation);
-            compare(LandmarkSource::Fixed, landmark.id, Point::new(landmark.x, landmark.y), deviation * deviation)
+            let variance = association.shared_map_error * deviation * deviation;
+            compare(LandmarkSource::Fixed, landmark.id, Point::new(landmark.x, landmark.y), variance)
         };
         if kind == LandmarkKind::Reflector {
             return if reflectors {

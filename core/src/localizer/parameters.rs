@@ -113,7 +113,7 @@ impl Default for FeatureParameters {
             detector: falko::Parameters::default(),
             nearest: 0.5,
             farthest: 30.0,
-            added_deviation: 0.005,
+            added_deviation: 0.01,
             motion_correction: true,
         }
     }
@@ -131,12 +131,16 @@ pub struct AssociationParameters {
     pub gate: f64,
     /// By how much the second best landmark must be worse, in squared Mahalanobis distance.
     pub margin: f64,
+    /// How many observations in a row share the error of a landmark's place in the map. The filter takes errors as
+    /// independent; this multiplies the variance of the landmark, so that seeing one landmark often does not make its
+    /// place certain.
+    pub shared_map_error: f64,
 }
 
 impl Default for AssociationParameters {
     /// The gate lets 99.7 per cent of the right ones pass.
     fn default() -> Self {
-        Self { reflector_radius: 1.5, feature_radius: 0.3, gate: 11.83, margin: 9.0 }
+        Self { reflector_radius: 1.5, feature_radius: 0.3, gate: 11.83, margin: 9.0, shared_map_error: 20.0 }
     }
 }
 

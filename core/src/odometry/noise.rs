@@ -25,7 +25,7 @@ pub struct OdometryNoise {
 impl Default for OdometryNoise {
     /// A vehicle that was calibrated with some care.
     fn default() -> Self {
-        Self { speed: 0.0, steering: 2e-4, slip: 4e-3, side_slip: 1e-3, yaw: 1e-3 }
+        Self { speed: 0.0, steering: 2e-4, slip: 6e-3, side_slip: 1e-3, yaw: 1.5e-3 }
     }
 }
 
