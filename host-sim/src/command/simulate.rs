@@ -27,7 +27,7 @@ impl Simulate {
         eprintln!("simulating {} with seed {}", self.scenario.display(), scenario.seed);
         let recording = simulate(&scenario)?.recording;
         if let Some(path) = &self.output {
-            anyhow::bail!("{} is not written: there is no log writer yet", path.display());
+            agv_host_sim::log::write(path, &recording)?;
         }
         summarise(&recording);
         Ok(())

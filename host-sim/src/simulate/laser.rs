@@ -118,21 +118,37 @@ pub fn revolutions(options: &LaserOptions, track: &LaserTrack) -> usize {
     (track.duration() * options.frequency + 1e-9) as usize
 }
 
-/// One revolution. Each beam is cast from where the laser is at that beam's time. `start` is the time of the track's first
-/// state. Faults have random numbers of their own, so switching them on leaves the noise of the other beams as it was.
+/// One turn of the laser.
+#[derive(Clone, Copy, Debug)]
+pub struct Revolution<'a> {
+    /// How many came before.
+    pub index: usize,
+    /// What the rays can meet.
+    pub scene: Scene<'a>,
+    /// Where the laser is.
+    pub track: &'a LaserTrack,
+    /// The laser.
+    pub options: &'a LaserOptions,
+    /// Time of the track's first state.
+    pub drive_start: Time,
+}
+
+impl Revolution<'_> {
+    /// When the first beam is cast, s since the track's first state.
+    #[must_use]
+    pub fn start(&self) -> f64 {
+        self.index as f64 / self.options.frequency
+    }
+}
+
+/// The ranges of one revolution. Each beam is cast from where the laser is at that beam's time. Faults have random numbers
+/// of their own, so switching them on leaves the noise of the other beams as it was.
 #[must_use]
-pub fn scan(
-    revolution: usize,
-    scene: &Scene,
-    track: &LaserTrack,
-    options: &LaserOptions,
-    start: Time,
-    noise: &mut Random,
-    faults: &mut Random,
-) -> RecordedScan {
+pub fn scan(revolution: &Revolution, noise: &mut Random, faults: &mut Random) -> RecordedScan {
+    let &Revolution { scene, track, options, drive_start, .. } = revolution;
     let bearing_noise = options.bearing_noise_deg.to_radians();
     let (bearing_step, beam_interval) = (bearing_step(options), beam_interval(options));
-    let scan_start = revolution as f64 / options.frequency;
+    let scan_start = revolution.start();
     let count = options.beams as usize;
     let mut ranges = Vec::with_capacity(count);
     let mut intensities = Vec::with_capacity(if options.intensities { count } else { 0 });
@@ -145,7 +161,7 @@ pub fn scan(
         let hit = scene.first_hit(&origin, &unit(angle), options.farthest, time);
         let mut distance = hit.map(|hit| hit.distance);
         if options.mixed_share > 0.0 {
-            distance = mixed(distance, scene, &origin, angle, options, time, faults);
+            distance = mixed(distance, &scene, &origin, angle, options, time, faults);
         }
         let is_lost = is_lost(bearing, options, faults);
         let range = distance.filter(|_| !is_lost).map_or(0.0, |distance| {
@@ -163,7 +179,7 @@ pub fn scan(
         }
     }
     RecordedScan {
-        start: start.offset(scan_start),
+        start: drive_start.offset(scan_start),
         beam_interval,
         first_bearing: FIRST_BEARING,
         bearing_step,

@@ -24,7 +24,7 @@ use agv_core::measurement::Time;
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 
 use crate::recording::{RecordedEvent, Recording, Truth};
-use laser::{LaserTrack, Scene};
+use laser::{LaserTrack, Revolution, Scene};
 use path::Path;
 use random::{Random, Stream};
 use raycast::RayCaster;
@@ -216,23 +216,16 @@ fn report_laser(arrivals: &mut Arrivals, scenario: &Scenario, world: &World, tra
     let mut noise = Random::new(scenario.seed, Stream::Laser);
     let mut faults = Random::new(scenario.seed, Stream::LaserFaults);
     let mut reflector_random = Random::new(scenario.seed, Stream::Reflectors);
-    for revolution in 0..laser::revolutions(&scenario.laser, track) {
-        let end = START.offset((revolution + 1) as f64 / scenario.laser.frequency);
+    for index in 0..laser::revolutions(&scenario.laser, track) {
+        let revolution = Revolution { index, scene, track, options: &scenario.laser, drive_start: START };
+        let end = START.offset((index + 1) as f64 / scenario.laser.frequency);
         if !world.reflectors.is_empty() {
-            let observations = reflector_detector::detect(
-                revolution,
-                &scene,
-                &world.reflectors,
-                track,
-                &scenario.laser,
-                &scenario.reflectors,
-                START,
-                &mut reflector_random,
-            );
+            let observations =
+                reflector_detector::detect(&revolution, &world.reflectors, &scenario.reflectors, &mut reflector_random);
             arrivals.add(end.offset(scenario.reflectors.latency), RecordedEvent::Reflectors(observations));
         }
         if scenario.laser.scans {
-            let scan = laser::scan(revolution, &scene, track, &scenario.laser, START, &mut noise, &mut faults);
+            let scan = laser::scan(&revolution, &mut noise, &mut faults);
             arrivals.add(end.offset(scenario.laser.latency), RecordedEvent::Scan(scan));
         }
     }

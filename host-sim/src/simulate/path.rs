@@ -84,8 +84,8 @@ impl Leg {
         pose
     }
 
-    /// Mean curvature, rad/m, over `window` (m) around `way` (m); beyond its ends the leg goes on straight into itself:
-    /// the first and the last curvature are held.
+    /// Mean curvature, rad/m, over `window` (m) around `way` (m). Beyond its ends the leg is taken to keep its first and
+    /// its last curvature.
     #[must_use]
     pub fn mean_curvature(&self, way: f64, window: f64) -> f64 {
         let (low, high) = (way - 0.5 * window, way + 0.5 * window);

@@ -23,7 +23,7 @@ pub struct Hit {
 }
 
 /// Side of a cell, m.
-const CELL: f64 = 0.5;
+const CELL: f64 = 0.75;
 /// Solids are listed in every cell that they come this near to, m, so that rounding at a border loses none.
 const MARGIN: f64 = 1e-6;
 /// Segments are taken longer by this share at both ends, so that no ray slips through a joint.
@@ -71,12 +71,8 @@ impl RayCaster {
         let columns = ((high.x - low.x) / CELL) as usize + 1;
         let rows = ((high.y - low.y) / CELL) as usize + 1;
         let (segment_starts, segments) =
-            list_by_cell(&world.segments, low, columns, rows, segment_extent, |segment, centre, reach| {
-                distance_to_segment(centre, segment) <= reach
-            });
-        let (round_starts, rounds) = list_by_cell(&rounds, low, columns, rows, round_extent, |round, centre, reach| {
-            (centre - round.circle.centre).norm() <= round.circle.radius + reach
-        });
+            list_by_cell(&world.segments, low, columns, rows, segment_extent, line_meets_cell);
+        let (round_starts, rounds) = list_by_cell(&rounds, low, columns, rows, round_extent, circle_meets_cell);
         Self { low, columns, rows, segment_starts, segments, round_starts, rounds }
     }
 
@@ -168,15 +164,19 @@ pub fn circle_hit(origin: &Point, direction: &Point, circle: &Circle) -> Option<
     (distance > 0.0).then_some(distance)
 }
 
-/// Infinite if the ray misses the segment.
+/// Infinite if the ray misses the segment; a parallel segment has no inside that it could hit.
 fn distance_along(origin: &Point, direction: &Point, segment: &Segment) -> f64 {
     let edge = segment.to - segment.from;
     let start = segment.from - origin;
-    let slant = 1.0 / direction.perp(&edge);
-    let share = start.perp(direction) * slant;
-    let distance = start.perp(&edge) * slant;
-    // Both are infinite or NaN for a parallel segment, which has no inside that the ray could hit.
-    if (-JOINT..=1.0 + JOINT).contains(&share) && distance > 0.0 { distance } else { f64::INFINITY }
+    let slant = direction.perp(&edge);
+    // Most segments are missed: that is found without a division.
+    let share = start.perp(direction) * slant.signum();
+    let whole = slant.abs();
+    if share < -JOINT * whole || share > (1.0 + JOINT) * whole || whole == 0.0 {
+        return f64::INFINITY;
+    }
+    let distance = start.perp(&edge) / slant;
+    if distance > 0.0 { distance } else { f64::INFINITY }
 }
 
 fn range(starts: &[u32], cell: usize) -> std::ops::Range<usize> {
@@ -230,24 +230,28 @@ fn bounds(segments: &[Segment], rounds: &[Round]) -> (Point, Point) {
         })
 }
 
-fn distance_to_segment(point: &Point, segment: &Segment) -> f64 {
+/// Whether the segment's line meets the cell around `centre`; the bounding boxes are known to meet (separating axes).
+fn line_meets_cell(segment: &Segment, centre: &Point) -> bool {
     let edge = segment.to - segment.from;
-    let square = edge.norm_squared();
-    let share = if square > 0.0 { ((point - segment.from).dot(&edge) / square).clamp(0.0, 1.0) } else { 0.0 };
-    (point - segment.from - edge * share).norm()
+    let reach = 0.5 * CELL * (edge.x.abs() + edge.y.abs()) + MARGIN * (1.0 + edge.norm());
+    edge.perp(&(centre - segment.from)).abs() <= reach
 }
 
-/// Copies of the items, cell after cell; `extent` gives an item's bounding box, `touches(item, centre, reach)` whether it
-/// comes that near to a cell's centre.
+fn circle_meets_cell(round: &Round, centre: &Point) -> bool {
+    let beside = (round.circle.centre - centre).abs().add_scalar(-0.5 * CELL).sup(&Point::zeros());
+    beside.norm() <= round.circle.radius + MARGIN
+}
+
+/// Copies of the items, cell after cell; `extent` gives an item's bounding box, `meets(item, centre)` whether it meets a
+/// cell that the box meets.
 fn list_by_cell<Item: Copy>(
     items: &[Item],
     low: Point,
     columns: usize,
     rows: usize,
     extent: impl Fn(&Item) -> (Point, Point),
-    touches: impl Fn(&Item, &Point, f64) -> bool,
+    meets: impl Fn(&Item, &Point) -> bool,
 ) -> (Vec<u32>, Vec<Item>) {
-    let reach = CELL * std::f64::consts::FRAC_1_SQRT_2 + MARGIN;
     let mut cells = vec![Vec::new(); columns * rows];
     for item in items {
         let (from, to) = extent(item);
@@ -257,7 +261,7 @@ fn list_by_cell<Item: Copy>(
         for row in span(1, rows) {
             for column in span(0, columns) {
                 let centre = low + Point::new((column as f64 + 0.5) * CELL, (row as f64 + 0.5) * CELL);
-                if touches(item, &centre, reach) {
+                if meets(item, &centre) {
                     cells[row * columns + column].push(*item);
                 }
             }

@@ -3,7 +3,7 @@
 use agv_core::geometry::{difference, wrap};
 use agv_core::measurement::{ReflectorObservation, Time};
 
-use super::laser::{FIRST_BEARING, LaserTrack, Scene, beam_interval, bearing_step, unit};
+use super::laser::{FIRST_BEARING, LaserTrack, Revolution, beam_interval, bearing_step, unit};
 use super::random::Random;
 use super::raycast::Surface;
 use super::scenario::{LaserOptions, ReflectorOptions};
@@ -16,18 +16,14 @@ const CROSSING_STEPS: usize = 4;
 /// The reflectors of one revolution, in order of time. A reflector is seen if the ray to its axis hits it first, if its
 /// foil is turned to the laser, and if it is near enough.
 #[must_use]
-#[allow(clippy::too_many_arguments)]
 pub fn detect(
-    revolution: usize,
-    scene: &Scene,
+    revolution: &Revolution,
     reflectors: &[Reflector],
-    track: &LaserTrack,
-    laser: &LaserOptions,
     options: &ReflectorOptions,
-    start: Time,
     random: &mut Random,
 ) -> Vec<ReflectorObservation> {
-    let scan_start = revolution as f64 / laser.frequency;
+    let &Revolution { scene, track, options: laser, drive_start, .. } = revolution;
+    let scan_start = revolution.start();
     let bearing_noise = options.bearing_noise_deg.to_radians();
     let mut seen = Vec::new();
     for (index, reflector) in reflectors.iter().enumerate() {
@@ -46,7 +42,7 @@ pub fn detect(
         }
         let bearing = libm::atan2(offset.y, offset.x) - heading;
         seen.push(observation(
-            start.offset(time),
+            drive_start.offset(time),
             distance + options.range_noise * noise.0,
             bearing + bearing_noise * noise.1,
         ));
@@ -61,7 +57,7 @@ pub fn detect(
             if let Some(hit) = scene.first_hit(&origin, &unit(heading + bearing), options.farthest, time)
                 && hit.distance >= laser.nearest
             {
-                seen.push(observation(start.offset(time), hit.distance, bearing));
+                seen.push(observation(drive_start.offset(time), hit.distance, bearing));
             }
         }
     }

@@ -67,3 +67,15 @@ fn another_run_in_the_same_world_has_other_noise() {
     assert!(first.recording.truth != second.recording.truth);
     assert!(scans(&first.recording).next() != scans(&second.recording).next());
 }
+
+#[test]
+fn a_simulated_drive_survives_the_log() {
+    let scenario = Scenario::block_storage_with_reflectors(BlockStoragePath::P4, ReflectorPlacement::Aisle, 6);
+    let recording = simulate(&scenario).unwrap().recording;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive");
+    agv_host_sim::log::write(&path, &recording).unwrap();
+    let (read, damages) = agv_host_sim::log::read(&path).unwrap();
+    assert!(damages.is_empty());
+    assert!(read == recording);
+}
