@@ -8,15 +8,6 @@ use agv_host_sim::import::{ImportError, carpark, sapienza};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::{data, log};
 
-/// The folder of real data; a test that needs it is skipped without it.
-fn real_data(name: &str) -> Option<std::path::PathBuf> {
-    let folder = data::folder().map(|folder| folder.join(name)).filter(|folder| folder.exists());
-    if folder.is_none() {
-        eprintln!("skipped: the real data `{name}` are not here (AGV_DATA)");
-    }
-    folder
-}
-
 fn survives_a_log(recording: &Recording) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");
@@ -92,7 +83,7 @@ fn bad_tricycle_files_are_refused_with_the_line() {
 
 #[test]
 fn the_real_tricycle_data_are_read() {
-    let Some(folder) = real_data("sapienza_tricycle") else { return };
+    let Some(folder) = data::for_test("the_real_tricycle_data_are_read", "sapienza_tricycle") else { return };
     let recording = sapienza::read(&folder.join("dataset.txt")).unwrap();
     assert_eq!((recording.events.len(), recording.references.len()), (2434, 2434));
     let RecordedEvent::Encoders(last) = recording.events[2433] else { panic!() };
@@ -169,7 +160,7 @@ fn bad_car_park_tables_are_refused_with_the_line() {
 
 #[test]
 fn the_real_car_park_data_are_read() {
-    let Some(folder) = real_data("carpark") else { return };
+    let Some(folder) = data::for_test("the_real_car_park_data_are_read", "carpark") else { return };
     let recording = carpark::read(&folder, &carpark::WINDOW).unwrap();
     let scans = || {
         recording.events.iter().filter_map(|event| match event {
