@@ -1,5 +1,6 @@
 //! Where recordings of others are kept.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 /// The folder of real recordings: the environment variable `AGV_DATA`, else `../shared/data` beside the repository.
@@ -11,4 +12,22 @@ pub fn folder() -> Option<PathBuf> {
         PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
     ]);
     candidates.into_iter().find(|folder| folder.is_dir())
+}
+
+/// A file or folder of the real recordings, for a test. Where it is absent, says in one line that `test` is skipped: on
+/// standard error, and in the file that the environment variable `AGV_SKIPPED` names.
+#[must_use]
+pub fn for_test(test: &str, name: &str) -> Option<PathBuf> {
+    let found = folder().map(|folder| folder.join(name)).filter(|path| path.exists());
+    if found.is_none() {
+        let line = format!("skipped: {test}, because there is no {name} in the folder of real data (AGV_DATA)\n");
+        eprint!("{line}");
+        if let Some(path) = std::env::var_os("AGV_SKIPPED")
+            && let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(path)
+        {
+            // A line that cannot be written changes nothing about the test.
+            let _ = file.write_all(line.as_bytes());
+        }
+    }
+    found
 }

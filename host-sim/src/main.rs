@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand};
 
 /// Localisation of automated guided vehicles: replay, simulate, measure.
 #[derive(Parser)]
-#[command(version)]
+#[command(name = "agv", version)]
 struct Agv {
     #[command(subcommand)]
     command: Option<Command>,
@@ -37,7 +37,9 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("agv: {error:#}");
+            // One line, whatever a library says.
+            let complaint = format!("{error:#}");
+            eprintln!("agv: {}", complaint.lines().map(str::trim).collect::<Vec<_>>().join(" "));
             ExitCode::FAILURE
         }
     }

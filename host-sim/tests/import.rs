@@ -2,20 +2,12 @@
 
 use std::path::Path;
 
-use agv_core::measurement::Time;
+use agv_core::geometry::Pose;
+use agv_core::measurement::{PoseIncrement, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
-use agv_host_sim::import::{ImportError, carpark, sapienza};
-use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::import::{ImportError, PosedScan, ScanLog, carmen, carpark, drive, graph_log, sapienza};
+use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording, Reference};
 use agv_host_sim::{data, log};
-
-/// The folder of real data; a test that needs it is skipped without it.
-fn real_data(name: &str) -> Option<std::path::PathBuf> {
-    let folder = data::folder().map(|folder| folder.join(name)).filter(|folder| folder.exists());
-    if folder.is_none() {
-        eprintln!("skipped: the real data `{name}` are not here (AGV_DATA)");
-    }
-    folder
-}
 
 fn survives_a_log(recording: &Recording) {
     let folder = tempfile::tempdir().unwrap();
@@ -92,7 +84,7 @@ fn bad_tricycle_files_are_refused_with_the_line() {
 
 #[test]
 fn the_real_tricycle_data_are_read() {
-    let Some(folder) = real_data("sapienza_tricycle") else { return };
+    let Some(folder) = data::for_test("the_real_tricycle_data_are_read", "sapienza_tricycle") else { return };
     let recording = sapienza::read(&folder.join("dataset.txt")).unwrap();
     assert_eq!((recording.events.len(), recording.references.len()), (2434, 2434));
     let RecordedEvent::Encoders(last) = recording.events[2433] else { panic!() };
@@ -169,7 +161,7 @@ fn bad_car_park_tables_are_refused_with_the_line() {
 
 #[test]
 fn the_real_car_park_data_are_read() {
-    let Some(folder) = real_data("carpark") else { return };
+    let Some(folder) = data::for_test("the_real_car_park_data_are_read", "carpark") else { return };
     let recording = carpark::read(&folder, &carpark::WINDOW).unwrap();
     let scans = || {
         recording.events.iter().filter_map(|event| match event {
@@ -184,4 +176,72 @@ fn the_real_car_park_data_are_read() {
     let (with_range, all) = bright.fold((0, 0), |(with, all), (range, _)| (with + usize::from(*range > 0.0), all + 1));
     assert!(all > 500 && with_range == all, "{with_range} of {all}");
     survives_a_log(&recording);
+}
+
+#[test]
+fn a_log_of_scans_becomes_a_drive() {
+    let scan = |seconds, laser, robot| PosedScan {
+        scan: RecordedScan {
+            start: Time::from_seconds(seconds),
+            beam_interval: 0.0,
+            first_bearing: 0.0,
+            bearing_step: 0.1,
+            ranges: vec![seconds as f32],
+            intensities: vec![],
+        },
+        laser,
+        robot,
+    };
+    let laser = Pose::new(0.5, -0.1, 0.2);
+    let robots = [Pose::new(3.0, 4.0, 1.0), Pose::new(3.5, 4.25, 2.0), Pose::new(3.0, 5.0, -3.0)];
+    let posed = |index: usize| scan(index as f64, robots[index].compose(&laser), robots[index]);
+    let mut log = ScanLog { scans: (0..3).map(posed).collect(), increments: vec![] };
+
+    let recording = drive(&log).unwrap();
+    assert!(close(&recording.parameters.laser, &laser));
+    let moved = recording.events.iter().fold(robots[0], |pose, event| match event {
+        RecordedEvent::Increment(increment) => pose.compose(&increment.displacement),
+        _ => pose,
+    });
+    assert!(close(&moved, &robots[2]));
+    let Reference { x, y, heading, .. } = recording.references[1];
+    assert!(close(&Pose::new(x, y, heading.unwrap()), &robots[1].compose(&laser)));
+
+    let increment = |seconds| PoseIncrement { time: Time::from_seconds(seconds), displacement: laser };
+    log.increments = [0.5, 1.0, 1.5, 9.0].map(increment).to_vec();
+    let recording = drive(&log).unwrap();
+    let order: String =
+        recording.events.iter().map(|event| if matches!(event, RecordedEvent::Scan(_)) { 's' } else { 'i' }).collect();
+    assert_eq!(order, "siisisi");
+    survives_a_log(&recording);
+
+    log.scans.clear();
+    assert!(drive(&log).is_none());
+}
+
+fn close(a: &Pose, b: &Pose) -> bool {
+    let Pose { x, y, theta } = a.between(b);
+    x.abs() < 1e-12 && y.abs() < 1e-12 && theta.abs() < 1e-12
+}
+
+#[test]
+fn the_real_logs_of_scans_are_read() {
+    let Some(folder) = data::for_test("the_real_logs_of_scans_are_read", "scans2d") else { return };
+    let recordings = [
+        (drive(&graph_log::read(&folder.join("fr079.log")).unwrap().log).unwrap(), 1464, 360),
+        (drive(&carmen::read(&folder.join("aces-corrected.log.gz")).unwrap().front).unwrap(), 440, 180),
+    ];
+    for (recording, scans, beams) in recordings {
+        let lengths: Vec<usize> = recording
+            .events
+            .iter()
+            .filter_map(|event| match event {
+                RecordedEvent::Scan(scan) => Some(scan.ranges.len()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(lengths, vec![beams; scans]);
+        assert_eq!(recording.references.len(), scans);
+        survives_a_log(&recording);
+    }
 }

@@ -1,12 +1,14 @@
 //! `agv import`.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use agv_host_sim::import::{carpark, sapienza};
+use agv_host_sim::import::{self, ScanLog, carmen, carpark, graph_log, sapienza};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use flate2::read::MultiGzDecoder;
 
 /// Turn the recordings of others into logs.
 #[derive(clap::Args)]
@@ -31,6 +33,10 @@ enum Format {
     Carpark,
     /// Tricycle dataset of the Sapienza University of Rome: raw encoder counters and tracked poses.
     Sapienza,
+    /// CARMEN log, plain or compressed (.gz): FLASER or ROBOTLASER1, and ODOM.
+    Carmen,
+    /// Pose graph with scans: VERTEX2, ROBOTLASER1, EDGE2. Its corrected poses serve as odometry.
+    Graph,
 }
 
 impl Import {
@@ -44,6 +50,8 @@ impl Import {
         let recording = match format {
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
+            Format::Carmen => drive(&self.input, "CARMEN", &carmen::read(&self.input)?.front)?,
+            Format::Graph => drive(&self.input, "pose-graph", &graph_log::read(&self.input)?.log)?,
             Format::Auto => unreachable!("the format has been found above"),
         };
         eprintln!("writing {}", self.output.display());
@@ -74,17 +82,34 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
         bail!("{}: this folder does not hold the car park tables", input.display());
     }
     let beginning = beginning(input).with_context(|| input.display().to_string())?;
-    if beginning.starts_with(sapienza::SIGNATURE.as_bytes()) {
-        return Ok(Format::Sapienza);
+    if beginning.is_empty() {
+        bail!("{}: the file is empty", input.display());
     }
-    bail!("{}: no known recording but {}", input.display(), file_kind::describe(&beginning));
+    let mut unpacked = Vec::new();
+    // What is not compressed, or cut, is looked at as far as it goes.
+    let _ = MultiGzDecoder::new(&beginning[..]).read_to_end(&mut unpacked);
+    let text = if unpacked.is_empty() { &beginning } else { &unpacked };
+    let begins_line = |word: &str| text.split(|byte| *byte == b'\n').any(|line| line.starts_with(word.as_bytes()));
+    if begins_line(sapienza::SIGNATURE) {
+        Ok(Format::Sapienza)
+    } else if begins_line("VERTEX2 ") {
+        Ok(Format::Graph)
+    } else if ["PARAM ", "FLASER ", "ROBOTLASER1 ", "ODOM "].into_iter().any(begins_line) {
+        Ok(Format::Carmen)
+    } else {
+        bail!("{}: this is no known recording but {}", input.display(), file_kind::describe(&beginning))
+    }
+}
+
+/// The drive in a log of scans.
+fn drive(input: &Path, kind: &str, log: &ScanLog) -> anyhow::Result<Recording> {
+    import::drive(log).with_context(|| format!("{}: there are no scans of a {kind} log in the file", input.display()))
 }
 
 /// The first few kilobytes of a file.
 fn beginning(path: &Path) -> std::io::Result<Vec<u8>> {
-    use std::io::Read;
     let mut beginning = Vec::new();
-    std::fs::File::open(path)?.take(4096).read_to_end(&mut beginning)?;
+    std::fs::File::open(path)?.take(1 << 16).read_to_end(&mut beginning)?;
     Ok(beginning)
 }
 

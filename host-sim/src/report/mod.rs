@@ -1,1 +1,12 @@
-//! To come.
+//! Reports: one self-contained HTML page with pictures.
+
+mod charts;
+mod figure;
+mod page;
+mod thinning;
+mod trajectories;
+
+pub use charts::{Bounds, LandmarkMark, landmark_timeline, line_chart, scatter_chart};
+pub use figure::{Figure, FigureError, PointSet, Series};
+pub use page::{Page, Table};
+pub use trajectories::{Map, trajectory_plot};

@@ -27,8 +27,13 @@ pub enum ScenarioError {
         source: std::io::Error,
     },
     /// The text is not a scenario: not TOML, an unknown key, or a value of the wrong type.
-    #[error("this is not a scenario: {0}")]
-    Parse(#[from] toml::de::Error),
+    #[error("this is not a scenario, line {line}: {problem}")]
+    Parse {
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A value is outside of what makes sense.
     #[error("the scenario's {key} must be {demand}")]
     Value {
@@ -547,7 +552,11 @@ impl Scenario {
     /// # Errors
     /// The text is not a scenario.
     pub fn parse(text: &str) -> Result<Self, ScenarioError> {
-        let scenario: Self = toml::from_str(text)?;
+        let scenario: Self = toml::from_str(text).map_err(|error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let problem = error.message().replace('\n', ", ");
+            ScenarioError::Parse { line: before.matches('\n').count() + 1, problem }
+        })?;
         scenario.check()?;
         Ok(scenario)
     }

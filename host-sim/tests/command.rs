@@ -1,0 +1,170 @@
+//! The command as people run it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use agv_host_sim::data;
+
+fn agv(arguments: &[&str]) -> Output {
+    // A backtrace would be more than one line.
+    Command::new(env!("CARGO_BIN_EXE_agv")).args(arguments).env("RUST_BACKTRACE", "1").output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+/// Names of the subcommands, as the help lists them.
+fn subcommands() -> Vec<String> {
+    let output = agv(&["--help"]);
+    assert!(output.status.success());
+    let help = text(&output.stdout).to_owned();
+    let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names = listed.map(|line| line.split_whitespace().next().unwrap().to_owned());
+    // clap's own command takes no options.
+    names.filter(|name| name != "help").collect()
+}
+
+/// Runs a command that must refuse its input, and gives the one line that says why. Lines of progress before it say
+/// what is being done and hold no complaint.
+fn refusal(arguments: &[&str]) -> String {
+    let output = agv(arguments);
+    let complaint = text(&output.stderr);
+    assert!(!output.status.success(), "{arguments:?} took its input");
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {complaint}");
+    assert!(output.stdout.is_empty(), "{arguments:?} printed results");
+    let lines: Vec<&str> = complaint.lines().filter(|line| line.starts_with("agv: ")).collect();
+    assert_eq!(lines.len(), 1, "{arguments:?}: {complaint}");
+    assert!(!complaint.contains("panicked") && !complaint.contains("backtrace"), "{complaint}");
+    assert_eq!(complaint.lines().last(), lines.last().copied(), "{complaint}");
+    lines[0].to_owned()
+}
+
+struct Files {
+    folder: tempfile::TempDir,
+}
+
+impl Files {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    fn write(&self, name: &str, content: &[u8]) -> String {
+        std::fs::write(self.folder.path().join(name), content).unwrap();
+        self.path(name)
+    }
+}
+
+#[test]
+fn every_command_explains_itself() {
+    let commands = subcommands();
+    for expected in ["import", "simulate", "replay", "map", "evaluate"] {
+        assert!(commands.iter().any(|command| command == expected), "no {expected} in {commands:?}");
+    }
+    for command in &commands {
+        let output = agv(&[command, "--help"]);
+        assert!(output.status.success(), "{command}");
+        assert!(text(&output.stdout).contains("Usage: agv"), "{command}");
+    }
+    assert!(text(&agv(&["--version"]).stdout).starts_with("agv "));
+}
+
+#[test]
+fn import_refuses_bad_input_in_one_line() {
+    let files = Files::new();
+    let output = files.path("out.agvlog");
+    let missing = files.path("missing.log");
+    let inputs = [
+        files.write("empty.log", b""),
+        files.write("foreign.gz", b"\x1f\x8b\x08\0\0\0\0\0\0\0"),
+        files.write("foreign.bin", &[0, 1, 2, 3, 200, 255]),
+        files.write("foreign.txt", b"no recording at all\n"),
+    ];
+    for format in ["auto", "carpark", "sapienza", "carmen", "graph"] {
+        let complaint = refusal(&["import", format, &missing, "-o", &output]);
+        assert!(complaint.contains("missing.log"), "{complaint}");
+        for input in &inputs {
+            let complaint = refusal(&["import", format, input, "-o", &output]);
+            assert!(complaint.contains(&file_name(input)), "{format}: {complaint}");
+        }
+        assert!(!Path::new(&output).exists(), "{format} left a log behind");
+    }
+    let nowhere = files.path("no/such/folder/out.agvlog");
+    let good = files.write("good.log", GRAPH.as_bytes());
+    assert!(refusal(&["import", "auto", &good, "-o", &nowhere]).contains("out.agvlog"));
+}
+
+/// The part of a path behind the last separator.
+fn file_name(path: &str) -> String {
+    PathBuf::from(path).file_name().unwrap().to_str().unwrap().to_owned()
+}
+
+/// A pose graph of two scans.
+const GRAPH: &str = "VERTEX2 0 0 0 0
+ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 10.5 host 0.5
+VERTEX2 1 1 0 0.5
+ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 11.5 host 1.5
+EDGE2 0 1 1 0 0.5 1 0 1 1 0 0
+";
+
+#[test]
+fn import_says_which_line_is_damaged() {
+    let files = Files::new();
+    let output = files.path("out.agvlog");
+    let damaged = files.write("damaged.log", GRAPH.replace("VERTEX2 1 1 0 0.5", "VERTEX2 1 1 x 0.5").as_bytes());
+    let complaint = refusal(&["import", "graph", &damaged, "-o", &output]);
+    assert!(complaint.contains("damaged.log:3:"), "{complaint}");
+}
+
+#[test]
+fn import_writes_a_log_and_a_summary() {
+    let files = Files::new();
+    let output = files.path("out.agvlog");
+    let input = files.write("good.log", GRAPH.as_bytes());
+    for format in ["auto", "graph"] {
+        let run = agv(&["import", format, &input, "-o", &output, "--json"]);
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+        assert_eq!((&summary["scans"], &summary["odometry"]), (&2.into(), &2.into()));
+        let (recording, damages) = agv_host_sim::log::read(Path::new(&output)).unwrap();
+        assert_eq!((recording.references.len(), damages.len()), (2, 0));
+    }
+}
+
+#[test]
+fn import_finds_out_what_the_real_data_are() {
+    let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "") else { return };
+    let files = Files::new();
+    let output = files.path("out.agvlog");
+    for (input, key, expected) in [
+        ("carpark", "landmarks", 15),
+        ("sapienza_tricycle/dataset.txt", "odometry", 2434),
+        ("scans2d/intel-lab.log", "scans", 2672),
+        ("scans2d/fhw-corrected.log.gz", "scans", 488),
+    ] {
+        let run = agv(&["import", "auto", folder.join(input).to_str().unwrap(), "-o", &output, "--json"]);
+        assert!(run.status.success(), "{input}: {}", text(&run.stderr));
+        let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+        assert_eq!(summary[key], expected, "{input}");
+    }
+}
+
+#[test]
+fn a_scenario_that_is_none_is_refused() {
+    let files = Files::new();
+    let output = files.path("out.agvlog");
+    for scenario in [
+        files.path("missing.toml"),
+        files.write("empty.toml", b""),
+        files.write("foreign.toml", b"\x1f\x8b\x08\0\0"),
+        files.write("damaged.toml", b"[world\n"),
+    ] {
+        refusal(&["simulate", &scenario, "-o", &output]);
+    }
+    let complaint = refusal(&["simulate", &files.path("damaged.toml"), "-o", &output]);
+    assert!(complaint.contains("line 1: ") && !complaint.contains('|'), "{complaint}");
+}
