@@ -2,10 +2,11 @@
 
 use heapless::Vec;
 
+use super::corner::Corner;
 use super::end_point;
-use super::line::{Moments, intersection_covariance, largest_variance};
-use super::neighbourhood::{Reach, Side, beams_within};
-use super::parameters::{LineGate, Parameters, SuppressionRule};
+use super::line::Moments;
+use super::neighbourhood::{Disc, Reach, Side, beams_within};
+use super::parameters::{Parameters, SuppressionRule};
 use super::runs::Runs;
 use super::score::{SectorCounts, Sectors};
 use super::suppression::{Cost, is_best_within, walk};
@@ -24,19 +25,10 @@ pub struct Detector<const BEAMS: usize> {
 /// A candidate's neighbourhood.
 #[derive(Clone, Copy, Debug)]
 struct Neighbourhood {
-    centre: ScanPoint,
-    radius: f32,
+    disc: Disc,
     reach: Reach,
     /// Height of the triangle, m.
     height: f32,
-}
-
-/// Position and covariance of a corner.
-#[derive(Clone, Copy, Debug)]
-struct Corner {
-    position: ScanPoint,
-    covariance: [f32; 3],
-    misfit: f32,
 }
 
 impl<const BEAMS: usize> Detector<BEAMS> {
@@ -142,9 +134,9 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         }
         let radius = self.radius(range);
         let window = beams_within(radius / range, scan.bearing_step);
-        let squared = radius * radius;
-        let before = Side::before(scan, index, window.min(limits.0)).farthest_before(centre, squared)?;
-        let after = Side::after(scan, index, window.min(limits.1)).farthest_after(centre, squared)?;
+        let disc = Disc { centre, range, radius };
+        let before = Side::before(scan, index, window.min(limits.0)).farthest_before(&disc)?;
+        let after = Side::after(scan, index, window.min(limits.1)).farthest_after(&disc)?;
         if before.0 < least || after.0 < least {
             return None;
         }
@@ -159,24 +151,24 @@ impl<const BEAMS: usize> Detector<BEAMS> {
             return None;
         }
         let height = libm::fabsf(doubled_area) / libm::sqrtf(squared_base);
-        Some(Neighbourhood { centre, radius, reach: Reach { before: before.0, after: after.0 }, height })
+        Some(Neighbourhood { disc, reach: Reach { before: before.0, after: after.0 }, height })
     }
 
     /// What the detector holds against beam `index` being a corner.
     fn cost(&self, scan: &PointScan<BEAMS>, index: usize, crosses_seam: bool) -> Cost {
         let Some(around) = self.neighbourhood(scan, index, crosses_seam) else { return Cost::NONE };
+        if self.parameters.gate.is_some() {
+            let corner = self.corner(scan, index, &around);
+            // The beam whose lines fix the corner best is the one at the corner.
+            return corner.map_or(Cost::NONE, |corner| Cost { cost: corner.variance, height: around.height });
+        }
         let before = Side::before(scan, index, around.reach.before);
         let after = Side::after(scan, index, around.reach.after);
-        let squared = around.radius * around.radius;
         let Some(orientation) = self.orientation(&around, &before, &after) else { return Cost::NONE };
-        if let Some(gate) = &self.parameters.gate {
-            let Some(corner) = self.corner(scan, index, &around, Some(gate)) else { return Cost::NONE };
-            return Cost { cost: corner.misfit, height: around.height };
-        }
         let origin = self.sectors.origin(orientation);
         let score = [before, after].map(|side| {
             let mut counts = SectorCounts::default();
-            side.visit_near(around.centre, squared, |relative| counts.add(self.sectors.index(origin, relative)));
+            side.visit(&around.disc, |relative| counts.add(self.sectors.index(origin, relative)));
             counts.pair_sum(self.sectors.count())
         });
         Cost { cost: (score[0] + score[1]) as f32, height: around.height }
@@ -184,12 +176,11 @@ impl<const BEAMS: usize> Detector<BEAMS> {
 
     /// Direction of the corner (K 3.2.3), not normalised. None if a side has too few points, or if there is none.
     fn orientation(&self, around: &Neighbourhood, before: &Side<'_>, after: &Side<'_>) -> Option<ScanPoint> {
-        let squared = around.radius * around.radius;
         let least = f32::from(self.parameters.points_a_side.max(1));
         let mut orientation = ScanPoint::zeros();
         for side in [before, after] {
             let (mut count, mut sum) = (0.0_f32, ScanPoint::zeros());
-            side.visit_near(around.centre, squared, |relative| {
+            side.visit(&around.disc, |relative| {
                 count += 1.0;
                 sum += relative;
             });
@@ -201,64 +192,24 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         (orientation.norm_squared() > 1e-12).then_some(orientation)
     }
 
-    /// The corner between the beams (K 3.1.2). With a gate, None if the lines do not pass it; without, the candidate's
-    /// own point if they do not meet nearby.
-    fn corner(
-        &self,
-        scan: &PointScan<BEAMS>,
-        index: usize,
-        around: &Neighbourhood,
-        gate: Option<&LineGate>,
-    ) -> Option<Corner> {
-        let own = Corner { position: around.centre, covariance: self.own_covariance(), misfit: f32::INFINITY };
-        let refused = if gate.is_some() { None } else { Some(own) };
-        let squared = around.radius * around.radius;
+    /// The corner between the beams (K 3.1.2). None if the lines do not meet near the candidate, or fail the gate.
+    fn corner(&self, scan: &PointScan<BEAMS>, index: usize, around: &Neighbourhood) -> Option<Corner> {
+        let least = f32::from(self.parameters.points_a_side);
         let fit = |side: Side<'_>| {
             let mut moments = Moments::default();
+            side.visit(&around.disc, |relative| moments.add(relative));
+            let is_enough = moments.count >= least;
             if self.parameters.lines_include_corner {
                 moments.add(ScanPoint::zeros());
             }
-            side.visit_near(around.centre, squared, |relative| moments.add(relative));
-            moments.line()
+            is_enough.then(|| moments.line()).flatten()
         };
-        let (Some(before), Some(after)) =
-            (fit(Side::before(scan, index, around.reach.before)), fit(Side::after(scan, index, around.reach.after)))
-        else {
-            return refused;
-        };
-        let Some(relative) = before.intersection(&after) else { return refused };
-        if relative.norm() >= self.parameters.sub_beam_limit {
-            return refused;
-        }
-        let ray = around.centre / around.centre.norm().max(1e-6);
-        let variance = self.parameters.range_deviation * self.parameters.range_deviation;
-        let mut covariance = intersection_covariance(
-            (&before, before.variance_at(relative, ray, variance)),
-            (&after, after.variance_at(relative, ray, variance)),
-        );
-        let floor = self.parameters.deviation_floor * self.parameters.deviation_floor;
-        covariance[0] += floor;
-        covariance[2] += floor;
-        if let Some(gate) = gate {
-            let beam_width = scan.bearing_step * around.centre.norm();
-            let sideways = libm::fabsf(ray.x * relative.y - ray.y * relative.x);
-            let is_concave = (before.centroid + after.centroid).dot(&ray) < 0.0;
-            let slant = libm::fabsf(before.normal().dot(&ray)).min(libm::fabsf(after.normal().dot(&ray)));
-            if sideways > gate.beams * beam_width || (is_concave && beam_width > gate.concave_spacing * slant) {
-                return None;
-            }
-            let residual = gate.residual * gate.residual;
-            let sine = libm::fabsf(before.along.dot(&after.normal()));
-            if before.mean_square() > residual
-                || after.mean_square() > residual
-                || sine < gate.sine
-                || largest_variance(covariance) > gate.deviation * gate.deviation
-            {
-                return None;
-            }
-        }
-        let misfit = largest_variance(covariance);
-        Some(Corner { position: around.centre + relative, covariance, misfit })
+        let before = fit(Side::before(scan, index, around.reach.before))?;
+        let after = fit(Side::after(scan, index, around.reach.after))?;
+        let corner = Corner::between(before, after, &around.disc, &self.parameters)?;
+        let passes =
+            self.parameters.gate.is_none_or(|gate| corner.passes(&gate, scan.bearing_step * around.disc.range));
+        passes.then_some(corner)
     }
 
     /// Covariance of a corner that is known only to lie near its beam's return, m^2.
@@ -273,14 +224,18 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         let before = Side::before(scan, index, around.reach.before);
         let after = Side::after(scan, index, around.reach.after);
         let orientation = self.orientation(&around, &before, &after)?;
-        let corner = self.corner(scan, index, &around, self.parameters.gate.as_ref())?;
+        let (position, covariance) = match self.corner(scan, index, &around) {
+            Some(corner) => (around.disc.centre + corner.relative, corner.covariance),
+            None if self.parameters.gate.is_some() => return None,
+            None => (around.disc.centre, self.own_covariance()),
+        };
         Some(Keypoint {
             kind: KeypointKind::Corner,
             beam: index as u16,
-            position: corner.position,
-            covariance: corner.covariance,
+            position,
+            covariance,
             orientation: libm::atan2f(orientation.y, orientation.x),
-            radius: around.radius,
+            radius: around.disc.radius,
             score,
         })
     }

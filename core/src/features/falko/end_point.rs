@@ -24,6 +24,9 @@ const FARTHEST_BACKGROUND: usize = 8;
 /// Points of a face before its line is trusted to tell whether the next point lies on it.
 const TRUSTED: f32 = 5.0;
 
+/// The trusted line is fitted anew each time the face has grown by this factor.
+const GROWTH: f32 = 1.25;
+
 /// Finds the ends of the faces of a scan and gives each to `keep`.
 pub(super) fn find<const BEAMS: usize>(
     scan: &PointScan<BEAMS>,
@@ -151,6 +154,7 @@ fn face_line<const BEAMS: usize>(
 ) -> Option<(Line, f32)> {
     let last = *scan.points.get(index)?;
     let mut moments = Moments::default();
+    let (mut trusted, mut renewal) = (None::<Line>, TRUSTED);
     let mut extent = 0.0_f32;
     let farthest = 3.0 * wanted.residual;
     for steps in 0..=length {
@@ -167,8 +171,11 @@ fn face_line<const BEAMS: usize>(
         if reach > wanted.length {
             break;
         }
-        if moments.count >= TRUSTED {
-            let line = moments.line()?;
+        if moments.count >= renewal {
+            trusted = moments.line();
+            renewal = GROWTH * moments.count;
+        }
+        if let Some(line) = &trusted {
             // The face bends here: what lies behind is another one.
             if libm::fabsf(line.normal().dot(&(relative - line.centroid))) > farthest {
                 break;

@@ -62,63 +62,76 @@ impl<'a> Side<'a> {
         self.first.points.len() + self.second.points.len()
     }
 
-    /// Calls `visit` with each present return within the radius of `centre`, relative to it, in order of beams.
+    /// Calls `visit` with each return inside the disc, relative to its centre, in order of beams.
     #[inline]
-    pub(super) fn visit_near(&self, centre: ScanPoint, squared_radius: f32, mut visit: impl FnMut(ScanPoint)) {
+    pub(super) fn visit(&self, disc: &Disc, mut visit: impl FnMut(ScanPoint)) {
         for piece in [self.first, self.second] {
             for (point, range) in piece.returns() {
-                let relative = point - centre;
-                if range > 0.0 && relative.norm_squared() <= squared_radius {
+                if let Some(relative) = disc.contains(point, range) {
                     visit(relative);
                 }
             }
         }
     }
 
-    /// The farthest return in order of beams within the radius, for a side that lies before its candidate: beams to
-    /// the candidate, and position relative to it.
+    /// The first return inside the disc in order of beams, for a side that lies before the centre: beams to the
+    /// centre, and position relative to it.
     #[inline]
-    pub(super) fn farthest_before(&self, centre: ScanPoint, squared_radius: f32) -> Option<(usize, ScanPoint)> {
-        let length = self.len();
-        let near = |(point, range): (ScanPoint, f32)| within(point - centre, range, squared_radius);
-        for (skipped, found) in self.first.returns().map(near).enumerate() {
-            if let Some(relative) = found {
-                return Some((length - skipped, relative));
-            }
-        }
-        let passed = self.first.points.len();
-        for (skipped, found) in self.second.returns().map(near).enumerate() {
-            if let Some(relative) = found {
-                return Some((length - passed - skipped, relative));
+    pub(super) fn farthest_before(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
+        let mut steps = self.len();
+        for piece in [self.first, self.second] {
+            for (point, range) in piece.returns() {
+                if let Some(relative) = disc.contains(point, range) {
+                    return Some((steps, relative));
+                }
+                steps -= 1;
             }
         }
         None
     }
 
-    /// The same for a side that lies after its candidate.
+    /// The last return inside the disc, for a side that lies after the centre.
     #[inline]
-    pub(super) fn farthest_after(&self, centre: ScanPoint, squared_radius: f32) -> Option<(usize, ScanPoint)> {
-        let length = self.len();
-        let near = |(point, range): (ScanPoint, f32)| within(point - centre, range, squared_radius);
-        for (skipped, found) in self.second.returns().rev().map(near).enumerate() {
-            if let Some(relative) = found {
-                return Some((length - skipped, relative));
-            }
-        }
-        let passed = self.second.points.len();
-        for (skipped, found) in self.first.returns().rev().map(near).enumerate() {
-            if let Some(relative) = found {
-                return Some((length - passed - skipped, relative));
+    pub(super) fn farthest_after(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
+        let mut steps = self.len();
+        for piece in [self.second, self.first] {
+            for (point, range) in piece.returns().rev() {
+                if let Some(relative) = disc.contains(point, range) {
+                    return Some((steps, relative));
+                }
+                steps -= 1;
             }
         }
         None
     }
 }
 
-#[inline]
-fn within(relative: ScanPoint, range: f32, squared_radius: f32) -> Option<ScanPoint> {
-    (range > 0.0 && relative.norm_squared() <= squared_radius).then_some(relative)
+/// The disc around a candidate that its neighbours lie in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Disc {
+    pub centre: ScanPoint,
+    /// Range of the centre, m.
+    pub range: f32,
+    /// Radius, m; less than the range, so that absent returns are never inside.
+    pub radius: f32,
 }
+
+impl Disc {
+    /// Position of a return relative to the centre. None if it is not inside.
+    #[inline]
+    fn contains(&self, point: ScanPoint, range: f32) -> Option<ScanPoint> {
+        // The range alone excludes most of what is not inside, absent returns among it.
+        if libm::fabsf(range - self.range) > REACH * self.radius {
+            return None;
+        }
+        let relative = point - self.centre;
+        (relative.norm_squared() <= self.radius * self.radius && range > 0.0).then_some(relative)
+    }
+}
+
+/// Difference of ranges that can still be inside, in radii; above 1 because ranges are measured from wherever the
+/// sensor was while points are in one frame.
+const REACH: f32 = 1.1;
 
 /// Number of beams whose directions differ by less than asin(`sine`); possibly one more, never one less.
 #[inline]

@@ -111,6 +111,9 @@ impl Beams<'_> {
     /// Steps back to the nearest present return. None if `index` itself is absent, or if too many are.
     fn gap_before(&self, index: usize) -> Option<usize> {
         self.range(index)?;
+        if index > 0 && self.range(index - 1).is_some() {
+            return Some(1);
+        }
         (1..=BRIDGED + 1).find(|gap| self.back(index, *gap).and_then(|previous| self.range(previous)).is_some())
     }
 

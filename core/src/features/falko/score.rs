@@ -1,5 +1,7 @@
 //! Cornerness: how well each side of a corner keeps to one direction (K 3.5-3.10).
 
+use heapless::Vec;
+
 use super::Parameters;
 use crate::geometry::ScanPoint;
 
@@ -53,8 +55,8 @@ impl Sectors {
         let y = origin.x * vector.y - origin.y * vector.x;
         let is_lower = y < 0.0 || (y == 0.0 && x < 0.0);
         let (x, y, base) = if is_lower { (-x, -y, self.half) } else { (x, y, 0) };
-        let passed = |boundary: &ScanPoint| usize::from(boundary.x * y >= boundary.y * x);
-        base + self.boundaries.iter().take(self.half - 1).map(passed).sum::<usize>()
+        let boundaries = self.boundaries.get(..self.half - 1).unwrap_or_default();
+        base + boundaries.partition_point(|boundary| boundary.x * y >= boundary.y * x)
     }
 }
 
@@ -81,17 +83,17 @@ impl SectorCounts {
 /// same integer.
 #[must_use]
 pub fn pair_sum(counts: &[u32]) -> u32 {
+    let mut occupied = Vec::<(usize, u32), ROOM>::new();
+    // No grid has more sectors than there is room for.
+    occupied.extend(counts.iter().copied().enumerate().filter(|(_, count)| *count > 0).take(ROOM));
+    let mut rest = occupied.as_slice();
     let mut sum = 0_u32;
-    for (first, &count) in counts.iter().enumerate() {
-        if count == 0 {
-            continue;
-        }
-        let rest = counts.iter().enumerate().skip(first + 1).filter(|(_, other)| **other > 0);
-        for (second, &other) in rest {
+    while let Some(((first, count), others)) = rest.split_first() {
+        for (second, other) in others {
             let apart = second - first;
-            let distance = apart.min(counts.len() - apart) as u32;
-            sum = sum.wrapping_add(count.wrapping_mul(other).wrapping_mul(distance));
+            sum += count * other * apart.min(counts.len() - apart) as u32;
         }
+        rest = others;
     }
     sum
 }
