@@ -31,7 +31,6 @@ impl<'a> Frame<'a> {
 
 /// One thing found in a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "passed by reference; there is no heap to put the header on")]
 pub enum Item<'a> {
     /// A good record.
     Record {
@@ -48,7 +47,6 @@ pub enum Item<'a> {
 
 /// What [`LogReader::step`] found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "passed by reference; there is no heap to put the header on")]
 pub enum Step<'a> {
     /// A record or damage.
     Item(Item<'a>),

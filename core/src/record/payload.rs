@@ -51,7 +51,6 @@ impl<'a> From<&'a Outputs> for Output<'a> {
 
 /// One record of a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "passed by reference; there is no heap to put the header on")]
 pub enum Record<'a> {
     /// What the log begins with.
     Header(Header<'a>),
