@@ -289,6 +289,32 @@ proptest! {
     }
 
     #[test]
+    fn untouched_records_survive_any_damage(records in prop::collection::vec(record(), 1..8), hits in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 0..20), piece in 1_usize..5000) {
+        let frames: Vec<_> = records.iter().enumerate().map(|(index, record)| record.frame(index as u32)).collect();
+        let mut log = frames.concat();
+        let mut flips = std::collections::BTreeMap::new();
+        for (place, flip) in hits {
+            flips.insert(place.index(log.len()), flip);
+        }
+        for (position, flip) in &flips {
+            log[*position] ^= flip;
+        }
+        let mut start = 0;
+        let mut survivors = Vec::new();
+        for frame in frames {
+            let end = start + frame.len();
+            if flips.range(start..end).next().is_none() {
+                survivors.push(frame);
+            }
+            start = end;
+        }
+        let (again, damages) = read_again(&log, piece);
+        prop_assert_eq!(again, survivors);
+        let skipped: u64 = damages.iter().map(|damage| damage.skipped).sum();
+        prop_assert_eq!(flips.is_empty(), skipped == 0);
+    }
+
+    #[test]
     fn arbitrary_payloads_are_records_or_damage(kind in 0_u8..16, payload in prop::collection::vec(any::<u8>(), 0..200)) {
         // A frame with a good checksum around anything.
         let mut frame = vec![0xD6, 0x41, 0x47, 0x56, 1, kind, payload.len() as u8, 0, 3, 0, 0, 0];
