@@ -25,19 +25,15 @@ fn subcommands() -> Vec<String> {
     names.filter(|name| name != "help").collect()
 }
 
-/// Runs a command that must refuse its input, and gives the one line that says why. Lines of progress before it say
-/// what is being done and hold no complaint.
+/// Runs a command that must refuse its input, and gives the one line that says why.
 fn refusal(arguments: &[&str]) -> String {
     let output = agv(arguments);
     let complaint = text(&output.stderr);
-    assert!(!output.status.success(), "{arguments:?} took its input");
     assert_eq!(output.status.code(), Some(1), "{arguments:?}: {complaint}");
     assert!(output.stdout.is_empty(), "{arguments:?} printed results");
-    let lines: Vec<&str> = complaint.lines().filter(|line| line.starts_with("agv: ")).collect();
-    assert_eq!(lines.len(), 1, "{arguments:?}: {complaint}");
-    assert!(!complaint.contains("panicked") && !complaint.contains("backtrace"), "{complaint}");
-    assert_eq!(complaint.lines().last(), lines.last().copied(), "{complaint}");
-    lines[0].to_owned()
+    assert!(complaint.starts_with("agv: ") && complaint.ends_with('\n'), "{arguments:?}: {complaint}");
+    assert_eq!(complaint.lines().count(), 1, "{arguments:?}: {complaint}");
+    complaint.to_owned()
 }
 
 struct Files {
