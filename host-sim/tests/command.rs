@@ -164,3 +164,32 @@ fn a_scenario_that_is_none_is_refused() {
     let complaint = refusal(&["simulate", &files.path("damaged.toml"), "-o", &output]);
     assert!(complaint.contains("line 1: ") && !complaint.contains('|'), "{complaint}");
 }
+
+#[test]
+fn whatever_reads_a_log_refuses_what_is_none() {
+    let files = Files::new();
+    let inputs = [
+        files.path("missing.agvlog"),
+        files.write("empty.agvlog", b""),
+        files.write("foreign.agvlog", b"t_s,x_m\n1,2\n"),
+        files.write("capture.agvlog", b"\xd4\xc3\xb2\xa1\x02\0\x04\0\0\0\0\0\xff"),
+    ];
+    let folder = files.path("folder");
+    for input in &inputs {
+        let complaint = refusal(&["features", "export", input, &folder]);
+        assert!(complaint.contains(&file_name(input)), "{complaint}");
+        assert!(!Path::new(&folder).exists());
+    }
+    // Commands that take a log, and nothing else that they must be given.
+    let takes_log = |command: &String| {
+        text(&agv(&[command, "--help"]).stdout)
+            .lines()
+            .any(|line| line.starts_with("Usage: ") && line.ends_with(" <LOG>"))
+    };
+    for command in subcommands().iter().filter(|command| takes_log(command)) {
+        for input in &inputs {
+            let complaint = refusal(&[command, input]);
+            assert!(complaint.contains(&file_name(input)), "{complaint}");
+        }
+    }
+}
