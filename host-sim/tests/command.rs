@@ -133,7 +133,7 @@ fn import_writes_a_log_and_a_summary() {
 
 #[test]
 fn import_finds_out_what_the_real_data_are() {
-    let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "") else { return };
+    let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "carpark") else { return };
     let files = Files::new();
     let output = files.path("out.agvlog");
     for (input, key, expected) in [
@@ -142,7 +142,8 @@ fn import_finds_out_what_the_real_data_are() {
         ("scans2d/intel-lab.log", "scans", 2672),
         ("scans2d/fhw-corrected.log.gz", "scans", 488),
     ] {
-        let run = agv(&["import", "auto", folder.join(input).to_str().unwrap(), "-o", &output, "--json"]);
+        let run =
+            agv(&["import", "auto", folder.with_file_name("").join(input).to_str().unwrap(), "-o", &output, "--json"]);
         assert!(run.status.success(), "{input}: {}", text(&run.stderr));
         let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
         assert_eq!(summary[key], expected, "{input}");
