@@ -117,8 +117,8 @@ fn real_logs_have_the_scans_that_their_owners_count() {
     }
     for (name, scans, beams, motions) in [
         ("aces-corrected.log.gz", 440, 180, 7373),
-        ("fhw-corrected.log.gz", 488, 180, 13446),
-        ("freiburg-079-corrected.log.gz", 4791, 360, 4933),
+        ("fhw-corrected.log.gz", 488, 180, 13451),
+        ("freiburg-079-corrected.log.gz", 4791, 360, 4951),
     ] {
         let log = carmen::read(&folder.join("scans2d").join(name)).unwrap();
         assert_eq!(log.front.scans.len(), scans);
