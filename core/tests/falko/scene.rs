@@ -111,7 +111,7 @@ impl Scene {
     pub fn offset_from_corner(&self, point: Vertex) -> Vertex {
         let corners = self.outlines.iter().flat_map(|outline| &outline.corners);
         let offsets = corners.map(|corner| [point[0] - corner[0], point[1] - corner[1]]);
-        offsets.min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1]))).expect("a scene has corners")
+        offsets.min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1]))).unwrap_or([f64::NAN; 2])
     }
 }
 
