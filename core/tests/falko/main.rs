@@ -239,6 +239,20 @@ fn seam_hides_no_corner() {
 }
 
 #[test]
+fn spotless_corner_is_found_though_every_score_is_zero() {
+    // Five beams, of which only the middle one has two neighbours on each side.
+    let ranges: Vec<f32> = (-2..=2)
+        .map(|beam| {
+            let bearing = 0.03 * f64::from(beam);
+            (2.0 / (bearing.cos() - bearing.sin().abs())) as f32
+        })
+        .collect();
+    let found = detect(&points(&ranges, -0.06, 0.03), Parameters::thesis());
+    let [corner] = found.as_slice() else { panic!("{found:?}") };
+    assert!((corner.position - ScanPoint::new(2.0, 0.0)).norm() < 1e-3 && corner.score == 0.0, "{corner:?}");
+}
+
+#[test]
 fn shadow_boundary_on_the_background_is_no_end() {
     // A wall 4 m ahead, and 2 m ahead a board from y = -0.5 to 0.5 in front of it.
     let step = PI / 720.0;
