@@ -22,6 +22,7 @@ enum Command {
     Map(command::map::Map),
     Evaluate(command::evaluate::Evaluate),
     Features(command::features::Features),
+    Can(command::can::Can),
 }
 
 fn main() -> ExitCode {
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Some(Command::Map(command)) => command.run(),
         Some(Command::Evaluate(command)) => command.run(),
         Some(Command::Features(command)) => command.run(),
+        Some(Command::Can(command)) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
