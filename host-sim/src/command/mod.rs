@@ -7,5 +7,6 @@ pub mod evaluate;
 pub mod features;
 pub mod import;
 pub mod map;
+mod progress;
 pub mod replay;
 pub mod simulate;

@@ -13,7 +13,7 @@ use agv_core::measurement::Time;
 use agv_core::odometry::OdometryNoise;
 use serde::Serialize;
 
-use super::accuracy::{Spread, truth_at};
+use super::accuracy::{Spread, pose_at, truth_at};
 use crate::import::{ImportError, carpark};
 use crate::recording::{RecordedEvent, Recording, Truth};
 use crate::replay::{Replay, ReplayError, replay};
@@ -110,15 +110,6 @@ pub fn run(folder: &Path, noise: Noise) -> Result<(Outcome, Recording, Replay), 
     let replay = replay(&recording, |_| {})?;
     let outcome = judge(&recording, &replay, &headings);
     Ok((outcome, recording, replay))
-}
-
-/// The pose that the localiser would publish at `time`: the last one, carried on by the odometry that follows.
-fn pose_at(poses: &[PoseOutput], time: Time) -> Option<Pose> {
-    let after = poses.partition_point(|pose| pose.time <= time);
-    let (last, next) = (poses.get(after.checked_sub(1)?)?, poses.get(after)?);
-    let interval = next.time.since(last.time);
-    let share = if interval > 0.0 { time.since(last.time) / interval } else { 0.0 };
-    Some(last.pose.compose(&last.pose.between(&next.pose).fraction(share)))
 }
 
 fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome {

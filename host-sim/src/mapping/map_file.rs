@@ -1,0 +1,148 @@
+//! Maps as files: one landmark a line.
+//!
+//! ```text
+//! id,kind,x_m,y_m,deviation_m
+//! 0,reflector,1.250000,-3.400000,0.002000
+//! ```
+//!
+//! Kinds are `reflector`, `corner` and `end_point`; positions are in W. Identifiers are unique among reflectors and among
+//! the other kinds.
+
+use std::collections::HashSet;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use agv_core::landmarks::{Landmark, LandmarkKind};
+
+use crate::file_kind;
+
+/// First line of every map.
+pub const HEADER: &str = "id,kind,x_m,y_m,deviation_m";
+
+/// Why a map cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum MapFileError {
+    /// The file does not exist.
+    #[error("{}: there is no such file", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file is empty.
+    #[error("{}: the file is empty", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is no map.
+    #[error("{}: this is not a map, whose first line is '{HEADER}', but {looks_like}", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it seems to be.
+        looks_like: &'static str,
+    },
+    /// A line is not a landmark.
+    #[error("{}:{line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+fn io_error(path: &Path, source: std::io::Error) -> MapFileError {
+    let path = path.to_owned();
+    if source.kind() == std::io::ErrorKind::NotFound {
+        MapFileError::Missing { path }
+    } else {
+        MapFileError::Io { path, source }
+    }
+}
+
+/// Reads a map.
+///
+/// # Errors
+/// See [`MapFileError`].
+pub fn read(path: &Path) -> Result<Vec<Landmark>, MapFileError> {
+    let bytes = std::fs::read(path).map_err(|source| io_error(path, source))?;
+    if bytes.trim_ascii().is_empty() {
+        return Err(MapFileError::Empty { path: path.to_owned() });
+    }
+    let foreign = || {
+        let looks_like = file_kind::describe(&bytes[..bytes.len().min(4096)]);
+        MapFileError::Foreign { path: path.to_owned(), looks_like }
+    };
+    let text = std::str::from_utf8(&bytes).map_err(|_| foreign())?;
+    let mut lines = text.lines().zip(1..);
+    if lines.next().is_none_or(|(header, _)| header.trim() != HEADER) {
+        return Err(foreign());
+    }
+    let mut known = HashSet::new();
+    let mut landmarks = Vec::new();
+    for (text, line) in lines.filter(|(text, _)| !text.trim().is_empty()) {
+        let landmark = parse(text).map_err(|problem| MapFileError::Line { path: path.to_owned(), line, problem })?;
+        if !known.insert((landmark.kind == LandmarkKind::Reflector, landmark.id)) {
+            let problem = format!("there is another landmark {}", landmark.id);
+            return Err(MapFileError::Line { path: path.to_owned(), line, problem });
+        }
+        landmarks.push(landmark);
+    }
+    Ok(landmarks)
+}
+
+fn parse(text: &str) -> Result<Landmark, String> {
+    let fields: Vec<&str> = text.split(',').map(str::trim).collect();
+    let [id, kind, x, y, deviation] = fields[..] else {
+        return Err(format!("{} fields instead of 5", fields.len()));
+    };
+    let length = |name: &str, text: &str| {
+        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| format!("{name} is '{text}' instead of a number"))
+    };
+    let kind = match kind {
+        "reflector" => LandmarkKind::Reflector,
+        "corner" => LandmarkKind::Corner,
+        "end_point" => LandmarkKind::EndPoint,
+        other => return Err(format!("kind is '{other}' instead of reflector, corner or end_point")),
+    };
+    let deviation = length("deviation_m", deviation)?;
+    if deviation < 0.0 {
+        return Err("deviation_m is negative".to_owned());
+    }
+    Ok(Landmark {
+        id: id.parse().map_err(|_| format!("id is '{id}' instead of a whole number up to 65535"))?,
+        kind,
+        x: length("x_m", x)?,
+        y: length("y_m", y)?,
+        deviation: deviation as f32,
+    })
+}
+
+/// Writes a map; an older file of that name is replaced. Lengths are rounded to a micrometre.
+///
+/// # Errors
+/// [`MapFileError::Io`] if the file cannot be written.
+pub fn write(path: &Path, landmarks: &[Landmark]) -> Result<(), MapFileError> {
+    let mut text = format!("{HEADER}\n");
+    for Landmark { id, kind, x, y, deviation } in landmarks {
+        let kind = match kind {
+            LandmarkKind::Reflector => "reflector",
+            LandmarkKind::Corner => "corner",
+            LandmarkKind::EndPoint => "end_point",
+        };
+        let _ = writeln!(text, "{id},{kind},{x:.6},{y:.6},{deviation:.6}");
+    }
+    std::fs::write(path, text).map_err(|source| MapFileError::Io { path: path.to_owned(), source })
+}
