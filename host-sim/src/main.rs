@@ -25,6 +25,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    command::panic_message::install();
     let outcome = match Agv::parse().command {
         None => Err(anyhow::anyhow!("the default run is not there yet")),
         Some(Command::Import(command)) => command.run(),

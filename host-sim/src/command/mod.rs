@@ -7,6 +7,7 @@ pub mod evaluate;
 pub mod features;
 pub mod import;
 pub mod map;
+pub mod panic_message;
 mod progress;
 pub mod replay;
 pub mod simulate;
