@@ -85,19 +85,7 @@ pub fn run(mut begin: impl FnMut(&'static str)) -> Result<Vec<LocalisedDrive>, D
 /// Figures of each drive: a heading and rows.
 #[must_use]
 pub fn table(drives: &[LocalisedDrive]) -> Table {
-    let heading = [
-        "localised by",
-        "position, mm: median",
-        "95 %",
-        "max",
-        "end",
-        "heading, deg: median",
-        "95 %",
-        "max",
-        "end",
-        "NEES",
-        "within 2 cm, 0.1 deg",
-    ];
+    let heading = ["", "mm: median", "95 %", "max", "end", "deg: median", "95 %", "max", "end", "NEES", "ok"];
     let unknown = Spread { median: f64::NAN, p95: f64::NAN, max: f64::NAN };
     let row = |drive: &LocalisedDrive| {
         let accuracy = drive.figures.accuracy.as_ref();
@@ -108,7 +96,7 @@ pub fn table(drives: &[LocalisedDrive]) -> Table {
         let one = |value: f64| format!("{value:.1}");
         let three = |value: f64| format!("{value:.3}");
         vec![
-            drive.name.to_owned(),
+            unbroken(drive.name),
             one(position.median),
             one(position.p95),
             one(position.max),
@@ -121,7 +109,12 @@ pub fn table(drives: &[LocalisedDrive]) -> Table {
             format!("{:.0} %", 100.0 * accuracy.and_then(|accuracy| accuracy.ok_share).unwrap_or(f64::NAN)),
         ]
     };
-    Table { heading: heading.map(str::to_owned).to_vec(), rows: drives.iter().map(row).collect() }
+    Table { heading: heading.map(unbroken).to_vec(), rows: drives.iter().map(row).collect() }
+}
+
+/// The text with spaces at which no line breaks.
+fn unbroken(text: &str) -> String {
+    text.replace(' ', "\u{a0}")
 }
 
 /// A page that compares the drives, and shows the last of them in full.
@@ -135,7 +128,10 @@ pub fn page(drives: &[LocalisedDrive]) -> Result<Page, FigureError> {
          are slightly miscalibrated, the laser has noise. Natural features were mapped by another drive.",
     );
     page.section("Localised in four ways").table(&table(drives));
-    page.paragraph("NEES is the mean normalised error squared: 3 is expected, less is cautious.");
+    page.paragraph(
+        "Distance from the true position and difference from the true heading over the whole way, and at its end. NEES is \
+         the mean normalised error squared: 3 is expected, less is cautious. Ok are the poses within 2 cm and 0.1 deg.",
+    );
     let lines = |line: fn(&Track) -> Vec<(f64, f64)>| drives.iter().map(|drive| line(&drive.track)).collect::<Vec<_>>();
     let (positions, headings) = (lines(position_error_line), lines(heading_error_line));
     page.figure(&position_error_chart(&series(drives, &positions))?, "Distance from the true position over the way.");
