@@ -11,7 +11,7 @@ use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::progress;
+use super::{output, progress};
 
 const HELP: &str = "\
 Examples:
@@ -106,14 +106,14 @@ impl Map {
         map_file::write(&self.output, &landmarks)?;
         let summary = Summary::of(&landmarks);
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            println!("reflectors         {:6}", summary.reflectors);
-            println!("corners            {:6}", summary.corners);
-            println!("end points         {:6}", summary.end_points);
-            println!("largest deviation  {:6.1} mm", summary.largest_deviation_mm.unwrap_or_default());
+            return output::print(&serde_json::to_string_pretty(&summary)?);
         }
-        Ok(())
+        output::print_rows(&[
+            ["reflectors".to_owned(), summary.reflectors.to_string()],
+            ["corners".to_owned(), summary.corners.to_string()],
+            ["end points".to_owned(), summary.end_points.to_string()],
+            ["largest deviation".to_owned(), format!("{:.1} mm", summary.largest_deviation_mm.unwrap_or_default())],
+        ])
     }
 }
 

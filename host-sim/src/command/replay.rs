@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::MapUse;
 use agv_core::record::Damage;
-use agv_host_sim::evaluate::drive::{Figures, Track, figure_rows, report};
+use agv_host_sim::evaluate::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::map_file;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::{Comparison, compare, replay};
+use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::progress;
+use super::{output, progress};
 
 const HELP: &str = "\
 Examples:
@@ -117,7 +118,8 @@ impl Replay {
         let remarks = self.remarks(&software, comparison, &damages);
         if let Some(folder) = &self.report {
             let name = self.log.file_name().unwrap_or_default().to_string_lossy();
-            let page = report(&format!("Replay of {name}"), &remarks, &recording, &replay, &track, &figures)?;
+            let mut page = Page::new(&format!("Replay of {name}"));
+            add_drive(&mut page, &remarks, &recording, &replay, &track, &figures)?;
             let path = folder.join("index.html");
             page.write(&path).with_context(|| path.display().to_string())?;
         }
@@ -129,16 +131,14 @@ impl Replay {
             });
             let summary =
                 Summary { software: &software, figures: &figures, outputs: comparison, damage: damage.collect() };
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-        } else {
-            for [name, value] in remarks.iter().chain(&figure_rows(&figures)) {
-                println!("{name:<24} {value}");
-            }
-            if let Some(folder) = &self.report {
-                println!("{:<24} {}", "report", folder.join("index.html").display());
-            }
+            return output::print(&serde_json::to_string_pretty(&summary)?);
         }
-        Ok(())
+        let mut rows = remarks;
+        rows.extend(figure_rows(&figures));
+        if let Some(folder) = &self.report {
+            rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
+        }
+        output::print_rows(&rows)
     }
 
     fn maps(&self) -> anyhow::Result<MapUse> {

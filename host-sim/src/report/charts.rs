@@ -138,10 +138,10 @@ fn extents<'a, I: Iterator<Item = &'a (f64, f64)>>(points: impl Fn() -> I, bound
     (x, y.widened(0.05))
 }
 
-pub(super) type FloatPlane<'a> =
+type FloatPlane<'a> =
     super::figure::Plane<'a, plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
 
-pub(super) fn plane<'a>(area: &Area<'a>, x: Extent, y: Extent) -> Result<FloatPlane<'a>, Box<dyn std::error::Error>> {
+fn plane<'a>(area: &Area<'a>, x: Extent, y: Extent) -> Result<FloatPlane<'a>, Box<dyn std::error::Error>> {
     let chart = ChartBuilder::on(area)
         .margin(MARGIN)
         .x_label_area_size(X_LABELS)

@@ -2,8 +2,10 @@
 
 use plotters::prelude::*;
 
-use super::charts::plane;
-use super::figure::{Extent, Figure, FigureError, axes, axis_number, colour, draw};
+use super::figure::{Extent, Figure, FigureError, MARGIN, X_LABELS, axes, axis_number, colour, draw};
+
+/// Room for the names of the states, pixels.
+const NAMES: u32 = 160;
 
 /// A time in one state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +36,11 @@ pub fn state_timeline(x_label: &str, states: &[&str], spans: &[StateSpan]) -> Re
         states.get(state).filter(|_| is_row).copied().unwrap_or_default().to_owned()
     };
     draw(100 + 34 * rows as u32, Vec::new(), |area| {
-        let mut chart = plane(area, x, y)?;
+        let mut chart = ChartBuilder::on(area)
+            .margin(MARGIN)
+            .x_label_area_size(X_LABELS)
+            .y_label_area_size(NAMES)
+            .build_cartesian_2d(x.low..x.high, y.low..y.high)?;
         axes(&mut chart, [x_label, ""], rows + 2, &|value| axis_number(*value, x), &name_of)?;
         // A short time is seen too.
         let least = 0.002 * x.width();
