@@ -4,13 +4,16 @@ use std::io::Write;
 use std::path::PathBuf;
 
 /// The folder of real recordings: the environment variable `AGV_DATA`, else `../shared/data` beside the repository.
-/// None if neither exists.
+/// None if it does not exist.
 #[must_use]
 pub fn folder() -> Option<PathBuf> {
-    let candidates = std::env::var_os("AGV_DATA").map(PathBuf::from).into_iter().chain([
-        PathBuf::from("../shared/data"),
-        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
-    ]);
+    let candidates = match std::env::var_os("AGV_DATA") {
+        Some(stated) => vec![PathBuf::from(stated)],
+        None => {
+            let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+            vec![PathBuf::from("../shared/data"), PathBuf::from(beside)]
+        }
+    };
     candidates.into_iter().find(|folder| folder.is_dir())
 }
 

@@ -37,6 +37,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    command::panic_message::install();
     let arguments = Agv::parse();
     let outcome = match arguments.command {
         None => arguments.demonstration.run(),

@@ -1,18 +1,11 @@
 //! The command as people run it.
 
+mod support;
+
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use agv_host_sim::data;
-
-fn agv(arguments: &[&str]) -> Output {
-    // A backtrace would be more than one line.
-    Command::new(env!("CARGO_BIN_EXE_agv")).args(arguments).env("RUST_BACKTRACE", "1").output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
+use support::{Files, agv, refusal, text};
 
 /// Names of the subcommands, as the help lists them.
 fn subcommands() -> Vec<String> {
@@ -23,40 +16,6 @@ fn subcommands() -> Vec<String> {
     let names = listed.map(|line| line.split_whitespace().next().unwrap().to_owned());
     // clap's own command takes no options.
     names.filter(|name| name != "help").collect()
-}
-
-/// Runs a command that must refuse its input, and gives the one line that says why. Lines of progress before it say
-/// what is being done and hold no complaint.
-fn refusal(arguments: &[&str]) -> String {
-    let output = agv(arguments);
-    let complaint = text(&output.stderr);
-    assert!(!output.status.success(), "{arguments:?} took its input");
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {complaint}");
-    assert!(output.stdout.is_empty(), "{arguments:?} printed results");
-    let lines: Vec<&str> = complaint.lines().filter(|line| line.starts_with("agv: ")).collect();
-    assert_eq!(lines.len(), 1, "{arguments:?}: {complaint}");
-    assert!(!complaint.contains("panicked") && !complaint.contains("backtrace"), "{complaint}");
-    assert_eq!(complaint.lines().last(), lines.last().copied(), "{complaint}");
-    lines[0].to_owned()
-}
-
-struct Files {
-    folder: tempfile::TempDir,
-}
-
-impl Files {
-    fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.folder.path().join(name).to_str().unwrap().to_owned()
-    }
-
-    fn write(&self, name: &str, content: &[u8]) -> String {
-        std::fs::write(self.folder.path().join(name), content).unwrap();
-        self.path(name)
-    }
 }
 
 #[test]
@@ -137,7 +96,7 @@ fn import_writes_a_log_and_a_summary() {
 
 #[test]
 fn import_finds_out_what_the_real_data_are() {
-    let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "") else { return };
+    let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "carpark") else { return };
     let files = Files::new();
     let output = files.path("out.agvlog");
     for (input, key, expected) in [
@@ -146,7 +105,8 @@ fn import_finds_out_what_the_real_data_are() {
         ("scans2d/intel-lab.log", "scans", 2672),
         ("scans2d/fhw-corrected.log.gz", "scans", 488),
     ] {
-        let run = agv(&["import", "auto", folder.join(input).to_str().unwrap(), "-o", &output, "--json"]);
+        let run =
+            agv(&["import", "auto", folder.with_file_name("").join(input).to_str().unwrap(), "-o", &output, "--json"]);
         assert!(run.status.success(), "{input}: {}", text(&run.stderr));
         let summary: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
         assert_eq!(summary[key], expected, "{input}");
@@ -167,4 +127,33 @@ fn a_scenario_that_is_none_is_refused() {
     }
     let complaint = refusal(&["simulate", &files.path("damaged.toml"), "-o", &output]);
     assert!(complaint.contains("line 1: ") && !complaint.contains('|'), "{complaint}");
+}
+
+#[test]
+fn whatever_reads_a_log_refuses_what_is_none() {
+    let files = Files::new();
+    let inputs = [
+        files.path("missing.agvlog"),
+        files.write("empty.agvlog", b""),
+        files.write("foreign.agvlog", b"t_s,x_m\n1,2\n"),
+        files.write("capture.agvlog", b"\xd4\xc3\xb2\xa1\x02\0\x04\0\0\0\0\0\xff"),
+    ];
+    let folder = files.path("folder");
+    for input in &inputs {
+        let complaint = refusal(&["features", "export", input, &folder]);
+        assert!(complaint.contains(&file_name(input)), "{complaint}");
+        assert!(!Path::new(&folder).exists());
+    }
+    // Commands that take a log, and nothing else that they must be given.
+    let takes_log = |command: &String| {
+        text(&agv(&[command, "--help"]).stdout)
+            .lines()
+            .any(|line| line.starts_with("Usage: ") && line.ends_with(" <LOG>") && !line.contains(" --"))
+    };
+    for command in subcommands().iter().filter(|command| takes_log(command)) {
+        for input in &inputs {
+            let complaint = refusal(&[command, input]);
+            assert!(complaint.contains(&file_name(input)), "{complaint}");
+        }
+    }
 }

@@ -179,6 +179,23 @@ fn a_damaged_byte_costs_one_record_and_is_reported() {
 }
 
 #[test]
+fn megabytes_of_foreign_bytes_are_one_damage() {
+    let (_folder, path) = written(&small_recording());
+    let whole = std::fs::read(&path).unwrap();
+    let (records, _) = listed(&path).unwrap();
+    let middle = records[5].0 as usize;
+    // Every fourth byte begins the magic and breaks it off.
+    let foreign = [0xD6, 0x41, 0x47, 0x00].repeat(700_000);
+    std::fs::write(&path, [&whole[..middle], &foreign, &whole[middle..]].concat()).unwrap();
+    let (read, damages) = listed(&path).unwrap();
+    assert_eq!(
+        read.iter().map(|(_, text)| text).collect::<Vec<_>>(),
+        records.iter().map(|(_, text)| text).collect::<Vec<_>>()
+    );
+    assert_eq!(damages, [Damage { offset: middle as u64, skipped: foreign.len() as u64, reason: DamageReason::Magic }]);
+}
+
+#[test]
 fn appending_goes_on_behind_the_last_good_record() {
     let (_folder, path) = written(&small_recording());
     let whole = std::fs::read(&path).unwrap();

@@ -26,6 +26,7 @@ pub struct Keypoint {
     pub orientation: f32,
     /// Radius of the neighbourhood in which it was found, m.
     pub radius: f32,
-    /// Cornerness (K 3.10); smaller is better.
+    /// What the detector held against it; smaller is better. Cornerness (K 3.10), or the largest variance of the position,
+    /// m^2, of corners that a gate has passed; zero for ends of faces.
     pub score: f32,
 }

@@ -195,8 +195,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
     }
 
     fn set_pose(&mut self, fix: &PoseFix) {
-        let is_sound = fix.pose.is_finite() && fix.position_deviation >= 0.0 && fix.heading_deviation >= 0.0;
-        if !is_sound {
+        if !fix.is_sound() {
             return;
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);

@@ -1,4 +1,5 @@
 //! The detector in a synthetic storage whose true corners are known, and its properties on any scan.
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 mod scene;
 
@@ -62,16 +63,21 @@ impl Seen {
     }
 }
 
-/// All keypoints of many scans in many storages, with 10 mm of noise.
-fn look_around(parameters: Parameters, seeds: std::ops::Range<u64>, scans: usize) -> Vec<Seen> {
+/// All keypoints of many scans in many storages, with 10 mm of noise, by a sensor that moves by `travel` (m) a scan.
+fn look_around(parameters: Parameters, seeds: std::ops::Range<u64>, scans: usize, travel: f64) -> Vec<Seen> {
     let mut seen = Vec::new();
     for seed in seeds {
         let mut random = Random::new(seed);
         let scene = Scene::block_storage(&mut random);
         for _ in 0..scans {
             let pose = pose_in_lane(&mut random);
-            let ranges = scene.scan(pose, BEAMS, -PI, 0.01, &mut random);
-            for keypoint in detect(&points(&ranges, -PI, TAU / BEAMS as f64), parameters) {
+            let beams = scene.moving_scan(pose, BEAMS, travel, 0.01, &mut random);
+            let ranges: Vec<f32> = beams.iter().map(|(range, _)| *range).collect();
+            let mut points = points(&ranges, -PI, TAU / BEAMS as f64);
+            for (point, (_, [x, y])) in points.points.iter_mut().zip(&beams) {
+                *point = ScanPoint::new(*x, *y);
+            }
+            for keypoint in detect(&points, parameters) {
                 let (sine, cosine) = pose[2].sin_cos();
                 let (x, y) = (f64::from(keypoint.position.x), f64::from(keypoint.position.y));
                 let world = [pose[0] + cosine * x - sine * y, pose[1] + sine * x + cosine * y];
@@ -124,7 +130,7 @@ fn figures(name: &str, seen: &[Seen], kind: KeypointKind, scans: usize) -> Figur
 
 #[test]
 fn corners_and_ends_in_a_storage_lie_where_the_pallets_do() {
-    let seen = look_around(Parameters::mended(), 1000..1020, 10);
+    let seen = look_around(Parameters::mended(), 1000..1020, 10, 0.0);
     let corners = figures("mended", &seen, KeypointKind::Corner, 200);
     assert!(corners.per_scan > 4.5);
     assert!(corners.within_2_cm > 0.98);
@@ -141,8 +147,19 @@ fn corners_and_ends_in_a_storage_lie_where_the_pallets_do() {
 }
 
 #[test]
+fn motion_within_a_corrected_scan_does_little_harm() {
+    // 1.5 m/s at 8 scans a second.
+    let seen = look_around(Parameters::mended(), 2000..2020, 10, 0.19);
+    let corners = figures("moving", &seen, KeypointKind::Corner, 200);
+    assert!(corners.per_scan > 4.5 && corners.within_2_cm > 0.98 && corners.over_10_cm < 0.003);
+    let ends = figures("moving", &seen, KeypointKind::EndPoint, 200);
+    assert!(ends.per_scan > 10.0 && ends.within_2_cm > 0.89 && ends.over_10_cm < 0.02);
+    assert!(ends.beyond.abs() < 0.003);
+}
+
+#[test]
 fn printed_detector_slides_along_gaps() {
-    let seen = look_around(Parameters::thesis(), 1000..1010, 10);
+    let seen = look_around(Parameters::thesis(), 1000..1010, 10, 0.0);
     let corners = figures("thesis", &seen, KeypointKind::Corner, 100);
     assert!(corners.within_2_cm < 0.1, "the reason for the mended profile is gone");
 }
@@ -220,6 +237,20 @@ fn seam_hides_no_corner() {
         let near = found.iter().any(|keypoint| (keypoint.position - ScanPoint::new(2.0, 0.0)).norm() < 0.005);
         assert!(near, "{found:?}");
     }
+}
+
+#[test]
+fn spotless_corner_is_found_though_every_score_is_zero() {
+    // Five beams, of which only the middle one has two neighbours on each side.
+    let ranges: Vec<f32> = (-2..=2)
+        .map(|beam| {
+            let bearing = 0.03 * f64::from(beam);
+            (2.0 / (bearing.cos() - bearing.sin().abs())) as f32
+        })
+        .collect();
+    let found = detect(&points(&ranges, -0.06, 0.03), Parameters::thesis());
+    let [corner] = found.as_slice() else { panic!("{found:?}") };
+    assert!((corner.position - ScanPoint::new(2.0, 0.0)).norm() < 1e-3 && corner.score == 0.0, "{corner:?}");
 }
 
 #[test]

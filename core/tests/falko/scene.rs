@@ -107,11 +107,31 @@ impl Scene {
             .collect()
     }
 
+    /// Ranges around the full circle of a sensor that moves by `travel` along its heading meanwhile, and the points in the
+    /// frame that it had at the first beam, as a perfect correction of the motion gives them.
+    pub fn moving_scan(
+        &self,
+        pose: [f64; 3],
+        beams: usize,
+        travel: f64,
+        deviation: f64,
+        random: &mut Random,
+    ) -> Vec<(f32, [f32; 2])> {
+        let beam = |beam: usize| {
+            let share = beam as f64 / beams as f64;
+            let (bearing, along) = (TAU * share - PI, travel * share);
+            let origin = [pose[0] + along * pose[2].cos(), pose[1] + along * pose[2].sin()];
+            let range = self.cast(origin, pose[2] + bearing) + deviation * random.normal();
+            (range as f32, [(along + range * bearing.cos()) as f32, (range * bearing.sin()) as f32])
+        };
+        (0..beams).map(beam).collect()
+    }
+
     /// Offset of a world point from the nearest true corner.
     pub fn offset_from_corner(&self, point: Vertex) -> Vertex {
         let corners = self.outlines.iter().flat_map(|outline| &outline.corners);
         let offsets = corners.map(|corner| [point[0] - corner[0], point[1] - corner[1]]);
-        offsets.min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1]))).expect("a scene has corners")
+        offsets.min_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1]))).unwrap_or([f64::NAN; 2])
     }
 }
 

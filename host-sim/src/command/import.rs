@@ -2,6 +2,7 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use agv_host_sim::import::{self, ScanLog, carmen, carpark, graph_log, sapienza};
 use agv_host_sim::recording::{RecordedEvent, Recording};
@@ -9,6 +10,7 @@ use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use flate2::read::MultiGzDecoder;
+use indicatif::ProgressBar;
 
 /// Turn the recordings of others into logs.
 #[derive(clap::Args)]
@@ -46,7 +48,9 @@ impl Import {
             Format::Auto => detect(&self.input)?,
             stated => stated,
         };
-        eprintln!("reading {}", self.input.display());
+        // Shown on a terminal only, and gone when an error is reported.
+        let progress = ProgressBar::new_spinner().with_message(format!("reading {}", self.input.display()));
+        progress.enable_steady_tick(Duration::from_millis(100));
         let recording = match format {
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
@@ -54,8 +58,9 @@ impl Import {
             Format::Graph => drive(&self.input, "pose-graph", &graph_log::read(&self.input)?.log)?,
             Format::Auto => unreachable!("the format has been found above"),
         };
-        eprintln!("writing {}", self.output.display());
+        progress.set_message(format!("writing {}", self.output.display()));
         log::write(&self.output, &recording)?;
+        progress.finish_and_clear();
         let bytes = std::fs::metadata(&self.output).context("the log has vanished")?.len();
         let summary = Summary::of(&recording, bytes);
         if self.json {

@@ -9,6 +9,7 @@ pub mod features;
 pub mod import;
 pub mod map;
 mod output;
+pub mod panic_message;
 mod progress;
 pub mod replay;
 pub mod simulate;

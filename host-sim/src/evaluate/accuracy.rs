@@ -29,6 +29,12 @@ pub struct PoseError {
     pub normalised_square: Option<f64>,
 }
 
+impl PoseError {
+    /// The error of a pose that was never given.
+    pub const UNKNOWN: Self =
+        Self { time: Time::from_micros(0), position: f64::INFINITY, heading: f64::INFINITY, normalised_square: None };
+}
+
 /// Median, 95th percentile and largest of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {

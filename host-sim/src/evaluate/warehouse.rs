@@ -3,16 +3,19 @@
 //! Each run is a world of its own, with a drive of its own. The localiser gets a start pose with the errors that a start
 //! at reflectors leaves, and one of several maps. Errors are those of the logical point at the end of the way.
 
+use std::ops::Range;
+
+use agv_core::features::falko;
 use agv_core::localizer::MapUse;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::accuracy::{PoseError, Spread, pose_error};
+use super::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, PoseError, Spread, pose_error};
 use crate::mapping::{Clustering, map_features};
 use crate::replay::{ReplayError, replay};
-use crate::simulate::block_storage::ReflectorPlacement;
-use crate::simulate::scenario::{PathKind, Scenario, WorldOptions};
-use crate::simulate::{SimulateError, simulate};
+use crate::simulate::block_storage::{BlockStoragePath, ReflectorPlacement};
+use crate::simulate::scenario::{Scenario, WorldOptions};
+use crate::simulate::{SimulateError, Simulation, simulate};
 
 /// Which landmarks the localiser may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -24,16 +27,13 @@ pub enum Map {
     Reflectors,
     /// Features mapped by a drive on another path.
     Static,
-    /// Features found while driving.
+    /// Features found while driving, Algorithm 1 (K 5.4.1).
     Dynamic,
     /// Surveyed reflectors and features mapped on another path.
     Mixed,
 }
 
 impl Map {
-    /// All maps.
-    pub const ALL: [Self; 5] = [Self::Odometry, Self::Reflectors, Self::Static, Self::Dynamic, Self::Mixed];
-
     /// Whether there are reflectors in the world: as landmarks, or to map by.
     fn needs_reflectors(self) -> bool {
         self.uses_reflectors() || self.has_static_features()
@@ -45,6 +45,46 @@ impl Map {
 
     fn has_static_features(self) -> bool {
         matches!(self, Self::Static | Self::Mixed)
+    }
+}
+
+/// How the vehicle localises.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Method {
+    /// Name.
+    pub name: &'static str,
+    /// Which landmarks it may use.
+    pub map: Map,
+    /// How it finds natural features.
+    pub detector: falko::Parameters,
+    /// Standard deviation that is added to what the detector states, m.
+    pub added_deviation: f64,
+}
+
+/// What [`falko::Parameters::mended`] keypoints scatter and wander with the viewpoint beyond what it states, m.
+const MENDED_DEVIATION: f64 = 0.01;
+
+/// The same for FALKO as printed: scatter and median drift that the feasibility study found, m.
+const PRINTED_DEVIATION: f64 = 0.034;
+
+impl Method {
+    /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
+    pub const ALL: [Self; 6] = [
+        Self::mended("odometry", Map::Odometry),
+        Self::mended("reflectors", Map::Reflectors),
+        Self::mended("static", Map::Static),
+        Self {
+            name: "dynamic, FALKO as printed",
+            map: Map::Dynamic,
+            detector: falko::Parameters::thesis(),
+            added_deviation: PRINTED_DEVIATION,
+        },
+        Self::mended("dynamic", Map::Dynamic),
+        Self::mended("mixed", Map::Mixed),
+    ];
+
+    const fn mended(name: &'static str, map: Map) -> Self {
+        Self { name, map, detector: falko::Parameters::mended(), added_deviation: MENDED_DEVIATION }
     }
 }
 
@@ -83,14 +123,15 @@ pub enum WarehouseError {
 }
 
 /// The four paths of K table 5.6.
-pub const PATHS: [(&str, PathKind); 4] =
-    [("P1", PathKind::P1), ("P2", PathKind::P2), ("P3", PathKind::P3), ("P4", PathKind::P4)];
+pub const PATHS: [(&str, BlockStoragePath); 4] = [
+    ("P1", BlockStoragePath::P1),
+    ("P2", BlockStoragePath::P2),
+    ("P3", BlockStoragePath::P3),
+    ("P4", BlockStoragePath::P4),
+];
 
-/// Largest error of a position that can still be worked with, m (K 5.6).
-const POSITION_REQUIREMENT: f64 = 0.02;
-
-/// Largest error of a heading that can still be worked with, rad (K 5.6).
-const HEADING_REQUIREMENT: f64 = 0.1 * std::f64::consts::PI / 180.0;
+/// The mapping drive has its own noise: the seed of a run with this bit changed.
+const MAPPING_SEED_BIT: u64 = 1 << 32;
 
 /// End of one run.
 struct Run {
@@ -100,20 +141,20 @@ struct Run {
     elapsed: f64,
 }
 
-/// Runs one experiment with seeds 1 to `runs`; `done` is called after each run.
+/// Runs one experiment with each of the seeds; `done` is called after each run.
 ///
 /// # Errors
 /// See [`WarehouseError`].
 pub fn experiment(
-    (name, path): (&str, PathKind),
-    map: Map,
-    runs: usize,
+    (path_name, path): (&str, BlockStoragePath),
+    method: &Method,
+    seeds: Range<u64>,
     done: impl Fn() + Sync,
 ) -> Result<Experiment, WarehouseError> {
-    let results: Vec<Run> = (1..=runs as u64)
+    let results: Vec<Run> = seeds
         .into_par_iter()
         .map(|seed| {
-            let run = run(path, map, seed);
+            let run = run(path, method, seed);
             done();
             run
         })
@@ -121,55 +162,70 @@ pub fn experiment(
     let is_ok =
         |run: &&Run| run.error.position <= POSITION_REQUIREMENT && run.error.heading.abs() <= HEADING_REQUIREMENT;
     let sum = |value: fn(&Run) -> f64| results.iter().map(value).sum::<f64>();
+    let runs = results.len() as f64;
     Ok(Experiment {
-        name: name.to_owned(),
-        map,
-        path_m: sum(|run| run.path) / runs as f64,
-        runs,
-        ok_share: results.iter().filter(is_ok).count() as f64 / runs as f64,
+        name: format!("{path_name} {}", method.name),
+        map: method.map,
+        path_m: sum(|run| run.path) / runs,
+        runs: results.len(),
+        ok_share: results.iter().filter(is_ok).count() as f64 / runs,
         position_mm: Spread::of(results.iter().map(|run| run.error.position * 1e3)),
         heading_deg: Spread::of(results.iter().map(|run| run.error.heading.abs().to_degrees())),
-        nees: sum(|run| run.error.normalised_square.unwrap_or(f64::INFINITY)) / runs as f64,
+        nees: sum(|run| run.error.normalised_square.unwrap_or(f64::INFINITY)) / runs,
         realtime_factor: sum(|run| run.recorded) / sum(|run| run.elapsed),
     })
 }
 
-/// The standard scenario of a path with what the map needs of the world.
-#[must_use]
-pub fn scenario(path: PathKind, map: Map, seed: u64) -> Scenario {
-    let mut scenario = Scenario { seed, ..Scenario::default() };
-    scenario.path.kind = path;
-    if let WorldOptions::BlockStorage(storage) = &mut scenario.world
-        && map.needs_reflectors()
-    {
-        storage.reflectors = ReflectorPlacement::AisleAndLaneEnd;
+/// What the localiser of one run is given: a drive and the map of the method. The world is that of the seed. Features
+/// are mapped by another drive in the same world, on another path and with other noise, which is localised by the same
+/// survey of the reflectors.
+///
+/// # Errors
+/// See [`WarehouseError`].
+pub fn prepare(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Simulation, WarehouseError> {
+    let mut simulation = simulate(&scenario(path, method.map, seed, seed))?;
+    let recording = &mut simulation.recording;
+    recording.parameters.features.detector = method.detector;
+    recording.parameters.features.added_deviation = method.added_deviation;
+    recording.parameters.maps = MapUse {
+        reflectors: method.map.uses_reflectors(),
+        features: method.map.has_static_features(),
+        dynamic: method.map == Map::Dynamic,
+    };
+    if method.map.has_static_features() {
+        let mapping = scenario(BlockStoragePath::Mapping, method.map, seed, seed ^ MAPPING_SEED_BIT);
+        let mut mapping = simulate(&mapping)?.recording;
+        mapping.parameters.features.detector = method.detector;
+        mapping.landmarks.clone_from(&recording.landmarks);
+        recording.landmarks.extend(map_features(&mapping, &Clustering::default())?);
+    }
+    Ok(simulation)
+}
+
+fn scenario(path: BlockStoragePath, map: Map, world_seed: u64, seed: u64) -> Scenario {
+    let mut scenario = Scenario::block_storage(path, seed);
+    if let WorldOptions::BlockStorage(storage) = &mut scenario.world {
+        storage.seed = Some(world_seed);
+        if map.needs_reflectors() {
+            storage.reflectors = ReflectorPlacement::AisleAndLaneEnd;
+        }
     }
     scenario
 }
 
-fn run(path: PathKind, map: Map, seed: u64) -> Result<Run, WarehouseError> {
-    let simulation = simulate(&scenario(path, map, seed))?;
-    let mut recording = simulation.recording;
-    recording.parameters.maps =
-        MapUse { reflectors: map.uses_reflectors(), features: map.has_static_features(), dynamic: map == Map::Dynamic };
-    if map.has_static_features() {
-        let mapping = simulate(&scenario(PathKind::Mapping, map, seed))?.recording;
-        recording.landmarks.extend(map_features(&mapping, &Clustering::default())?);
-    }
-    let replay = replay(&recording, |_| {})?;
-    let error = replay.poses.iter().rev().find_map(|pose| pose_error(pose, &recording.truth)).unwrap_or(PoseError {
-        time: simulation_end(&recording),
-        position: f64::INFINITY,
-        heading: f64::INFINITY,
-        normalised_square: None,
-    });
+fn run(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Run, WarehouseError> {
+    let simulation = prepare(path, method, seed)?;
+    let recording = &simulation.recording;
+    let replay = replay(recording, |_| {})?;
+    let last = replay.poses.iter().rev().find_map(|pose| pose_error(pose, &recording.truth));
     let recorded = match (recording.truth.first(), recording.truth.last()) {
         (Some(first), Some(last)) => last.time.since(first.time),
         _ => 0.0,
     };
-    Ok(Run { error, path: simulation.path.length(), recorded, elapsed: replay.elapsed.as_secs_f64() })
-}
-
-fn simulation_end(recording: &crate::recording::Recording) -> agv_core::measurement::Time {
-    recording.truth.last().map_or_else(Default::default, |truth| truth.time)
+    Ok(Run {
+        error: last.unwrap_or(PoseError::UNKNOWN),
+        path: simulation.path.length(),
+        recorded,
+        elapsed: replay.elapsed.as_secs_f64(),
+    })
 }

@@ -71,10 +71,11 @@ pub fn read(path: &Path) -> Result<CarmenLog, CarmenError> {
             "ROBOTLASER2" => new_scan(words, &mut clock).map(|scan| log.rear.push(scan)),
             "ODOM" => odometry(words).map(|(pose, seconds)| {
                 let before = anchor.replace(pose);
-                if let (Some(before), true) = (before, seconds > 0.0) {
-                    let increment =
-                        PoseIncrement { time: clock.at(seconds), displacement: Pose::between(&before, &pose) };
-                    log.front.increments.push(increment);
+                if seconds > 0.0 {
+                    let time = clock.at(seconds);
+                    log.front.increments.extend(
+                        before.map(|before| PoseIncrement { time, displacement: Pose::between(&before, &pose) }),
+                    );
                 }
             }),
             _ => Some(()),

@@ -26,6 +26,12 @@ pub enum ScenarioError {
         /// Why not.
         source: std::io::Error,
     },
+    /// The file is empty.
+    #[error("the scenario {path} is empty")]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
     /// The text is not a scenario: not TOML, an unknown key, or a value of the wrong type.
     #[error("this is not a scenario, line {line}: {problem}")]
     Parse {
@@ -544,6 +550,10 @@ impl Scenario {
     pub fn read(path: &FilePath) -> Result<Self, ScenarioError> {
         let text =
             std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.to_path_buf(), source })?;
+        // An empty text states a drive with nothing but defaults, but nobody keeps that in a file.
+        if text.trim().is_empty() {
+            return Err(ScenarioError::Empty { path: path.to_path_buf() });
+        }
         Self::parse(&text)
     }
 

@@ -36,7 +36,7 @@ pub(super) fn find<const BEAMS: usize>(
     crosses_seam: bool,
     mut keep: impl FnMut(Keypoint),
 ) {
-    let beams = Beams { ranges: &scan.ranges, crosses_seam };
+    let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
     for index in 0..scan.ranges.len() {
         let Some(range) = beams.range(index).filter(|range| *range <= parameters.farthest) else { continue };
         for ends in [Ends::After, Ends::Before] {

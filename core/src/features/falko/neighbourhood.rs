@@ -121,7 +121,7 @@ impl Disc {
     #[inline]
     fn contains(&self, point: ScanPoint, range: f32) -> Option<ScanPoint> {
         // The range alone excludes most of what is not inside, absent returns among it.
-        if libm::fabsf(range - self.range) > REACH * self.radius {
+        if libm::fabsf(range - self.range) > self.radius + TRAVEL {
             return None;
         }
         let relative = point - self.centre;
@@ -129,9 +129,9 @@ impl Disc {
     }
 }
 
-/// Difference of ranges that can still be inside, in radii; above 1 because ranges are measured from wherever the
-/// sensor was while points are in one frame.
-const REACH: f32 = 1.1;
+/// Farthest that the sensor may move within one scan, m: ranges are measured from wherever it was, points are in one
+/// frame.
+const TRAVEL: f32 = 0.3;
 
 /// Number of beams whose directions differ by less than asin(`sine`); possibly one more, never one less.
 #[inline]

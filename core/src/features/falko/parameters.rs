@@ -65,7 +65,8 @@ pub struct Parameters {
     pub points_a_side: u16,
     /// Farthest candidate, m.
     pub farthest: f32,
-    /// How neighbouring candidates compete.
+    /// How neighbouring candidates compete. With a gate the better one is that whose lines fix the corner best, else that
+    /// with the lower score (K 3.10).
     pub suppression: SuppressionRule,
     /// Distance within which candidates compete, m (K 3.1.1).
     pub suppression_radius: f32,
@@ -107,7 +108,7 @@ impl Parameters {
             farthest: 30.0,
             suppression: SuppressionRule::Distance,
             suppression_radius: 0.2,
-            score_share: f32::INFINITY,
+            score_share: f32::MAX,
             sub_beam_limit: 0.2,
             lines_include_corner: true,
             crosses_seam: true,

@@ -1,6 +1,7 @@
 //! Unbroken surfaces: where one ends, neighbourhoods end too.
 
 use crate::features::PointScan;
+use crate::geometry::ScanPoint;
 
 /// Absent returns that are bridged between two returns of one surface.
 const BRIDGED: usize = 2;
@@ -34,7 +35,7 @@ impl<const BEAMS: usize> Runs<BEAMS> {
 
     /// Finds the surfaces of a scan; a surface ends where the range departs from it by more than `jump` (m).
     pub(super) fn find(&mut self, scan: &PointScan<BEAMS>, crosses_seam: bool, jump: f32) {
-        let beams = Beams { ranges: &scan.ranges, crosses_seam };
+        let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
         let count = scan.ranges.len();
         let most = count.saturating_sub(1);
         self.before.fill(0);
@@ -76,6 +77,7 @@ impl<const BEAMS: usize> Runs<BEAMS> {
 #[derive(Clone, Copy)]
 pub(super) struct Beams<'a> {
     pub ranges: &'a [f32],
+    pub points: &'a [ScanPoint],
     pub crosses_seam: bool,
 }
 
@@ -108,6 +110,12 @@ impl Beams<'_> {
         self.ranges.get(index).copied().filter(|range| *range > 0.0)
     }
 
+    /// Distance of a return from the origin of the points, m; None if it is absent.
+    fn distance(&self, index: usize) -> Option<f32> {
+        self.range(index)?;
+        self.points.get(index).map(|point| point.norm()).filter(|distance| *distance > 0.0)
+    }
+
     /// Steps back to the nearest present return. None if `index` itself is absent, or if too many are.
     fn gap_before(&self, index: usize) -> Option<usize> {
         self.range(index)?;
@@ -121,13 +129,17 @@ impl Beams<'_> {
     /// return.
     fn is_broken(&self, earlier: usize, later: usize, jump: f32) -> bool {
         let (Some(first), Some(second)) = (self.range(earlier), self.range(later)) else { return true };
-        let difference = libm::fabsf(second - first);
-        if difference <= jump {
+        if libm::fabsf(second - first) <= jump {
+            return false;
+        }
+        // Across the seam of a moving sensor ranges jump though the surface does not; corrected points do not.
+        let (Some(first), Some(second)) = (self.distance(earlier), self.distance(later)) else { return true };
+        if libm::fabsf(second - first) <= jump {
             return false;
         }
         let gap = if later > earlier { later - earlier } else { later + self.ranges.len() - earlier };
         let continues = |from: f32, inner: Option<usize>, target: f32| {
-            let inner = inner.and_then(|index| self.range(index));
+            let inner = inner.and_then(|index| self.distance(index));
             inner.is_some_and(|inner| {
                 // Along a straight line the inverse range is linear in the bearing, up to its square.
                 let slope = (1.0 / from - 1.0 / inner) / BASELINE as f32;

@@ -1,0 +1,305 @@
+//! The localiser as a whole: what it says of itself, and that nothing from outside can hurt it.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
+use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason};
+use agv_core::measurement::{EncoderSample, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use proptest::prelude::*;
+
+type Small = Localizer<360, 64, 64, 32>;
+
+const TICK: f64 = 1e-4;
+
+fn parameters() -> Parameters {
+    let vehicle = Vehicle::Tricycle(Tricycle {
+        wheelbase: 1.5,
+        drive_scale: TICK,
+        drive_range: CounterRange::BITS_32,
+        steering_scale: 1e-3,
+        steering_range: CounterRange::BITS_16,
+        steering_offset_forward: 0.0,
+        steering_offset_backward: 0.0,
+    });
+    Parameters::new(vehicle, Pose::new(0.9, 0.0, 0.0))
+}
+
+/// Reflectors in two uneven rows along a straight way.
+fn reflectors() -> Vec<Landmark> {
+    (0..24u16)
+        .map(|id| Landmark {
+            id,
+            kind: LandmarkKind::Reflector,
+            x: f64::from(id) * 3.1 + f64::from(id % 5) * 0.37 - 5.0,
+            y: if id % 2 == 0 { 4.0 + f64::from(id % 3) } else { -3.5 - f64::from(id % 4) * 0.6 },
+            deviation: 0.002,
+        })
+        .collect()
+}
+
+/// A vehicle that drives straight at 1 m/s from the origin, 100 encoder samples and 8 revolutions a second.
+struct Drive {
+    localizer: Box<Small>,
+    step: u64,
+    /// How far the true vehicle is beside what its encoders say, m.
+    offset: f64,
+}
+
+impl Drive {
+    fn start() -> Self {
+        let mut localizer = Box::new(Small::new(parameters()));
+        localizer.add_landmarks(&reflectors()).unwrap();
+        Self { localizer, step: 0, offset: 0.0 }
+    }
+
+    fn time(&self) -> Time {
+        Time::from_micros(1_000_000 + self.step * 10_000)
+    }
+
+    fn truth(&self, time: Time) -> Pose {
+        Pose::new(time.since(Time::from_micros(1_000_000)), self.offset, 0.0)
+    }
+
+    fn set_pose(&mut self, pose: Pose) -> PoseOutput {
+        let fix = PoseFix { time: self.time(), pose, position_deviation: 0.02, heading_deviation: 0.005 };
+        self.localizer.handle(&Event::SetPose(fix)).pose
+    }
+
+    /// Drives for some revolutions; `sees` says which reflectors are seen, by their ids.
+    fn revolutions(&mut self, count: usize, sees: impl Fn(u16) -> bool) -> PoseOutput {
+        for _ in 0..count {
+            let start = self.time();
+            for _ in 0..12 {
+                self.step += 1;
+                let drive = (self.step as f64 * 0.01 / TICK).round() as u32;
+                self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive, steering: 0 }));
+            }
+            let observations: Vec<_> = reflectors()
+                .iter()
+                .filter(|reflector| sees(reflector.id))
+                .filter_map(|reflector| self.observe(start, reflector))
+                .collect();
+            self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
+        }
+        self.localizer.outputs().pose
+    }
+
+    fn observe(&self, start: Time, reflector: &Landmark) -> Option<ReflectorObservation> {
+        // One look from the middle of the revolution gives the direction, and so the time, well enough.
+        let bearing_at = |time: Time| {
+            let laser = self.truth(time).compose(&parameters().laser);
+            let seen = laser.inverse_transform(&nalgebra::Vector2::new(reflector.x, reflector.y));
+            (seen.norm(), seen.y.atan2(seen.x))
+        };
+        let turn = bearing_at(start.offset(0.06)).1.rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU;
+        let time = start.offset(0.12 * turn);
+        let (range, bearing) = bearing_at(time);
+        (range < 12.0).then_some(ReflectorObservation { time, range: range as f32, bearing: bearing as f32 })
+    }
+}
+
+#[test]
+fn nothing_is_said_of_the_pose_before_one_is_given() {
+    let mut drive = Drive::start();
+    let output = drive.revolutions(3, |_| true);
+    assert_eq!((output.mode, output.reason), (Mode::NotLocalised, Reason::NoPose));
+    assert!(drive.localizer.outputs().uses.is_empty());
+}
+
+#[test]
+fn reflectors_correct_a_start_beside_the_truth() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::new(0.04, -0.03, 0.008));
+    let output = drive.revolutions(8, |_| true);
+    assert_eq!((output.mode, output.reason), (Mode::Reflectors, Reason::None));
+    let truth = drive.truth(output.time);
+    let error = (output.pose.x - truth.x).hypot(output.pose.y - truth.y);
+    assert!(error < 0.004 && output.pose.theta.abs() < 1e-3, "{error} m, {} rad", output.pose.theta);
+    assert!(output.acceptance > 0.99 && output.dead_reckoning_distance < 0.2);
+}
+
+#[test]
+fn every_reflector_is_used_at_its_own_time() {
+    // At 1 m/s the vehicle moves 12 cm within a revolution; noise-free observations leave millimetres only if each is
+    // taken from where the vehicle was.
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    drive.revolutions(40, |_| true);
+    let worst = drive.localizer.outputs().uses.iter().map(|used| used.residual[0].abs()).fold(0.0, f64::max);
+    assert!(worst < 0.003, "{worst} m");
+}
+
+#[test]
+fn without_landmarks_it_reckons_and_says_how_far() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    drive.revolutions(8, |_| true);
+    let before = drive.localizer.outputs().pose;
+    let output = drive.revolutions(40, |_| false);
+    assert_eq!((output.mode, output.reason), (Mode::DeadReckoning, Reason::NoLandmarks));
+    assert!((output.dead_reckoning_distance - 4.8).abs() < 0.15, "{}", output.dead_reckoning_distance);
+    assert!(output.covariance[2] > 4.0 * before.covariance[2]);
+    // Landmarks come back: so does the mode.
+    assert_eq!(drive.revolutions(4, |_| true).mode, Mode::Reflectors);
+    let mut reckoned = Drive::start();
+    let mut strict = parameters();
+    strict.limits.lost_after = 3.0;
+    reckoned.localizer = Box::new(Small::new(strict));
+    reckoned.set_pose(Pose::default());
+    let output = reckoned.revolutions(30, |_| false);
+    assert_eq!((output.mode, output.reason), (Mode::Lost, Reason::NoLandmarks));
+}
+
+#[test]
+fn a_vehicle_that_was_carried_away_is_lost_and_can_be_put_back() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    drive.revolutions(8, |_| true);
+    drive.offset = 0.6;
+    let mut revolutions = 0;
+    while drive.localizer.outputs().pose.mode != Mode::Lost {
+        revolutions += 1;
+        assert!(revolutions < 6, "it still believes its pose");
+        drive.revolutions(1, |_| true);
+    }
+    assert_eq!(drive.localizer.outputs().pose.reason, Reason::LandmarksRejected);
+    // It stays lost, however well a later scan may fit.
+    drive.offset = 0.0;
+    assert_eq!(drive.revolutions(4, |_| true).mode, Mode::Lost);
+    let here = drive.truth(drive.time());
+    drive.set_pose(here);
+    assert_eq!(drive.revolutions(4, |_| true).mode, Mode::Reflectors);
+}
+
+#[test]
+fn some_false_reflectors_change_nothing() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    drive.revolutions(4, |_| true);
+    for index in 0..20 {
+        let ghost = ReflectorObservation {
+            time: drive.time(),
+            range: 2.0 + 0.3 * (index % 7) as f32,
+            bearing: 0.9 * (index % 5) as f32 - 1.3,
+        };
+        let outputs = drive.localizer.handle(&Event::Reflectors(Reflectors { observations: &[ghost] }));
+        assert_ne!(outputs.uses[0].verdict, Verdict::Accepted);
+        assert_eq!(drive.revolutions(1, |_| true).mode, Mode::Reflectors);
+    }
+    let output = drive.localizer.outputs().pose;
+    assert!((output.pose.x - drive.truth(output.time).x).abs() < 0.003);
+}
+
+#[test]
+fn an_impossible_motion_is_said_and_not_believed() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    drive.revolutions(4, |_| true);
+    let before = drive.localizer.outputs().pose;
+    drive.step += 1;
+    let jump = EncoderSample { time: drive.time(), drive: 90_000, steering: 0 };
+    let output = drive.localizer.handle(&Event::Encoders(jump)).pose;
+    assert_eq!(output.reason, Reason::OdometryImplausible);
+    assert!((output.pose.x - before.pose.x - 0.01).abs() < 0.002);
+}
+
+#[test]
+fn the_same_events_give_the_same_bits() {
+    let outputs = || {
+        let mut drive = Drive::start();
+        drive.set_pose(Pose::new(0.04, -0.03, 0.008));
+        (0..10).map(|_| drive.revolutions(1, |id| id % 3 != 0)).collect::<Vec<_>>()
+    };
+    let (first, second) = (outputs(), outputs());
+    for (a, b) in first.iter().zip(&second) {
+        assert_eq!(a.pose.x.to_bits(), b.pose.x.to_bits());
+        assert_eq!(a.covariance.map(f64::to_bits), b.covariance.map(f64::to_bits));
+    }
+}
+
+/// Any number that a sensor might say, sensible or not.
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -50.0f64..50.0,
+        1 => any::<f64>(),
+        1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(0.0), Just(f64::MAX)],
+    ]
+}
+
+#[derive(Clone, Debug)]
+enum Anything {
+    Encoders(u64, u32, u32),
+    Reflectors(Vec<(u64, f32, f32)>),
+    Scan(u64, f64, f64, f64, Vec<f32>),
+    SetPose(u64, f64, f64, f64, f64, f64),
+}
+
+fn any_time() -> impl Strategy<Value = u64> {
+    prop_oneof![8 => 0u64..3_000_000, 1 => any::<u64>()]
+}
+
+fn anything() -> impl Strategy<Value = Anything> {
+    let single = || any_number().prop_map(|number| number as f32);
+    prop_oneof![
+        6 => (any_time(), any::<u32>(), any::<u32>()).prop_map(|(t, d, s)| Anything::Encoders(t, d, s)),
+        4 => (0u64..3_000_000, 0u32..3_000, 0u32..600).prop_map(|(t, d, s)| Anything::Encoders(t, d, s)),
+        3 => proptest::collection::vec((any_time(), single(), single()), 0..20)
+            .prop_map(Anything::Reflectors),
+        2 => (any_time(), any_number(), any_number(), -0.1f64..0.1, proptest::collection::vec(single(), 0..400))
+            .prop_map(|(t, interval, first, step, ranges)| Anything::Scan(t, interval, first, step, ranges)),
+        1 => (any_time(), any_number(), any_number(), any_number(), any_number(), any_number())
+            .prop_map(|(t, x, y, theta, p, h)| Anything::SetPose(t, x, y, theta, p, h)),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn no_sequence_of_events_breaks_the_pose(events in proptest::collection::vec(anything(), 1..60)) {
+        let mut parameters = parameters();
+        parameters.maps.dynamic = true;
+        let mut localizer = Box::new(Small::new(parameters));
+        localizer.add_landmarks(&reflectors()).unwrap();
+        let first = PoseFix {
+            time: Time::from_micros(0), pose: Pose::default(), position_deviation: 0.1, heading_deviation: 0.05,
+        };
+        localizer.handle(&Event::SetPose(first));
+        for event in &events {
+            let observations: Vec<ReflectorObservation>;
+            let event = match event {
+                Anything::Encoders(time, drive, steering) => Event::Encoders(EncoderSample {
+                    time: Time::from_micros(*time), drive: *drive, steering: *steering,
+                }),
+                Anything::Reflectors(seen) => {
+                    observations = seen.iter().map(|&(time, range, bearing)| ReflectorObservation {
+                        time: Time::from_micros(time), range, bearing,
+                    }).collect();
+                    Event::Reflectors(Reflectors { observations: &observations })
+                }
+                Anything::Scan(start, beam_interval, first_bearing, bearing_step, ranges) => Event::Scan(Scan {
+                    start: Time::from_micros(*start),
+                    beam_interval: *beam_interval,
+                    first_bearing: *first_bearing,
+                    bearing_step: *bearing_step,
+                    ranges,
+                    intensities: &[],
+                }),
+                Anything::SetPose(time, x, y, theta, position_deviation, heading_deviation) => {
+                    Event::SetPose(PoseFix {
+                        time: Time::from_micros(*time),
+                        pose: Pose { x: *x, y: *y, theta: *theta },
+                        position_deviation: *position_deviation,
+                        heading_deviation: *heading_deviation,
+                    })
+                }
+            };
+            let output = localizer.handle(&event).pose;
+            let [xx, xy, yy, xt, yt, tt] = output.covariance;
+            prop_assert!(output.pose.is_finite(), "{:?}", output);
+            prop_assert!([xx, xy, yy, xt, yt, tt].iter().all(|entry| entry.is_finite()), "{:?}", output);
+            prop_assert!(xx >= 0.0 && yy >= 0.0 && tt >= 0.0);
+            prop_assert!(xx * yy - xy * xy >= -1e-9 * xx * yy);
+            prop_assert!(localizer.dynamic_landmarks().len() <= 32);
+        }
+    }
+}

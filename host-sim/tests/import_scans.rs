@@ -1,0 +1,128 @@
+//! Logs of scans: a few lines of each format, and the real files.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::io::Write;
+
+use agv_core::geometry::Pose;
+use agv_core::measurement::Time;
+use agv_host_sim::data;
+use agv_host_sim::import::{carmen, graph_log};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+fn file(name: &str, content: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, content).unwrap();
+    (folder, path)
+}
+
+const GRAPH: &str = "\
+VERTEX2 0 1 2 1.5707963267948966
+ROBOTLASER1 0 -1.5 3.0 1.0 50 0.1 0 4 1.5 81.91 2.5 3 0 7.5 7 0 7 7 0 0 0 0 0 0 100.5 host 0.25
+VERTEX2 1 1 3 0
+ROBOTLASER1 0 -1.5 3.0 1.0 50 0.1 0 2 1 2 3 7 8 9 0.5 0 0 0 0 0 0 0 0 0 0 101.75 host 1.5
+# edges
+EDGE2 0 1 1 0 -1.5 100 0 100 500 0 0
+";
+
+#[test]
+fn graph_log_gives_scans_with_the_laser_where_it_sits_on_the_corrected_robot() {
+    let (_folder, path) = file("graph.log", GRAPH.as_bytes());
+    let graph = graph_log::read(&path).unwrap();
+    let [first, second] = graph.log.scans.as_slice() else { panic!("two scans") };
+    assert_eq!(first.scan.ranges, [1.5, 81.91, 2.5, 3.0]);
+    assert_eq!((first.scan.first_bearing, first.scan.bearing_step), (-1.5, 1.0));
+    assert_eq!(first.robot, Pose::new(1.0, 2.0, FRAC_PI_2));
+    assert!((first.laser.position() - Pose::new(1.0, 2.5, 0.0).position()).norm() < 1e-12);
+    assert_eq!(first.scan.start, Time::from_seconds(0.0));
+    assert_eq!(second.scan.start, Time::from_seconds(1.25));
+    assert_eq!(second.laser, Pose::new(1.5, 3.0, 0.0));
+    assert_eq!((graph.edges[0].from, graph.edges[0].to), (0, 1));
+    assert_eq!(graph.edges[0].displacement, Pose::new(1.0, 0.0, -1.5));
+}
+
+#[test]
+fn graph_log_says_which_line_is_wrong() {
+    let (_folder, path) = file("graph.log", GRAPH.replace("2.5 3 0", "2.5 x 0").as_bytes());
+    let error = graph_log::read(&path).unwrap_err();
+    assert!(matches!(error, graph_log::GraphLogError::Malformed { line: 2, .. }), "{error}");
+    let (_folder, path) = file("graph.log", GRAPH.split_once('\n').unwrap().1.as_bytes());
+    assert!(matches!(graph_log::read(&path).unwrap_err(), graph_log::GraphLogError::NoVertex { line: 1, .. }));
+    let (_folder, path) = file("graph.log", b"VERTEX2 0 0 0 0\nROBOTLASER1 0 0 0 0 0 0 0 99999999999999999999\n");
+    assert!(matches!(graph_log::read(&path).unwrap_err(), graph_log::GraphLogError::Malformed { line: 2, .. }));
+    assert!(matches!(
+        graph_log::read(&path.with_extension("no")).unwrap_err(),
+        graph_log::GraphLogError::Unreadable { .. }
+    ));
+}
+
+const CARMEN: &str = "\
+# message formats defined: PARAM SYNC ODOM FLASER RLASER
+PARAM robot_use_laser on nohost 0
+ODOM 0 0 0 0 0 0 10.0 host 10.0
+ODOM 1 0 0 0 0 0 10.5 host 10.5
+FLASER 4 1 2 3 4 0.9 0.1 0 0.8 0.1 0 10.5 host 10.5
+ODOM 0.8 0.1 0 0 0 0 0 host 0
+ODOM 0.8 0.6 0 0 0 0 11.0 host 11.0
+RLASER 3 1 2 3 0 0 0 0 0 0 11.25 host 11.25
+ROBOTLASER1 0 -1.5 3.0 1.0 50 0.1 0 2 5 6 0 0.5 0 0 0 0 0 0 0 0 0 0 12 host 12
+";
+
+#[test]
+fn carmen_log_gives_scans_and_raw_odometry() {
+    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(CARMEN.as_bytes()).unwrap();
+    let (_plain_folder, plain) = file("carmen.log", CARMEN.as_bytes());
+    let (_packed_folder, packed) = file("carmen.log.gz", &packed.finish().unwrap());
+    let log = carmen::read(&plain).unwrap();
+    assert_eq!(carmen::read(&packed).unwrap(), log);
+
+    let [old, new] = log.front.scans.as_slice() else { panic!("two scans") };
+    assert_eq!(old.scan.ranges, [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!((old.scan.first_bearing, old.scan.bearing_step), (-FRAC_PI_2, PI / 4.0));
+    assert_eq!((old.laser, old.robot), (Pose::new(0.9, 0.1, 0.0), Pose::new(0.8, 0.1, 0.0)));
+    assert_eq!(old.scan.start, Time::from_seconds(0.5));
+    assert_eq!((new.scan.first_bearing, new.scan.bearing_step), (-1.5, 1.0));
+    assert_eq!(new.laser, Pose::new(0.5, 0.0, 0.0));
+
+    assert_eq!(log.rear.len(), 1);
+    assert_eq!(log.rear[0].scan.bearing_step, PI / 2.0, "an odd number of beams measures both ends");
+
+    let increments: Vec<_> = log.front.increments.iter().map(|increment| increment.displacement).collect();
+    assert_eq!(increments.len(), 2, "the line with time zero moves the anchor only");
+    assert!((increments[0].x - 1.0).abs() < 1e-12 && (increments[1].y - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn carmen_log_says_which_line_is_wrong() {
+    let (_folder, path) = file("carmen.log", CARMEN.replace("FLASER 4 1", "FLASER 400 1").as_bytes());
+    let error = carmen::read(&path).unwrap_err();
+    assert!(matches!(error, carmen::CarmenError::Malformed { line: 5, .. }), "{error}");
+    let (_folder, path) = file("carmen.log.gz", b"this is not gzip");
+    assert!(matches!(carmen::read(&path).unwrap_err(), carmen::CarmenError::Unreadable { .. }));
+}
+
+#[test]
+fn real_logs_have_the_scans_that_their_owners_count() {
+    let Some(folder) = data::folder() else {
+        eprintln!("real_logs_have_the_scans_that_their_owners_count: skipped, no folder of recordings (AGV_DATA)");
+        return;
+    };
+    for (name, scans, beams) in [("fr079.log", 1464, 360), ("intel-lab.log", 2672, 180)] {
+        let graph = graph_log::read(&folder.join("scans2d").join(name)).unwrap();
+        assert_eq!(graph.log.scans.len(), scans);
+        assert!(graph.log.scans.iter().all(|scan| scan.scan.ranges.len() == beams));
+        assert!(graph.edges.iter().all(|edge| edge.from < scans && edge.to < scans));
+    }
+    for (name, scans, beams, motions) in [
+        ("aces-corrected.log.gz", 440, 180, 7373),
+        ("fhw-corrected.log.gz", 488, 180, 13451),
+        ("freiburg-079-corrected.log.gz", 4791, 360, 4951),
+    ] {
+        let log = carmen::read(&folder.join("scans2d").join(name)).unwrap();
+        assert_eq!(log.front.scans.len(), scans);
+        assert!(log.front.scans.iter().all(|scan| scan.scan.ranges.len() == beams));
+        assert_eq!(log.front.increments.len(), motions);
+    }
+}
