@@ -9,8 +9,6 @@ use anyhow::Context;
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::output;
-
 /// One drive, localised in four ways.
 #[derive(clap::Args)]
 pub struct Demonstration {
@@ -48,7 +46,8 @@ impl Demonstration {
         if self.json {
             let entries: Vec<_> =
                 drives.iter().map(|drive| Entry { name: drive.name, figures: &drive.figures }).collect();
-            return output::print(&serde_json::to_string_pretty(&entries)?);
+            println!("{}", serde_json::to_string_pretty(&entries)?);
+            return Ok(());
         }
         let mut lines = vec![
             "A simulated drive, 12 m into a block storage, localised in four ways:".to_owned(),
@@ -75,6 +74,7 @@ impl Demonstration {
         }
         lines.push(format!("report   {}", report.display()));
         lines.push(format!("log      {}", log.display()));
-        output::print(&lines.join("\n"))
+        println!("{}", lines.join("\n"));
+        Ok(())
     }
 }

@@ -9,6 +9,7 @@ use agv_host_sim::mapping::{
 };
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
+use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{output, progress};
@@ -76,9 +77,6 @@ impl Map {
         let (recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
             .map(|read| (read.recording, read.damages))?;
         reading.finish_and_clear();
-        for damage in &damages {
-            eprintln!("{}: {damage}", self.log.display());
-        }
         let default = match self.kind {
             Kind::Features => Poses::Localiser,
             Kind::Reflectors if recording.truth.is_empty() => Poses::References,
@@ -92,7 +90,8 @@ impl Map {
         if let Some((poses, name)) = &poses {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());
         }
-        eprintln!("looking for landmarks");
+        let looking = ProgressBar::new_spinner().with_message("looking for landmarks");
+        looking.tick();
         let landmarks = match (self.kind, &poses) {
             (Kind::Reflectors, None) => {
                 bail!("reflectors cannot be mapped from poses that rest on them; choose --poses truth or references")
@@ -102,18 +101,24 @@ impl Map {
             (Kind::Features, Some((poses, _))) => map_features_at(&recording, poses, &Clustering::default()),
         }
         .with_context(|| self.log.display().to_string())?;
+        looking.finish_and_clear();
         ensure!(!landmarks.is_empty(), "{}: no landmark was seen often enough from known poses", self.log.display());
         map_file::write(&self.output, &landmarks)?;
+        for damage in &damages {
+            eprintln!("{}: {damage}", self.log.display());
+        }
         let summary = Summary::of(&landmarks);
         if self.json {
-            return output::print(&serde_json::to_string_pretty(&summary)?);
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+            return Ok(());
         }
         output::print_rows(&[
             ["reflectors".to_owned(), summary.reflectors.to_string()],
             ["corners".to_owned(), summary.corners.to_string()],
             ["end points".to_owned(), summary.end_points.to_string()],
             ["largest deviation".to_owned(), format!("{:.1} mm", summary.largest_deviation_mm.unwrap_or_default())],
-        ])
+        ]);
+        Ok(())
     }
 }
 

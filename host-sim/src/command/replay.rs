@@ -131,14 +131,16 @@ impl Replay {
             });
             let summary =
                 Summary { software: &software, figures: &figures, outputs: comparison, damage: damage.collect() };
-            return output::print(&serde_json::to_string_pretty(&summary)?);
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+            return Ok(());
         }
         let mut rows = remarks;
         rows.extend(figure_rows(&figures));
         if let Some(folder) = &self.report {
             rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
         }
-        output::print_rows(&rows)
+        output::print_rows(&rows);
+        Ok(())
     }
 
     fn maps(&self) -> anyhow::Result<MapUse> {

@@ -23,7 +23,7 @@ pub enum Standard {
 /// A pose and where on the way it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackPoint {
-    /// Way since the first event, by odometry, m.
+    /// Way of R since the first event, by odometry, m.
     pub way: f64,
     /// The pose.
     pub output: PoseOutput,
@@ -113,7 +113,7 @@ fn way_at(points: &[TrackPoint], time: Time) -> f64 {
     points.get(after).map_or(0.0, |point| point.way)
 }
 
-/// How far the vehicle moves with each event, by its odometry, m.
+/// How far R moves with each event, by its odometry, m.
 fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
     let parameters = &recording.parameters;
     let mut odometer =
@@ -125,7 +125,8 @@ fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
             RecordedEvent::Increment(increment) => odometer.increment(increment),
             RecordedEvent::Reflectors(_) | RecordedEvent::Scan(_) | RecordedEvent::SetPose(_) => return 0.0,
         };
-        motion.map_or(0.0, |motion| motion.distance)
+        // The chord: the motion's own distance is that of the driving wheel.
+        motion.map_or(0.0, |motion| motion.displacement.position().norm())
     })
 }
 
