@@ -106,7 +106,8 @@ fn a_single_changed_bit_of_an_output_is_found() {
     let good = outputs(&replay);
     let middle = good.len() / 2;
     let seen = good.iter().position(|output| !output.uses.is_empty()).unwrap();
-    let changes: [(usize, &dyn Fn(&mut RecordedOutput)); 4] = [
+    type Change<'a> = &'a dyn Fn(&mut RecordedOutput);
+    let changes: [(usize, Change); 4] = [
         (middle, &|output| output.pose.pose.x = f64::from_bits(output.pose.pose.x.to_bits() ^ 1)),
         (middle, &|output| output.pose.covariance[4] = f64::NAN),
         (seen, &|output| output.uses[0].residual[0] = f64::from_bits(output.uses[0].residual[0].to_bits() ^ 1)),

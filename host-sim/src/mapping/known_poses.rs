@@ -49,7 +49,7 @@ pub fn sightings(
     let sightings = replay.uses.iter().filter(|used| is_wanted(used.kind)).filter_map(|used| {
         let laser = truth_at(poses, used.time)?.compose(&recording.parameters.laser);
         let [x, y] = used.position.map(f64::from);
-        Some(Sighting { kind: used.kind, position: laser.transform(&Point::new(x, y)) })
+        Some(Sighting { kind: used.kind, position: laser.transform(&Point::new(x, y)), pose_variance: 0.0 })
     });
     Ok(sightings.collect())
 }
