@@ -21,7 +21,7 @@ pub fn compare(recorded: &[RecordedOutput], replay: &Replay) -> Comparison {
     let mut frames = [vec![0; MAX_FRAME], vec![0; MAX_FRAME]];
     let differs = |output: &&RecordedOutput| {
         let [first, second] = &mut frames;
-        !replay.output(output.event).is_some_and(|again| bytes(output.view(), first) == bytes(again, second))
+        replay.output(output.event).is_none_or(|again| bytes(output.view(), first) != bytes(again, second))
     };
     Comparison { compared: recorded.len(), first_difference: recorded.iter().find(differs).map(|output| output.event) }
 }
