@@ -145,7 +145,7 @@ fn without_landmarks_it_reckons_and_says_how_far() {
     let mut reckoned = Drive::start();
     let mut strict = parameters();
     strict.limits.lost_after = 3.0;
-    reckoned.localizer = Box::new(Small::new(strict));
+    *reckoned.localizer = Small::new(strict);
     reckoned.set_pose(Pose::default());
     let output = reckoned.revolutions(30, |_| false);
     assert_eq!((output.mode, output.reason), (Mode::Lost, Reason::NoLandmarks));
