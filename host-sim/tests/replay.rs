@@ -118,6 +118,10 @@ fn a_single_changed_bit_of_an_output_is_found() {
         change(&mut bad[event]);
         assert_eq!(compare(&bad, &replay).first_difference, Some(event));
     }
+    assert_found(middle, &|output| output.pose.pose.x = next(output.pose.pose.x));
+    assert_found(middle, &|output| output.pose.covariance[4] = f64::NAN);
+    assert_found(seen, &|output| output.uses[0].residual[0] = next(output.uses[0].residual[0]));
+    assert_found(seen, &|output| output.uses.truncate(output.uses.len() - 1));
 }
 
 #[test]
@@ -191,6 +195,30 @@ fn the_errors_of_a_replay_are_those_of_its_truth() {
         assert!((error - 300.0).abs() < 40.0, "{key}: {error} mm");
     }
     assert_eq!(figures["accuracy"]["ok_share"], 0.0);
+}
+
+#[test]
+fn a_log_without_a_pose_can_be_given_one() {
+    let files = Files::new();
+    let log = files.path("drive.agvlog");
+    let mut recording = drive();
+    recording.events.retain(|event| !matches!(event, agv_host_sim::recording::RecordedEvent::SetPose(_)));
+    log::write(Path::new(&log), &recording).unwrap();
+    let without = agv(&["replay", &log]);
+    assert!(text(&without.stdout).contains("--start"), "{}", text(&without.stdout));
+    // The drive begins at (-3, 0), and ends where nobody has been told.
+    for start in ["-2.9,0.1,1.5", "recorded"] {
+        let run = agv(&["replay", &log, "--json", &format!("--start={start}")]);
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let end = json(&run.stdout)["accuracy"]["position_end_mm"].as_f64().unwrap();
+        assert!(end < 20.0, "{start}: {end} mm");
+    }
+    for bad in ["1,2", "a,b,c", "1,2,inf", ""] {
+        assert_eq!(agv(&["replay", &log, &format!("--start={bad}")]).status.code(), Some(2), "{bad}");
+    }
+    recording.truth.clear();
+    log::write(Path::new(&log), &recording).unwrap();
+    assert!(refusal(&["replay", &log, "--start", "recorded"]).contains("no pose with a heading"));
 }
 
 #[test]
@@ -404,4 +432,24 @@ fn bad_logs_are_refused_in_one_line() {
     assert!(refusal(&["replay", &good, "--output", &files.path("no/such/folder.agvlog")]).contains("folder.agvlog"));
     let file = files.write("file", b"in the way");
     assert!(refusal(&["replay", &good, "--report", &file]).contains("file/index.html"));
+}
+
+#[test]
+fn the_default_run_compares_four_ways_and_leaves_a_log() {
+    let files = Files::new();
+    let folder = files.path("report");
+    let run = agv(&["--report", &folder, "--json"]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let ways = json(&run.stdout);
+    let end = |name: &str| {
+        let way = ways.as_array().unwrap().iter().find(|way| way["name"] == name).unwrap();
+        way["accuracy"]["position_end_mm"].as_f64().unwrap()
+    };
+    for name in ["reflectors", "static features", "mixed"] {
+        assert!(end(name) < 20.0 && end(name) < end("odometry alone"), "{name}: {} mm", end(name));
+    }
+    assert!(std::fs::read_to_string(format!("{folder}/index.html")).unwrap().contains("<figure>"));
+    let again = agv(&["replay", &format!("{folder}/drive.agvlog")]);
+    assert!(text(&again.stdout).contains("recorded ones, bit for bit"), "{}", text(&again.stdout));
+    assert!(refusal(&["--report", &files.write("file", b"in the way")]).contains("file"));
 }

@@ -61,11 +61,12 @@ impl Demonstration {
                 "localised by", "median", "95 %", "max", "end", "median", "95 %", "max", "end", "(3)", "0.1 deg"
             ),
         ];
-        for row in demonstration::table(&drives).rows {
-            let [name, values @ .., ok] = &row[..] else { continue };
+        for (drive, row) in drives.iter().zip(demonstration::table(&drives).rows) {
+            let [_, values @ .., ok] = &row[..] else { continue };
+            let name = drive.name;
             let [p50, p95, pmax, pend, h50, h95, hmax, hend, nees] = values else { continue };
             lines.push(format!(
-                "{name:<16} {p50:>8} {p95:>6} {pmax:>6} {pend:>6}   {h50:>8} {h95:>6} {hmax:>6} {hend:>6}   {nees:>5}   {ok:>9}"
+                "{name:<16} {p50:>8} {p95:>6} {pmax:>6} {pend:>6}   {h50:>8} {h95:>6} {hmax:>6} {hend:>6}   {nees:>5}   {ok:>7} %"
             ));
         }
         if let Some(drive) = drives.last() {

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::localizer::MapUse;
+use agv_core::localizer::{MapUse, PoseFix};
 use agv_core::record::Damage;
 use agv_host_sim::evaluate::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
-use agv_host_sim::mapping::map_file;
-use agv_host_sim::recording::Recording;
+use agv_host_sim::mapping::{map_file, referenced_poses};
+use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
 use agv_host_sim::replay::{Comparison, compare, replay};
 use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
@@ -22,6 +23,7 @@ Examples:
   agv replay drive.agvlog
   agv replay drive.agvlog --report drive-report
   agv replay drive.agvlog --map features.csv --json
+  agv replay intel.agvlog --start recorded --landmarks dynamic
   agv replay drive.agvlog --landmarks none --output odometry.agvlog
 
 Keys of --json:
@@ -51,6 +53,10 @@ pub struct Replay {
     /// Which landmarks correct the pose, instead of what the log states.
     #[arg(long, value_name = "KIND,...", value_delimiter = ',')]
     landmarks: Vec<Landmarks>,
+    /// Where the vehicle is at the start, for logs that do not say it: X,Y,HEADING of the logical point in m, m and deg,
+    /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose.
+    #[arg(long, value_name = "POSE", value_parser = start, allow_hyphen_values = true)]
+    start: Option<Start>,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -66,6 +72,26 @@ enum Landmarks {
     Features,
     /// Natural features that are found while driving.
     Dynamic,
+}
+
+/// Where the vehicle is at the start.
+#[derive(Clone, Copy, Debug)]
+enum Start {
+    Recorded,
+    Given(Pose),
+}
+
+fn start(text: &str) -> Result<Start, String> {
+    if text == "recorded" {
+        return Ok(Start::Recorded);
+    }
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse::<f64>()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, heading]) if [x, y, heading].iter().all(|value| value.is_finite()) => {
+            Ok(Start::Given(Pose::new(x, y, heading.to_radians())))
+        }
+        _ => Err("three numbers, or 'recorded', are expected".to_owned()),
+    }
 }
 
 #[derive(Serialize)]
@@ -97,7 +123,10 @@ impl Replay {
         let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let Contents { software, mut recording, outputs, damages } = contents;
-        let is_as_recorded = self.map.is_empty() && self.landmarks.is_empty();
+        let is_as_recorded = self.map.is_empty() && self.landmarks.is_empty() && self.start.is_none();
+        if let Some(start) = self.start {
+            set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
+        }
         for path in &self.map {
             use_map(&mut recording, map_file::read(path)?);
         }
@@ -115,7 +144,10 @@ impl Replay {
         }
         let track = Track::new(&recording, &replay);
         let figures = Figures::new(&recording, &replay, &track);
-        let remarks = self.remarks(&software, comparison, &damages);
+        let mut remarks = self.remarks(&software, comparison, &damages);
+        if figures.poses == 0 {
+            remarks.push(["start".to_owned(), "no pose is given in the log; --start gives one".to_owned()]);
+        }
         if let Some(folder) = &self.report {
             let name = self.log.file_name().unwrap_or_default().to_string_lossy();
             let mut page = Page::new(&format!("Replay of {name}"));
@@ -174,6 +206,30 @@ impl Replay {
         }
         rows
     }
+}
+
+/// Standard deviations of a start pose that somebody states, m and rad.
+const STATED_DEVIATIONS: (f64, f64) = (0.3, 5.0 * std::f64::consts::PI / 180.0);
+
+/// Standard deviations of a start pose that has been measured, m and rad.
+const RECORDED_DEVIATIONS: (f64, f64) = (0.05, 1.0 * std::f64::consts::PI / 180.0);
+
+/// Puts a start pose before all events; other poses that the log gives stay.
+fn set_start(recording: &mut Recording, start: Start) -> anyhow::Result<()> {
+    let known = || recording.truth.first().copied().or_else(|| referenced_poses(recording).first().copied());
+    let (time, pose, (position_deviation, heading_deviation)) = match start {
+        Start::Given(pose) => {
+            let first = recording.events.iter().filter_map(RecordedEvent::time).min();
+            (first.context("the log has no events")?, pose, STATED_DEVIATIONS)
+        }
+        Start::Recorded => {
+            let Truth { time, pose } = known().context("there is no pose with a heading in the log")?;
+            (time, pose, RECORDED_DEVIATIONS)
+        }
+    };
+    let fix = PoseFix { time, pose, position_deviation, heading_deviation };
+    recording.events.insert(0, RecordedEvent::SetPose(fix));
+    Ok(())
 }
 
 /// Places of damage that are listed at the most.

@@ -86,7 +86,7 @@ pub fn run(mut begin: impl FnMut(&'static str)) -> Result<Vec<LocalisedDrive>, D
 /// Figures of each drive: a heading and rows.
 #[must_use]
 pub fn table(drives: &[LocalisedDrive]) -> Table {
-    let heading = ["", "mm: median", "95 %", "max", "end", "deg: median", "95 %", "max", "end", "NEES", "ok"];
+    let heading = ["", "mm: median", "95 %", "max", "end", "deg: median", "95 %", "max", "end", "NEES", "ok, %"];
     let unknown = Spread { median: f64::NAN, p95: f64::NAN, max: f64::NAN };
     let row = |drive: &LocalisedDrive| {
         let accuracy = drive.figures.accuracy.as_ref();
@@ -107,7 +107,7 @@ pub fn table(drives: &[LocalisedDrive]) -> Table {
             three(heading.max),
             three(heading_end.unwrap_or(f64::NAN)),
             one(accuracy.and_then(|accuracy| accuracy.nees).unwrap_or(f64::NAN)),
-            format!("{:.0} %", 100.0 * accuracy.and_then(|accuracy| accuracy.ok_share).unwrap_or(f64::NAN)),
+            format!("{:.0}", 100.0 * accuracy.and_then(|accuracy| accuracy.ok_share).unwrap_or(f64::NAN)),
         ]
     };
     Table { heading: heading.map(unbroken).to_vec(), rows: drives.iter().map(row).collect() }
@@ -132,7 +132,7 @@ pub fn page(drives: &[LocalisedDrive]) -> Result<Page, FigureError> {
     page.section("Localised in four ways").table(&table(drives));
     page.paragraph(
         "Distance from the true position and difference from the true heading over the whole way, and at its end. NEES is \
-         the mean normalised error squared: 3 is expected, less is cautious. Ok are the poses within 2 cm and 0.1 deg.",
+         the mean normalised error squared: 3 is expected, less is cautious. Ok is the share of the poses within 2 cm and 0.1 deg.",
     );
     let lines = |line: fn(&Track) -> Vec<(f64, f64)>| drives.iter().map(|drive| line(&drive.track)).collect::<Vec<_>>();
     let (positions, headings) = (lines(position_error_line), lines(heading_error_line));

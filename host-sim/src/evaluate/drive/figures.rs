@@ -161,8 +161,10 @@ fn modes(recording: &Recording, replay: &Replay) -> (Vec<ModeTime>, Vec<ModeChan
         let Some(now) = now else {
             continue;
         };
+        // Events of different sensors may overtake each other.
+        let now = last.map_or(now, |(before, _)| before.max(now));
         if let Some((before, mode)) = last {
-            let spent = now.since(before).max(0.0);
+            let spent = now.since(before);
             durations.iter_mut().filter(|entry| entry.mode == mode).for_each(|entry| entry.duration_s += spent);
         }
         last = Some((now, pose.mode));
