@@ -106,18 +106,12 @@ fn a_single_changed_bit_of_an_output_is_found() {
     let good = outputs(&replay);
     let middle = good.len() / 2;
     let seen = good.iter().position(|output| !output.uses.is_empty()).unwrap();
-    type Change<'a> = &'a dyn Fn(&mut RecordedOutput);
-    let changes: [(usize, Change); 4] = [
-        (middle, &|output| output.pose.pose.x = f64::from_bits(output.pose.pose.x.to_bits() ^ 1)),
-        (middle, &|output| output.pose.covariance[4] = f64::NAN),
-        (seen, &|output| output.uses[0].residual[0] = f64::from_bits(output.uses[0].residual[0].to_bits() ^ 1)),
-        (seen, &|output| output.uses.truncate(output.uses.len() - 1)),
-    ];
-    for (event, change) in changes {
+    let next = |value: f64| f64::from_bits(value.to_bits() ^ 1);
+    let assert_found = |event: usize, change: &dyn Fn(&mut RecordedOutput)| {
         let mut bad = good.clone();
         change(&mut bad[event]);
         assert_eq!(compare(&bad, &replay).first_difference, Some(event));
-    }
+    };
     assert_found(middle, &|output| output.pose.pose.x = next(output.pose.pose.x));
     assert_found(middle, &|output| output.pose.covariance[4] = f64::NAN);
     assert_found(seen, &|output| output.uses[0].residual[0] = next(output.uses[0].residual[0]));
