@@ -303,3 +303,11 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn all_of_its_memory_fits_a_controller() {
+    // Half of the STM32H743's largest RAM, 512 KiB.
+    let size = size_of::<Localizer>();
+    println!("{size} bytes");
+    assert!(size <= 256 * 1024, "{size} bytes");
+}
