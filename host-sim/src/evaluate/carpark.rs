@@ -14,9 +14,10 @@ use agv_core::odometry::OdometryNoise;
 use serde::Serialize;
 
 use super::accuracy::{Spread, pose_at, truth_at};
-use crate::import::{ImportError, carpark};
+use crate::import::carpark;
 use crate::recording::{RecordedEvent, Recording, Truth};
 use crate::replay::{Replay, ReplayError, replay};
+use crate::text_file::TextFileError;
 
 /// What is believed of the vehicle's own sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,7 +59,7 @@ pub struct Outcome {
 pub enum CarparkError {
     /// The data cannot be read.
     #[error(transparent)]
-    Import(#[from] ImportError),
+    Import(#[from] TextFileError),
     /// The recording cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),

@@ -10,92 +10,37 @@
 
 use std::collections::HashSet;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_core::landmarks::{Landmark, LandmarkKind};
 
-use crate::file_kind;
+use crate::text_file::{self, TextFileError};
 
 /// First line of every map.
 pub const HEADER: &str = "id,kind,x_m,y_m,deviation_m";
 
-/// Why a map cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum MapFileError {
-    /// The file does not exist.
-    #[error("{}: there is no such file", path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The operating system refused.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
-    /// The file is empty.
-    #[error("{}: the file is empty", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file is no map.
-    #[error("{}: this is not a map, whose first line is '{HEADER}', but {looks_like}", path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-        /// What it seems to be.
-        looks_like: &'static str,
-    },
-    /// A line is not a landmark.
-    #[error("{}:{line}: {problem}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        problem: String,
-    },
-}
-
-fn io_error(path: &Path, source: std::io::Error) -> MapFileError {
-    let path = path.to_owned();
-    if source.kind() == std::io::ErrorKind::NotFound {
-        MapFileError::Missing { path }
-    } else {
-        MapFileError::Io { path, source }
-    }
-}
-
 /// Reads a map.
 ///
 /// # Errors
-/// See [`MapFileError`].
-pub fn read(path: &Path) -> Result<Vec<Landmark>, MapFileError> {
-    let bytes = std::fs::read(path).map_err(|source| io_error(path, source))?;
-    if bytes.trim_ascii().is_empty() {
-        return Err(MapFileError::Empty { path: path.to_owned() });
-    }
-    let foreign = || {
-        let looks_like = file_kind::describe(&bytes[..bytes.len().min(4096)]);
-        MapFileError::Foreign { path: path.to_owned(), looks_like }
-    };
-    let text = std::str::from_utf8(&bytes).map_err(|_| foreign())?;
+/// See [`TextFileError`].
+pub fn read(path: &Path) -> Result<Vec<Landmark>, TextFileError> {
+    let expected = "a map";
+    let text = text_file::read(path, expected)?;
     let mut lines = text.lines().zip(1..);
     if lines.next().is_none_or(|(header, _)| header.trim() != HEADER) {
-        return Err(foreign());
+        return Err(TextFileError::Foreign {
+            path: path.to_owned(),
+            expected,
+            looks_like: "text without a map's heading",
+        });
     }
     let mut known = HashSet::new();
     let mut landmarks = Vec::new();
     for (text, line) in lines.filter(|(text, _)| !text.trim().is_empty()) {
-        let landmark = parse(text).map_err(|problem| MapFileError::Line { path: path.to_owned(), line, problem })?;
+        let landmark = parse(text).map_err(|problem| TextFileError::of_line(path, line, problem))?;
         if !known.insert((landmark.kind == LandmarkKind::Reflector, landmark.id)) {
             let problem = format!("there is another landmark {}", landmark.id);
-            return Err(MapFileError::Line { path: path.to_owned(), line, problem });
+            return Err(TextFileError::of_line(path, line, problem));
         }
         landmarks.push(landmark);
     }
@@ -133,8 +78,8 @@ fn parse(text: &str) -> Result<Landmark, String> {
 /// Writes a map; an older file of that name is replaced. Lengths are rounded to a micrometre.
 ///
 /// # Errors
-/// [`MapFileError::Io`] if the file cannot be written.
-pub fn write(path: &Path, landmarks: &[Landmark]) -> Result<(), MapFileError> {
+/// [`TextFileError::Io`] if the file cannot be written.
+pub fn write(path: &Path, landmarks: &[Landmark]) -> Result<(), TextFileError> {
     let mut text = format!("{HEADER}\n");
     for Landmark { id, kind, x, y, deviation } in landmarks {
         let kind = match kind {
@@ -144,5 +89,5 @@ pub fn write(path: &Path, landmarks: &[Landmark]) -> Result<(), MapFileError> {
         };
         let _ = writeln!(text, "{id},{kind},{x:.6},{y:.6},{deviation:.6}");
     }
-    std::fs::write(path, text).map_err(|source| MapFileError::Io { path: path.to_owned(), source })
+    std::fs::write(path, text).map_err(|source| TextFileError::Io { path: path.to_owned(), source })
 }
