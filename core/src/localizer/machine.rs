@@ -273,7 +273,12 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             let is_accepted = outcome == Ok(true);
             let is_fixed = association.nearest.is_none_or(|landmark| landmark.source == LandmarkSource::Fixed);
             let is_reflector = sighting.kind == LandmarkKind::Reflector;
-            if outcome.is_ok() && is_fixed && (is_reflector || association.nearest.is_some()) {
+            // Two landmarks that fit equally say nothing against the pose, nor does a feature that no map has.
+            let is_evidence = outcome.is_ok()
+                && is_fixed
+                && association.verdict != Verdict::Ambiguous
+                && (is_reflector || association.nearest.is_some());
+            if is_evidence {
                 expected += 1;
                 accepted += usize::from(is_accepted);
             }
@@ -300,6 +305,10 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 position: [position.x as f32, position.y as f32],
                 located,
                 residual: association.nearest.map_or([0.0; 2], |landmark| landmark.innovation.residual.into()),
+                residual_deviation: association.nearest.map_or([0.0; 2], |landmark| {
+                    let covariance = &landmark.innovation.covariance;
+                    [libm::sqrt(covariance.m11), libm::sqrt(covariance.m22)]
+                }),
                 test_ratio: association
                     .nearest
                     .map_or(0.0, |landmark| landmark.innovation.normalised_square / self.parameters.association.gate),

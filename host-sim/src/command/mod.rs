@@ -4,9 +4,13 @@
 //! progress to standard error.
 
 pub mod can;
+pub mod demonstration;
 pub mod evaluate;
 pub mod features;
 pub mod import;
 pub mod map;
+mod output;
+pub mod panic_message;
+mod progress;
 pub mod replay;
 pub mod simulate;

@@ -196,9 +196,7 @@ fn aisle_reflectors(world: &mut World, half_lane: f64, columns: &[Rectangle; 3],
     ] {
         add_reflector(world, before_face(rectangle, along, across));
     }
-    for (x, y) in
-        [(-0.25, half_lane + 0.3), (-0.35, -half_lane - 0.45), (-7.7, 3.4), (-7.7, -2.6), (-7.7, 0.6), (-7.7, -0.5)]
-    {
+    for (x, y) in [(-0.25, half_lane + 0.3), (-0.35, -half_lane - 0.45), (-7.7, 3.4), (-7.7, -2.6)] {
         add_reflector(world, Point::new(x, y));
     }
 }
