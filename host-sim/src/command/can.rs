@@ -11,7 +11,7 @@ use agv_core::wire::can::controller::{Content, PoseReceiver};
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
 use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_core::wire::can::frame::{AnyFrame, Frame};
-use agv_core::wire::can::sdo::{Request, Response};
+use agv_core::wire::can::sdo::{Object, Request, Response};
 use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::bus::{self, Bus};
 use agv_host_sim::emulate::encoder::EmulatedEncoder;
@@ -178,20 +178,8 @@ fn meaning(frame: &Frame, controller: NodeId) -> Option<String> {
         return Some(format!("{content:?} #{counter}"));
     }
     Some(match Message::decode(frame).ok()? {
-        Message::SdoRequest { node, bytes } => {
-            format!(
-                "SDO to {}: {}",
-                node.number(),
-                Request::decode(bytes).map_or("?".to_owned(), |r| format!("{r:X?}"))
-            )
-        }
-        Message::SdoResponse { node, bytes } => {
-            format!(
-                "SDO of {}: {}",
-                node.number(),
-                Response::decode(bytes).map_or("?".to_owned(), |r| format!("{r:X?}"))
-            )
-        }
+        Message::SdoRequest { node, bytes } => format!("SDO to {}: {}", node.number(), request(bytes)),
+        Message::SdoResponse { node, bytes } => format!("SDO of {}: {}", node.number(), response(bytes)),
         Message::Nmt { command, node: None } => format!("NMT {command:?}, all nodes"),
         Message::Nmt { command, node: Some(node) } => format!("NMT {command:?}, node {}", node.number()),
         Message::Sync { .. } => "SYNC".to_owned(),
@@ -202,6 +190,29 @@ fn meaning(frame: &Frame, controller: NodeId) -> Option<String> {
         Message::ReceivePdo { node, number, .. } => format!("PDO {number} to {}", node.number()),
         Message::Heartbeat { node, state } => format!("node {} is {state:?}", node.number()),
     })
+}
+
+fn place(object: Object) -> String {
+    format!("{:04X}:{:02X}", object.index, object.sub)
+}
+
+fn request(bytes: [u8; 8]) -> String {
+    match Request::decode(bytes) {
+        Ok(Request::Read(object)) => format!("read {}", place(object)),
+        Ok(Request::Write(object, value)) => format!("write {} = {:X}h", place(object), value.unsigned()),
+        Ok(Request::Abort(object, reason)) => format!("{} given up, {reason:?}", place(object)),
+        Err(_) => "part of a longer transfer".to_owned(),
+    }
+}
+
+fn response(bytes: [u8; 8]) -> String {
+    match Response::decode(bytes) {
+        Ok(Response::Read(object, value)) => format!("{} = {:X}h", place(object), value.unsigned()),
+        Ok(Response::Segmented(object)) => format!("{} is longer than four bytes", place(object)),
+        Ok(Response::Written(object)) => format!("{} written", place(object)),
+        Ok(Response::Abort(object, reason)) => format!("{} refused, {reason:?}", place(object)),
+        Err(_) => "part of a longer transfer".to_owned(),
+    }
 }
 
 impl Encoders {

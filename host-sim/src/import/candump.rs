@@ -8,13 +8,16 @@
 //! ```
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_core::measurement::{EncoderSample, Time};
 use agv_core::wire::can::canopen::Message;
 use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_core::wire::can::frame::{AnyFrame, FdFrame, Frame, Id, extended_id, standard_id};
+use agv_core::wire::can::nmt::NmtState;
 use agv_core::wire::can::sdo::{AbortCode, Request, Response};
+
+use crate::text_file::{self, TextFileError};
 
 /// One frame as it was seen on an interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,43 +30,18 @@ pub struct SeenFrame {
     pub frame: AnyFrame,
 }
 
-/// Why a log of `candump` cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum CandumpError {
-    /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A line is no frame.
-    #[error("{}:{line}: this is no frame as candump writes it", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-    },
-}
-
 /// The frames of a log, in the order of the file. Error frames are left out.
 ///
 /// # Errors
 /// If the file cannot be read or a line is no frame.
-pub fn read(path: &Path) -> Result<Vec<SeenFrame>, CandumpError> {
-    let unreadable = |source| CandumpError::Unreadable { path: path.to_owned(), source };
-    let text = String::from_utf8_lossy(&std::fs::read(path).map_err(unreadable)?).into_owned();
+pub fn read(path: &Path) -> Result<Vec<SeenFrame>, TextFileError> {
+    let text = text_file::read_unpacked(path, "a log of candump")?;
     let mut frames = Vec::new();
-    for (line, text) in (1..).zip(text.lines()) {
-        if text.trim().is_empty() {
-            continue;
-        }
+    for (line, text) in (1..).zip(text.lines()).filter(|(_, text)| !text.trim().is_empty()) {
         match parse_line(text) {
             Some(Line::Frame(frame)) => frames.push(frame),
             Some(Line::Error) => {}
-            None => return Err(CandumpError::Malformed { path: path.to_owned(), line }),
+            None => return Err(TextFileError::of_line(path, line, "this is no frame as candump writes it")),
         }
     }
     Ok(frames)
@@ -211,8 +189,7 @@ pub fn encoder_samples(
     let Some(start) = frames.iter().find_map(|seen| seen.time) else { return Vec::new() };
     let mut pair = EncoderPair::new(drive, steering, 1.0, start);
     for settings in [drive, steering] {
-        let boot_up =
-            Message::Heartbeat { node: settings.encoder.node, state: agv_core::wire::can::nmt::NmtState::BootUp };
+        let boot_up = Message::Heartbeat { node: settings.encoder.node, state: NmtState::BootUp };
         pair.handle(&boot_up.encode(), start);
     }
     // The pair asks for what nobody can tell any more, and takes the defaults.
