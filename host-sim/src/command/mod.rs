@@ -13,3 +13,4 @@ pub mod panic_message;
 mod progress;
 pub mod replay;
 pub mod simulate;
+mod summary;
