@@ -1,0 +1,170 @@
+//! The sensor's clock in the vehicle's time.
+
+use heapless::Vec;
+
+use super::DeviceTime;
+use crate::measurement::Time;
+
+/// How many exchanges are remembered.
+const EXCHANGES: usize = 32;
+/// Exchanges over less time than this, s, say nothing about drift.
+const DRIFT_SPAN: f64 = 10.0;
+/// No crystal drifts by more.
+const GREATEST_DRIFT: f64 = 500e-6;
+/// An exchange that disagrees by more than this and half of its round trip, s, is of a clock that was started again.
+const RESTART: f64 = 0.05;
+/// Exchanges that took longer, s, are of no use.
+const SLOWEST: f64 = 1.0;
+
+/// Why an exchange was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClockError {
+    /// The answer took too long, or came before the question.
+    RoundTrip,
+    /// The sensor's clock does not go on where it was; all earlier exchanges are forgotten, this one is used.
+    Restarted,
+}
+
+/// Question and answer about the time.
+#[derive(Clone, Copy, Debug)]
+struct Exchange {
+    /// The sensor's clock without wraps, ms.
+    device: i64,
+    /// The middle between question and answer, us.
+    local: i64,
+    /// Time between question and answer, us.
+    round_trip: i64,
+}
+
+/// Local time as a line over the sensor's time.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    device: f64,
+    local: f64,
+    drift: f64,
+}
+
+/// Keeps the offset between the sensor's clock and the vehicle's.
+///
+/// The sensor is taken to read its clock in the middle of the round trip. Exchanges whose round trip is near the
+/// smallest count; a line through them gives offset and drift. The error is at most half of the smallest round trip,
+/// and a millisecond, the sensor's resolution.
+#[derive(Clone, Debug, Default)]
+pub struct SensorClock {
+    exchanges: Vec<Exchange, EXCHANGES>,
+    oldest: usize,
+    newest: Option<(DeviceTime, i64)>,
+    line: Option<Line>,
+}
+
+impl SensorClock {
+    /// A clock of which nothing is known.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { exchanges: Vec::new(), oldest: 0, newest: None, line: None }
+    }
+
+    /// How much faster the vehicle's clock is than the sensor's, as a share.
+    #[must_use]
+    pub fn drift(&self) -> f64 {
+        self.line.map_or(0.0, |line| line.drift)
+    }
+
+    /// Whether times can be converted.
+    #[must_use]
+    pub const fn is_known(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// Takes an exchange: the question left at `sent`, the answer came at `received` and said `device`.
+    ///
+    /// # Errors
+    /// If the exchange cannot be used, or says that the sensor's clock was started again.
+    pub fn record(&mut self, sent: Time, received: Time, device: DeviceTime) -> Result<(), ClockError> {
+        let round_trip = received.since(sent);
+        if !(0.0..=SLOWEST).contains(&round_trip) {
+            return Err(ClockError::RoundTrip);
+        }
+        let middle = sent.offset(0.5 * round_trip);
+        let is_restarted = self
+            .to_local(device)
+            .is_some_and(|expected| libm::fabs(expected.since(middle)) > RESTART + 0.5 * round_trip);
+        if is_restarted {
+            *self = Self::new();
+        }
+        let extended = self.extend(device);
+        self.newest = Some((device, extended));
+        let exchange = Exchange {
+            device: extended,
+            local: middle.micros().cast_signed(),
+            round_trip: received.micros().abs_diff(sent.micros()).cast_signed(),
+        };
+        if let Err(exchange) = self.exchanges.push(exchange) {
+            if let Some(place) = self.exchanges.get_mut(self.oldest) {
+                *place = exchange;
+            }
+            self.oldest = (self.oldest + 1) % EXCHANGES;
+        }
+        self.line = self.fit();
+        if is_restarted { Err(ClockError::Restarted) } else { Ok(()) }
+    }
+
+    /// When the sensor's clock showed `device`. Right within 24 days of the last exchange. None before the first one.
+    #[must_use]
+    pub fn to_local(&self, device: DeviceTime) -> Option<Time> {
+        let line = self.line?;
+        let elapsed = (self.extend(device) as f64 - line.device) * 1e-3;
+        let micros = line.local + elapsed * (1.0 + line.drift) * 1e6;
+        Some(Time::from_micros(libm::round(micros) as u64))
+    }
+
+    /// What the sensor's clock shows at `time`. None before the first exchange.
+    #[must_use]
+    pub fn to_device(&self, time: Time) -> Option<DeviceTime> {
+        let line = self.line?;
+        let elapsed = (time.micros() as f64 - line.local) * 1e-3 / (1.0 + line.drift);
+        let extended = libm::round(line.device + elapsed) as i64;
+        // The sensor's counter is what is left of the number without wraps.
+        Some(DeviceTime(extended as u32))
+    }
+
+    fn extend(&self, device: DeviceTime) -> i64 {
+        match self.newest {
+            Some((newest, extended)) => extended + i64::from(device.since(newest)),
+            None => i64::from(device.0),
+        }
+    }
+
+    fn fit(&self) -> Option<Line> {
+        let smallest = self.exchanges.iter().map(|exchange| exchange.round_trip).min()?;
+        let good = || self.exchanges.iter().filter(|exchange| exchange.round_trip <= 2 * smallest + 1000);
+        let origin = good().next()?;
+        // Differences to one of them are small, so they are exact.
+        let points = || {
+            good().map(|exchange| {
+                let device = (exchange.device - origin.device) as f64 * 1e-3;
+                (device, (exchange.local - origin.local) as f64 * 1e-6 - device)
+            })
+        };
+        let count = points().count() as f64;
+        let (device_sum, lead_sum) = points().fold((0.0, 0.0), |sum, point| (sum.0 + point.0, sum.1 + point.1));
+        let (device_mean, lead_mean) = (device_sum / count, lead_sum / count);
+        let (first, last) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), point| {
+            (libm::fmin(first, point.0), libm::fmax(last, point.0))
+        });
+        let drift = if last - first < DRIFT_SPAN {
+            0.0
+        } else {
+            let (square, product) = points().fold((0.0, 0.0), |(square, product), point| {
+                let device = point.0 - device_mean;
+                (square + device * device, product + device * (point.1 - lead_mean))
+            });
+            (product / square).clamp(-GREATEST_DRIFT, GREATEST_DRIFT)
+        };
+        Some(Line {
+            device: origin.device as f64 + device_mean * 1e3,
+            local: origin.local as f64 + (device_mean + lead_mean) * 1e6,
+            drift,
+        })
+    }
+}
