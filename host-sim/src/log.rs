@@ -349,7 +349,7 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
 }
 
 /// Reads a whole log, and everything that is wrong with it. A log without an end record is cut, even if it is cut between
-/// two records. Outputs and notes are left out.
+/// two records. Outputs, notes and raw bytes are left out.
 ///
 /// # Errors
 /// If the file is missing, empty, foreign, of another version, without a readable header, or holds two different drives.
@@ -374,7 +374,7 @@ pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
                 Record::Truth(one) => truth.push(one),
                 Record::Reference(one) => references.push(one),
                 Record::End => is_complete = true,
-                Record::Output(_) | Record::Note(_) => {}
+                Record::Output(_) | Record::Note(_) | Record::Raw(_) => {}
             },
         }
     }

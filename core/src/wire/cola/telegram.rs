@@ -93,8 +93,9 @@ impl<'a> Telegram<'a> {
         let (letters, rest) = payload.split_first_chunk::<3>().ok_or(ReadError::End)?;
         let command = CommandWord::find(*letters).ok_or(ReadError::Value)?;
         if command == CommandWord::Fault {
-            // CoLa-B has no space before the number.
-            let rest = if rest.len() > 2 { rest.strip_prefix(b" ").unwrap_or(rest) } else { rest };
+            // CoLa-B has no space before the number, and the number itself may look like one.
+            let has_space = dialect == Dialect::Ascii || rest.len() > 2;
+            let rest = if has_space { rest.strip_prefix(b" ").unwrap_or(rest) } else { rest };
             return Ok(Self { command, name: "", arguments: Reader::new(dialect, rest) });
         }
         let rest = rest.strip_prefix(b" ").ok_or(ReadError::Text)?;

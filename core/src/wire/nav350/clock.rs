@@ -9,6 +9,13 @@ use crate::measurement::Time;
 const EXCHANGES: usize = 32;
 /// Exchanges over less time than this, s, say nothing about drift.
 const DRIFT_SPAN: f64 = 10.0;
+/// Nor do fewer than these.
+const DRIFT_EXCHANGES: usize = 8;
+/// How wrong the drift may be before it was measured, and after.
+const UNKNOWN_DRIFT: f64 = 200e-6;
+const FITTED_DRIFT: f64 = 30e-6;
+/// Exchanges whose uncertainties differ by less, s, count alike.
+const SIMILAR: f64 = 0.5e-3;
 /// No crystal drifts by more.
 const GREATEST_DRIFT: f64 = 500e-6;
 /// An exchange that disagrees by more than this and half of its round trip, s, is of a clock that was started again.
@@ -46,9 +53,10 @@ struct Line {
 
 /// Keeps the offset between the sensor's clock and the vehicle's.
 ///
-/// The sensor is taken to read its clock in the middle of the round trip. Exchanges whose round trip is near the
-/// smallest count; a line through them gives offset and drift. The error is at most half of the smallest round trip,
-/// and a millisecond, the sensor's resolution.
+/// The sensor is taken to read its clock in the middle of the round trip, so an exchange is wrong by half of its round
+/// trip at the most, and by what the clocks have drifted apart since. The offset is the mean of the exchanges for which
+/// this is smallest; the drift is the slope of those with small round trips. The sensor's resolution, a millisecond,
+/// comes on top.
 #[derive(Clone, Debug, Default)]
 pub struct SensorClock {
     exchanges: Vec<Exchange, EXCHANGES>,
@@ -135,36 +143,48 @@ impl SensorClock {
         }
     }
 
+    /// The line through the exchanges.
     fn fit(&self) -> Option<Line> {
-        let smallest = self.exchanges.iter().map(|exchange| exchange.round_trip).min()?;
-        let good = || self.exchanges.iter().filter(|exchange| exchange.round_trip <= 2 * smallest + 1000);
-        let origin = good().next()?;
+        let (_, newest) = self.newest?;
+        let origin = *self.exchanges.first()?;
         // Differences to one of them are small, so they are exact.
-        let points = || {
-            good().map(|exchange| {
-                let device = (exchange.device - origin.device) as f64 * 1e-3;
-                (device, (exchange.local - origin.local) as f64 * 1e-6 - device)
-            })
+        let lead = |exchange: &Exchange| {
+            let device = (exchange.device - origin.device) as f64 * 1e-3;
+            (device, (exchange.local - origin.local) as f64 * 1e-6 - device)
         };
-        let count = points().count() as f64;
-        let (device_sum, lead_sum) = points().fold((0.0, 0.0), |sum, point| (sum.0 + point.0, sum.1 + point.1));
-        let (device_mean, lead_mean) = (device_sum / count, lead_sum / count);
-        let (first, last) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), point| {
-            (libm::fmin(first, point.0), libm::fmax(last, point.0))
+        let measured = self.measure_drift(lead);
+        let drift = measured.or(self.line.map(|line| line.drift)).unwrap_or(0.0);
+        let unknown_drift = if measured.is_some() { FITTED_DRIFT } else { UNKNOWN_DRIFT };
+        let uncertainty = |exchange: &Exchange| {
+            let age = (newest - exchange.device) as f64 * 1e-3;
+            0.5e-6 * exchange.round_trip as f64 + libm::fabs(age) * unknown_drift
+        };
+        let least = self.exchanges.iter().map(uncertainty).fold(f64::INFINITY, libm::fmin);
+        let good = self.exchanges.iter().filter(|exchange| uncertainty(exchange) <= least + SIMILAR);
+        let (count, sum) = good.fold((0.0, 0.0), |(count, sum), exchange| {
+            let (device, lead) = lead(exchange);
+            (count + 1.0, sum + lead - drift * device)
         });
-        let drift = if last - first < DRIFT_SPAN {
-            0.0
-        } else {
-            let (square, product) = points().fold((0.0, 0.0), |(square, product), point| {
-                let device = point.0 - device_mean;
-                (square + device * device, product + device * (point.1 - lead_mean))
-            });
-            (product / square).clamp(-GREATEST_DRIFT, GREATEST_DRIFT)
-        };
-        Some(Line {
-            device: origin.device as f64 + device_mean * 1e3,
-            local: origin.local as f64 + (device_mean + lead_mean) * 1e6,
-            drift,
-        })
+        Some(Line { device: origin.device as f64, local: origin.local as f64 + sum / count * 1e6, drift })
+    }
+
+    /// Slope of the leads of the exchanges with small round trips; None if they are too few or too near.
+    fn measure_drift(&self, lead: impl Fn(&Exchange) -> (f64, f64)) -> Option<f64> {
+        let smallest = self.exchanges.iter().map(|exchange| exchange.round_trip).min()?;
+        let good = || self.exchanges.iter().filter(|exchange| exchange.round_trip <= 2 * smallest + 1000).map(&lead);
+        let count = good().count();
+        let (first, last) = good().fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), (device, _)| {
+            (libm::fmin(first, device), libm::fmax(last, device))
+        });
+        if count < DRIFT_EXCHANGES || last - first < DRIFT_SPAN {
+            return None;
+        }
+        let (device_sum, lead_sum) = good().fold((0.0, 0.0), |sum, (device, lead)| (sum.0 + device, sum.1 + lead));
+        let (device_mean, lead_mean) = (device_sum / count as f64, lead_sum / count as f64);
+        let (square, product) = good().fold((0.0, 0.0), |(square, product), (device, lead)| {
+            let device = device - device_mean;
+            (square + device * device, product + device * (lead - lead_mean))
+        });
+        Some((product / square).clamp(-GREATEST_DRIFT, GREATEST_DRIFT))
     }
 }

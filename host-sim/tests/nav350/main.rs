@@ -1,0 +1,3 @@
+//! The NAV350: recorded telegrams, the emulated sensor, and what is recorded from it.
+
+mod recorded;
