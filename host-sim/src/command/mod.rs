@@ -7,5 +7,7 @@ pub mod evaluate;
 pub mod features;
 pub mod import;
 pub mod map;
+pub mod nav350;
+pub mod record;
 pub mod replay;
 pub mod simulate;
