@@ -145,7 +145,7 @@ fn without_landmarks_it_reckons_and_says_how_far() {
     let mut reckoned = Drive::start();
     let mut strict = parameters();
     strict.limits.lost_after = 3.0;
-    reckoned.localizer = Box::new(Small::new(strict));
+    *reckoned.localizer = Small::new(strict);
     reckoned.set_pose(Pose::default());
     let output = reckoned.revolutions(30, |_| false);
     assert_eq!((output.mode, output.reason), (Mode::Lost, Reason::NoLandmarks));
@@ -302,4 +302,12 @@ proptest! {
             prop_assert!(localizer.dynamic_landmarks().len() <= 32);
         }
     }
+}
+
+#[test]
+fn all_of_its_memory_fits_a_controller() {
+    // Half of the STM32H743's largest RAM, 512 KiB.
+    let size = size_of::<Localizer>();
+    println!("{size} bytes");
+    assert!(size <= 256 * 1024, "{size} bytes");
 }

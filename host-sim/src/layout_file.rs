@@ -4,11 +4,12 @@
 //! with `#` or `globID` are skipped. A csv file has the same columns behind a line of their names, with the layers
 //! separated by spaces.
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
+
+use crate::text_file::{self, TextFileError};
 
 /// How a layout is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,45 +20,20 @@ pub enum Format {
     Csv,
 }
 
-/// Why a layout could not be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum LayoutError {
-    /// The operating system refused.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        source: io::Error,
-    },
-    /// The ending of the name is neither `imk` nor `csv`.
-    #[error("{}: the name must end in .imk or .csv", path.display())]
-    Ending {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A line is no landmark.
-    #[error("{}, line {line}: {problem}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong.
-        problem: &'static str,
-    },
-}
-
 impl Format {
     /// The format that the ending of the name says.
     ///
     /// # Errors
     /// If it is neither `imk` nor `csv`.
-    pub fn of(path: &Path) -> Result<Self, LayoutError> {
+    pub fn of(path: &Path) -> Result<Self, TextFileError> {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some(ending) if ending.eq_ignore_ascii_case("imk") => Ok(Self::Imk),
             Some(ending) if ending.eq_ignore_ascii_case("csv") => Ok(Self::Csv),
-            _ => Err(LayoutError::Ending { path: path.to_owned() }),
+            _ => Err(TextFileError::Foreign {
+                path: path.to_owned(),
+                expected: "a layout, whose name ends in .imk or .csv,",
+                looks_like: "a file of another name",
+            }),
         }
     }
 }
@@ -133,17 +109,17 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
 ///
 /// # Errors
 /// If the file cannot be read, or a line is no landmark.
-pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, LayoutError> {
+pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
     Format::of(path)?;
-    let text = std::fs::read_to_string(path).map_err(|source| LayoutError::Io { path: path.to_owned(), source })?;
-    parse(&text).map_err(|(line, problem)| LayoutError::Line { path: path.to_owned(), line, problem })
+    let text = text_file::read(path, "a layout")?;
+    parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem))
 }
 
 /// Writes a layout to a file.
 ///
 /// # Errors
 /// If the file cannot be written, or the ending of its name is of no known format.
-pub fn save(path: &Path, landmarks: &[IdentifiedLandmark]) -> Result<(), LayoutError> {
+pub fn save(path: &Path, landmarks: &[IdentifiedLandmark]) -> Result<(), TextFileError> {
     let text = write(landmarks, Format::of(path)?);
-    std::fs::write(path, text).map_err(|source| LayoutError::Io { path: path.to_owned(), source })
+    std::fs::write(path, text).map_err(|source| TextFileError::of_system(path, source))
 }

@@ -15,3 +15,4 @@ pub mod replay;
 pub mod report;
 pub mod serve;
 pub mod simulate;
+pub mod text_file;

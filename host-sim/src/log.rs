@@ -5,15 +5,13 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use agv_core::localizer::Event;
-use agv_core::measurement::Time;
 use agv_core::record::{
     self, Capacities, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
-    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Record, Scratch,
+    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Output, Record, Scratch,
 };
 
 use crate::file_kind;
-use crate::recording::{RecordedEvent, Recording};
+use crate::recording::{RecordedEvent, RecordedOutput, Recording};
 
 /// Name and version that this program leaves in its logs.
 pub const SOFTWARE: &str = concat!("agv ", env!("CARGO_PKG_VERSION"));
@@ -303,24 +301,25 @@ impl Writer {
     }
 }
 
-/// When an event happened; for a revolution, when it began.
-fn event_time(event: &RecordedEvent) -> Option<Time> {
-    match event.view() {
-        Event::Encoders(sample) => Some(sample.time),
-        Event::Speed(sample) => Some(sample.time),
-        Event::Increment(increment) => Some(increment.time),
-        Event::Reflectors(reflectors) => reflectors.observations.first().map(|observation| observation.time),
-        Event::Scan(scan) => Some(scan.start),
-        Event::SetPose(fix) => Some(fix.time),
-    }
-}
-
 /// Writes a drive as a log. Truth and references stand before the first event that is not earlier, so that a log that is
 /// cut has all of them up to the cut.
 ///
 /// # Errors
 /// If the file cannot be written, or a scan is too long for a log.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
+    write_with_outputs(path, recording, |_| None)
+}
+
+/// Writes a drive as [`write`] does, and after each event what the localiser answered to it. `output` gives the answer to
+/// the event of that index.
+///
+/// # Errors
+/// If the file cannot be written, or a scan is too long for a log.
+pub fn write_with_outputs<'a>(
+    path: &Path,
+    recording: &Recording,
+    output: impl Fn(usize) -> Option<Output<'a>>,
+) -> Result<(), LogError> {
     let header = Header { software: SOFTWARE, parameters: &recording.parameters, capacities: Capacities::default() };
     let mut writer = Writer::create(path, &header)?;
     for piece in recording.landmarks.chunks(LANDMARKS_A_RECORD) {
@@ -328,8 +327,8 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
     }
     let mut truth = recording.truth.iter().peekable();
     let mut references = recording.references.iter().peekable();
-    for event in &recording.events {
-        if let Some(now) = event_time(event) {
+    for (index, event) in recording.events.iter().enumerate() {
+        if let Some(now) = event.time() {
             while let Some(next) = truth.next_if(|next| next.time <= now) {
                 writer.write(&Record::Truth(*next))?;
             }
@@ -338,6 +337,9 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
             }
         }
         writer.write(&Record::Event(event.view()))?;
+        if let Some(output) = output(index) {
+            writer.write(&Record::Output(output))?;
+        }
     }
     for next in truth {
         writer.write(&Record::Truth(*next))?;
@@ -348,29 +350,66 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
     writer.finish()
 }
 
-/// Reads a whole log, and everything that is wrong with it. A log without an end record is cut, even if it is cut between
-/// two records. Outputs, notes and raw bytes are left out.
+/// Everything that a log holds, except notes and raw bytes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contents {
+    /// Name and version of the program that wrote the log.
+    pub software: String,
+    /// The drive.
+    pub recording: Recording,
+    /// What the localiser answered while the log was written, in the order of the events; empty if that was not logged.
+    pub outputs: Vec<RecordedOutput>,
+    /// Everything that is wrong with the log.
+    pub damages: Vec<Damage>,
+}
+
+/// Reads a drive, and everything that is wrong with its log: see [`read_contents`].
+///
+/// # Errors
+/// As [`read_contents`].
+pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
+    read_contents(path, |_| {}).map(|contents| (contents.recording, contents.damages))
+}
+
+/// Reads a whole log. A log without an end record is cut, even if it is cut between two records. `progress` is called
+/// with the number of bytes done.
 ///
 /// # Errors
 /// If the file is missing, empty, foreign, of another version, without a readable header, or holds two different drives.
-pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
+pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Contents, LogError> {
     let mut reader = Reader::open(path)?;
     let mut damages = Vec::new();
-    let mut parameters = None;
+    let mut header = None;
     let mut is_complete = false;
     let (mut landmarks, mut events, mut truth, mut references) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut outputs = Vec::new();
+    // An output behind damage may belong to an event that is lost.
+    let mut is_answer_expected = false;
     while let Some(item) = reader.next()? {
         match item {
-            Item::Damage(damage) => damages.push(damage),
+            Item::Damage(damage) => {
+                is_answer_expected = false;
+                damages.push(damage);
+            }
             Item::Record { offset, record, .. } => match record {
-                Record::Header(header) => match parameters {
-                    Some(known) if known != *header.parameters => {
+                Record::Header(found) => match &header {
+                    Some((_, known)) if known != found.parameters => {
                         return Err(LogError::SecondDrive { path: path.to_owned(), offset });
                     }
-                    _ => parameters = Some(*header.parameters),
+                    _ => header = Some((found.software.to_owned(), *found.parameters)),
                 },
                 Record::Landmarks(piece) => landmarks.extend_from_slice(piece),
-                Record::Event(event) => events.push(RecordedEvent::from(event)),
+                Record::Event(event) => {
+                    is_answer_expected = true;
+                    events.push(RecordedEvent::from(event));
+                    if events.len() % 1024 == 0 {
+                        progress(offset);
+                    }
+                }
+                Record::Output(Output { pose, uses }) if is_answer_expected => {
+                    is_answer_expected = false;
+                    outputs.push(RecordedOutput { event: events.len() - 1, pose, uses: uses.to_vec() });
+                }
                 Record::Truth(one) => truth.push(one),
                 Record::Reference(one) => references.push(one),
                 Record::End => is_complete = true,
@@ -382,8 +421,11 @@ pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
     if !is_complete && !is_cut {
         damages.push(Damage { offset: reader.position(), skipped: 0, reason: DamageReason::Cut });
     }
-    match parameters {
-        Some(parameters) => Ok((Recording { parameters, landmarks, events, truth, references }, damages)),
+    match header {
+        Some((software, parameters)) => {
+            let recording = Recording { parameters, landmarks, events, truth, references };
+            Ok(Contents { software, recording, outputs, damages })
+        }
         None => Err(LogError::Header { path: path.to_owned(), damage: damages.first().copied() }),
     }
 }

@@ -7,12 +7,24 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 /// Localisation of automated guided vehicles: replay, simulate, measure.
+///
+/// Without a command: simulates a drive into a block storage, maps its world, localises the drive by odometry,
+/// reflectors, mapped features and both, prints the errors and writes a report with pictures.
 #[derive(Parser)]
-#[command(name = "agv", version)]
+#[command(name = "agv", version, args_conflicts_with_subcommands = true, after_help = HELP)]
 struct Agv {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    demonstration: command::demonstration::Demonstration,
 }
+
+const HELP: &str = "\
+Examples:
+  agv
+  agv --report /tmp/report
+  agv simulate host-sim/scenarios/block_storage_p2.toml --output drive.agvlog
+  agv replay drive.agvlog --report report";
 
 #[derive(Subcommand)]
 enum Command {
@@ -27,8 +39,10 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Agv::parse().command {
-        None => Err(anyhow::anyhow!("the default run is not there yet")),
+    command::panic_message::install();
+    let arguments = Agv::parse();
+    let outcome = match arguments.command {
+        None => arguments.demonstration.run(),
         Some(Command::Import(command)) => command.run(),
         Some(Command::Simulate(command)) => command.run(),
         Some(Command::Replay(command)) => command.run(),

@@ -1,8 +1,10 @@
 //! A drive in memory: what the sensors said, in the order of arrival, and apart from that where the vehicle really was.
 
+use agv_core::geometry::Pose;
 use agv_core::landmarks::Landmark;
-use agv_core::localizer::{Event, Parameters, PoseFix};
+use agv_core::localizer::{Event, LandmarkUse, Parameters, PoseFix, PoseOutput};
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
+use agv_core::record::Output;
 pub use agv_core::record::{Reference, Truth};
 
 /// A scan that owns its ranges; the fields are those of [`Scan`].
@@ -69,6 +71,21 @@ impl RecordedEvent {
     }
 }
 
+impl RecordedEvent {
+    /// When it happened; for a revolution, when it began. None for a revolution without reflectors.
+    #[must_use]
+    pub fn time(&self) -> Option<Time> {
+        match self {
+            Self::Encoders(sample) => Some(sample.time),
+            Self::Speed(sample) => Some(sample.time),
+            Self::Increment(increment) => Some(increment.time),
+            Self::Reflectors(observations) => observations.first().map(|observation| observation.time),
+            Self::Scan(scan) => Some(scan.start),
+            Self::SetPose(fix) => Some(fix.time),
+        }
+    }
+}
+
 impl From<Event<'_>> for RecordedEvent {
     fn from(event: Event<'_>) -> Self {
         match event {
@@ -102,4 +119,36 @@ pub struct Recording {
     pub truth: Vec<Truth>,
     /// Where another instrument has seen the laser, in order of time; empty if there was none.
     pub references: Vec<Reference>,
+}
+
+/// What the localiser answered to one event when it was recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedOutput {
+    /// Index of the event.
+    pub event: usize,
+    /// The pose after the event.
+    pub pose: PoseOutput,
+    /// What became of the event's observations, in order of time.
+    pub uses: Vec<LandmarkUse>,
+}
+
+impl RecordedOutput {
+    /// The answer as a log takes it.
+    #[must_use]
+    pub fn view(&self) -> Output<'_> {
+        Output { pose: self.pose, uses: &self.uses }
+    }
+}
+
+/// The true pose at a time, at constant body velocity between its neighbours. None outside the recorded truth.
+#[must_use]
+pub fn truth_at(truth: &[Truth], time: Time) -> Option<Pose> {
+    let after = truth.partition_point(|sample| sample.time < time);
+    let next = truth.get(after)?;
+    if next.time == time {
+        return Some(next.pose);
+    }
+    let previous = truth.get(after.checked_sub(1)?)?;
+    let share = time.since(previous.time) / next.time.since(previous.time);
+    Some(previous.pose.compose(&previous.pose.between(&next.pose).fraction(share)))
 }

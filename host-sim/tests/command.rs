@@ -1,18 +1,11 @@
 //! The command as people run it.
 
+mod support;
+
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use agv_host_sim::data;
-
-fn agv(arguments: &[&str]) -> Output {
-    // A backtrace would be more than one line.
-    Command::new(env!("CARGO_BIN_EXE_agv")).args(arguments).env("RUST_BACKTRACE", "1").output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
+use support::{Files, agv, refusal, text};
 
 /// Names of the subcommands, as the help lists them.
 fn subcommands() -> Vec<String> {
@@ -23,36 +16,6 @@ fn subcommands() -> Vec<String> {
     let names = listed.map(|line| line.split_whitespace().next().unwrap().to_owned());
     // clap's own command takes no options.
     names.filter(|name| name != "help").collect()
-}
-
-/// Runs a command that must refuse its input, and gives the one line that says why.
-fn refusal(arguments: &[&str]) -> String {
-    let output = agv(arguments);
-    let complaint = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {complaint}");
-    assert!(output.stdout.is_empty(), "{arguments:?} printed results");
-    assert!(complaint.starts_with("agv: ") && complaint.ends_with('\n'), "{arguments:?}: {complaint}");
-    assert_eq!(complaint.lines().count(), 1, "{arguments:?}: {complaint}");
-    complaint.to_owned()
-}
-
-struct Files {
-    folder: tempfile::TempDir,
-}
-
-impl Files {
-    fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.folder.path().join(name).to_str().unwrap().to_owned()
-    }
-
-    fn write(&self, name: &str, content: &[u8]) -> String {
-        std::fs::write(self.folder.path().join(name), content).unwrap();
-        self.path(name)
-    }
 }
 
 #[test]
@@ -185,7 +148,7 @@ fn whatever_reads_a_log_refuses_what_is_none() {
     let takes_log = |command: &String| {
         text(&agv(&[command, "--help"]).stdout)
             .lines()
-            .any(|line| line.starts_with("Usage: ") && line.ends_with(" <LOG>"))
+            .any(|line| line.starts_with("Usage: ") && line.ends_with(" <LOG>") && !line.contains(" --"))
     };
     for command in subcommands().iter().filter(|command| takes_log(command)) {
         for input in &inputs {

@@ -5,8 +5,9 @@ use std::path::Path;
 use agv_core::geometry::Pose;
 use agv_core::measurement::{PoseIncrement, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
-use agv_host_sim::import::{ImportError, PosedScan, ScanLog, carmen, carpark, drive, graph_log, sapienza};
+use agv_host_sim::import::{PosedScan, ScanLog, carmen, carpark, drive, graph_log, sapienza};
 use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording, Reference};
+use agv_host_sim::text_file::TextFileError;
 use agv_host_sim::{data, log};
 
 fn survives_a_log(recording: &Recording) {
@@ -29,7 +30,7 @@ time: 1668091584.821040869 ticks: 290 4294859756 model_pose: 0 0 0 tracker_pose:
 time: 1668091584.862079620 ticks: 8001 4 model_pose: 0 0 0 tracker_pose: 0.00101071 -0.00602303 0.00124475
 ";
 
-fn tricycle(text: &str) -> Result<Recording, ImportError> {
+fn tricycle(text: &str) -> Result<Recording, TextFileError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dataset.txt");
     std::fs::write(&path, text).unwrap();

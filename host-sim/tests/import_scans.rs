@@ -7,6 +7,7 @@ use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
 use agv_host_sim::data;
 use agv_host_sim::import::{carmen, graph_log};
+use agv_host_sim::text_file::TextFileError;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
@@ -46,15 +47,12 @@ fn graph_log_gives_scans_with_the_laser_where_it_sits_on_the_corrected_robot() {
 fn graph_log_says_which_line_is_wrong() {
     let (_folder, path) = file("graph.log", GRAPH.replace("2.5 3 0", "2.5 x 0").as_bytes());
     let error = graph_log::read(&path).unwrap_err();
-    assert!(matches!(error, graph_log::GraphLogError::Malformed { line: 2, .. }), "{error}");
+    assert!(matches!(error, TextFileError::Line { line: 2, .. }), "{error}");
     let (_folder, path) = file("graph.log", GRAPH.split_once('\n').unwrap().1.as_bytes());
-    assert!(matches!(graph_log::read(&path).unwrap_err(), graph_log::GraphLogError::NoVertex { line: 1, .. }));
+    assert!(matches!(graph_log::read(&path).unwrap_err(), TextFileError::Line { line: 1, .. }));
     let (_folder, path) = file("graph.log", b"VERTEX2 0 0 0 0\nROBOTLASER1 0 0 0 0 0 0 0 99999999999999999999\n");
-    assert!(matches!(graph_log::read(&path).unwrap_err(), graph_log::GraphLogError::Malformed { line: 2, .. }));
-    assert!(matches!(
-        graph_log::read(&path.with_extension("no")).unwrap_err(),
-        graph_log::GraphLogError::Unreadable { .. }
-    ));
+    assert!(matches!(graph_log::read(&path).unwrap_err(), TextFileError::Line { line: 2, .. }));
+    assert!(matches!(graph_log::read(&path.with_extension("no")).unwrap_err(), TextFileError::Missing { .. }));
 }
 
 const CARMEN: &str = "\
@@ -98,9 +96,9 @@ fn carmen_log_gives_scans_and_raw_odometry() {
 fn carmen_log_says_which_line_is_wrong() {
     let (_folder, path) = file("carmen.log", CARMEN.replace("FLASER 4 1", "FLASER 400 1").as_bytes());
     let error = carmen::read(&path).unwrap_err();
-    assert!(matches!(error, carmen::CarmenError::Malformed { line: 5, .. }), "{error}");
+    assert!(matches!(error, TextFileError::Line { line: 5, .. }), "{error}");
     let (_folder, path) = file("carmen.log.gz", b"this is not gzip");
-    assert!(matches!(carmen::read(&path).unwrap_err(), carmen::CarmenError::Unreadable { .. }));
+    assert!(matches!(carmen::read(&path).unwrap_err(), TextFileError::Io { .. }));
 }
 
 #[test]

@@ -48,8 +48,8 @@ impl Consistency {
         Self { parameters, expected: 0.0, accepted: 0.0, used: 0.0, normalised_square: 0.0 }
     }
 
-    /// Takes the evidence of one scan: how many observations should have had a fixed landmark, how many of these were
-    /// accepted, and of all that were used their number and the sum of their normalised squared innovations.
+    /// Takes the evidence of one scan: how many observations tell whether they fit a fixed landmark, how many of these
+    /// were accepted, and of all that were used their number and the sum of their normalised squared innovations.
     pub fn add(&mut self, expected: usize, accepted: usize, used: usize, normalised_square_sum: f64) {
         let remaining = self.remaining(expected);
         self.expected = remaining * self.expected + expected as f64;

@@ -195,8 +195,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
     }
 
     fn set_pose(&mut self, fix: &PoseFix) {
-        let is_sound = fix.pose.is_finite() && fix.position_deviation >= 0.0 && fix.heading_deviation >= 0.0;
-        if !is_sound {
+        if !fix.is_sound() {
             return;
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
@@ -274,7 +273,12 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             let is_accepted = outcome == Ok(true);
             let is_fixed = association.nearest.is_none_or(|landmark| landmark.source == LandmarkSource::Fixed);
             let is_reflector = sighting.kind == LandmarkKind::Reflector;
-            if outcome.is_ok() && is_fixed && (is_reflector || association.nearest.is_some()) {
+            // Two landmarks that fit equally say nothing against the pose, nor does a feature that no map has.
+            let is_evidence = outcome.is_ok()
+                && is_fixed
+                && association.verdict != Verdict::Ambiguous
+                && (is_reflector || association.nearest.is_some());
+            if is_evidence {
                 expected += 1;
                 accepted += usize::from(is_accepted);
             }

@@ -3,11 +3,15 @@
 //! A subcommand is a clap `Args` structure with `run(self) -> anyhow::Result<()>`. Results go to standard output,
 //! progress to standard error.
 
+pub mod demonstration;
 pub mod evaluate;
 pub mod features;
 pub mod import;
 pub mod map;
 pub mod nav350;
+mod output;
+pub mod panic_message;
+mod progress;
 pub mod record;
 pub mod replay;
 pub mod simulate;

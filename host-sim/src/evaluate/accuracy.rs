@@ -7,6 +7,13 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use crate::recording::Truth;
+pub use crate::recording::truth_at;
+
+/// Largest error of a position that can still be worked with, m (K 5.6).
+pub const POSITION_REQUIREMENT: f64 = 0.02;
+
+/// Largest error of a heading that can still be worked with, rad (K 5.6).
+pub const HEADING_REQUIREMENT: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// Error of one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,17 +68,15 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (sorted[above] - sorted[below]) * (place - below as f64)
 }
 
-/// The true pose at a time, at constant body velocity between its neighbours. None outside the recorded truth.
+/// The pose that the localiser would publish at `time`: the last one, carried on by the odometry that follows. None
+/// before the first pose and from the last one on.
 #[must_use]
-pub fn truth_at(truth: &[Truth], time: Time) -> Option<Pose> {
-    let after = truth.partition_point(|sample| sample.time < time);
-    let next = truth.get(after)?;
-    if next.time == time {
-        return Some(next.pose);
-    }
-    let previous = truth.get(after.checked_sub(1)?)?;
-    let share = time.since(previous.time) / next.time.since(previous.time);
-    Some(previous.pose.compose(&previous.pose.between(&next.pose).fraction(share)))
+pub fn pose_at(poses: &[PoseOutput], time: Time) -> Option<Pose> {
+    let after = poses.partition_point(|pose| pose.time <= time);
+    let (last, next) = (poses.get(after.checked_sub(1)?)?, poses.get(after)?);
+    let interval = next.time.since(last.time);
+    let share = if interval > 0.0 { time.since(last.time) / interval } else { 0.0 };
+    Some(last.pose.compose(&last.pose.between(&next.pose).fraction(share)))
 }
 
 /// Error of a pose against the true one of its time. None where the truth is not known.

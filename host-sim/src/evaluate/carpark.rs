@@ -13,10 +13,11 @@ use agv_core::measurement::Time;
 use agv_core::odometry::OdometryNoise;
 use serde::Serialize;
 
-use super::accuracy::{Spread, truth_at};
-use crate::import::{ImportError, carpark};
+use super::accuracy::{Spread, pose_at, truth_at};
+use crate::import::carpark;
 use crate::recording::{RecordedEvent, Recording, Truth};
 use crate::replay::{Replay, ReplayError, replay};
+use crate::text_file::TextFileError;
 
 /// What is believed of the vehicle's own sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,7 +59,7 @@ pub struct Outcome {
 pub enum CarparkError {
     /// The data cannot be read.
     #[error(transparent)]
-    Import(#[from] ImportError),
+    Import(#[from] TextFileError),
     /// The recording cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
@@ -73,7 +74,9 @@ const WRONG: f64 = 0.5;
 /// First heading as the data's description states it, rad.
 const FIRST_HEADING: f64 = -126.0 * std::f64::consts::PI / 180.0;
 
-/// What the localiser is told about the vehicle and its sensors.
+/// What the localiser is told about the vehicle and its sensors. The noise of reflectors is such that innovations have
+/// about the size that the filter expects; the receiver has no part in it. The car passes a reflector in few scans, so
+/// errors of the map count as independent.
 #[must_use]
 pub fn parameters(imported: &Parameters, noise: Noise) -> Parameters {
     let mut parameters = *imported;
@@ -83,9 +86,10 @@ pub fn parameters(imported: &Parameters, noise: Noise) -> Parameters {
     };
     parameters.odometry_noise = OdometryNoise { speed, steering, slip: 0.0, side_slip: 0.0, yaw: 0.0 };
     parameters.maps = MapUse { reflectors: true, features: false, dynamic: false };
-    parameters.reflectors.range_deviation = 0.03;
+    parameters.reflectors.range_deviation = 0.02;
     parameters.reflectors.bearing_deviation = 0.3_f64.to_radians();
     parameters.reflectors.detection = Some(ReflectorDetection::default());
+    parameters.association.shared_map_error = 1.0;
     parameters.limits.fastest = 10.0;
     parameters
 }
@@ -110,15 +114,6 @@ pub fn run(folder: &Path, noise: Noise) -> Result<(Outcome, Recording, Replay), 
     let replay = replay(&recording, |_| {})?;
     let outcome = judge(&recording, &replay, &headings);
     Ok((outcome, recording, replay))
-}
-
-/// The pose that the localiser would publish at `time`: the last one, carried on by the odometry that follows.
-fn pose_at(poses: &[PoseOutput], time: Time) -> Option<Pose> {
-    let after = poses.partition_point(|pose| pose.time <= time);
-    let (last, next) = (poses.get(after.checked_sub(1)?)?, poses.get(after)?);
-    let interval = next.time.since(last.time);
-    let share = if interval > 0.0 { time.since(last.time) / interval } else { 0.0 };
-    Some(last.pose.compose(&last.pose.between(&next.pose).fraction(share)))
 }
 
 fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome {

@@ -2,6 +2,8 @@
 
 pub mod accuracy;
 pub mod carpark;
+pub mod demonstration;
+pub mod drive;
 pub mod falko;
 pub mod repeatability;
 pub mod warehouse;

@@ -10,7 +10,7 @@ use agv_core::localizer::MapUse;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::accuracy::{PoseError, Spread, pose_error};
+use super::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, PoseError, Spread, pose_error};
 use crate::mapping::{Clustering, map_features};
 use crate::replay::{ReplayError, replay};
 use crate::simulate::block_storage::{BlockStoragePath, ReflectorPlacement};
@@ -129,12 +129,6 @@ pub const PATHS: [(&str, BlockStoragePath); 4] = [
     ("P3", BlockStoragePath::P3),
     ("P4", BlockStoragePath::P4),
 ];
-
-/// Largest error of a position that can still be worked with, m (K 5.6).
-const POSITION_REQUIREMENT: f64 = 0.02;
-
-/// Largest error of a heading that can still be worked with, rad (K 5.6).
-const HEADING_REQUIREMENT: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
 /// The mapping drive has its own noise: the seed of a run with this bit changed.
 const MAPPING_SEED_BIT: u64 = 1 << 32;

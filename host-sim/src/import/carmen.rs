@@ -5,38 +5,14 @@
 //! corrected pose after each scan as an `ODOM` line with time zero: from there the next `ODOM` lines go on by raw
 //! odometry. Such a line moves the anchor and is no motion.
 
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_core::geometry::Pose;
 use agv_core::measurement::{PoseIncrement, Time};
-use flate2::read::MultiGzDecoder;
 
 use super::{PosedScan, ScanLog};
 use crate::recording::RecordedScan;
-
-/// Why a CARMEN log cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum CarmenError {
-    /// The file cannot be read or unpacked.
-    #[error("cannot read {}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A line lacks a field or has one that is no number.
-    #[error("{}:{line}: {record} has a field that is missing or no number", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// First word of the line.
-        record: String,
-    },
-}
+use crate::text_file::{self, TextFileError};
 
 /// A CARMEN log by laser.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,19 +24,15 @@ pub struct CarmenLog {
 }
 
 /// Reads a CARMEN log.
-pub fn read(path: &Path) -> Result<CarmenLog, CarmenError> {
-    let unreadable = |source| CarmenError::Unreadable { path: path.to_owned(), source };
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    let reader: Box<dyn Read> = if path.extension().is_some_and(|extension| extension == "gz") {
-        Box::new(MultiGzDecoder::new(file))
-    } else {
-        Box::new(file)
-    };
+///
+/// # Errors
+/// If the file is missing, cannot be unpacked, is not text, or a line lacks a field or has one that is no number.
+pub fn read(path: &Path) -> Result<CarmenLog, TextFileError> {
+    let text = text_file::read_unpacked(path, "a CARMEN log")?;
     let mut log = CarmenLog::default();
     let mut clock = Clock::default();
     let mut anchor = None;
-    for (line, text) in (1..).zip(BufReader::new(reader).lines()) {
-        let text = text.map_err(unreadable)?;
+    for (line, text) in (1..).zip(text.lines()) {
         let mut words = text.split_ascii_whitespace();
         let record = words.next().unwrap_or_default();
         let words = &mut words;
@@ -80,7 +52,7 @@ pub fn read(path: &Path) -> Result<CarmenLog, CarmenError> {
             }),
             _ => Some(()),
         };
-        parsed.ok_or_else(|| CarmenError::Malformed { path: path.to_owned(), line, record: record.to_owned() })?;
+        parsed.ok_or_else(|| TextFileError::of_line(path, line, super::missing_field(record)))?;
     }
     Ok(log)
 }

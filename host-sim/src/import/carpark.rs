@@ -11,8 +11,9 @@ use agv_core::localizer::Parameters;
 use agv_core::measurement::{SpeedSample, Time};
 use agv_core::odometry::{Ackermann, Vehicle};
 
-use super::table::{ImportError, Row, read_rows};
+use super::table::{Row, read_rows};
 use crate::recording::{RecordedEvent, RecordedScan, Recording, Reference, Truth};
+use crate::text_file::TextFileError;
 
 /// Geometry of the vehicle as its owners state it; encoder offset and wheelbase, m.
 pub const VEHICLE: Ackermann = Ackermann { wheelbase: 2.83, encoder_offset: 0.76 };
@@ -40,7 +41,7 @@ const SAME_TIME: f64 = 2e-3;
 ///
 /// # Errors
 /// If a file is missing, empty, not a table, has a bad row, or the files do not fit each other.
-pub fn read(folder: &Path, window: &RangeInclusive<f64>) -> Result<Recording, ImportError> {
+pub fn read(folder: &Path, window: &RangeInclusive<f64>) -> Result<Recording, TextFileError> {
     let odometry = read_rows(&folder.join("odometry.csv"), 3)?;
     let ranges = read_rows(&folder.join("laser_ranges_m.csv"), BEAMS + 1)?;
     let intensities = read_rows(&folder.join("laser_intensity.csv"), BEAMS + 1)?;
@@ -53,7 +54,7 @@ pub fn read(folder: &Path, window: &RangeInclusive<f64>) -> Result<Recording, Im
     let mut references = Vec::new();
     for row in &order {
         let [seconds, sensor, index] = row.numbers[..] else { continue };
-        let problem = |problem| ImportError::Line { path: order_path.clone(), line: row.line, problem };
+        let problem = |problem| TextFileError::Line { path: order_path.clone(), line: row.line, problem };
         if !window.contains(&seconds) {
             continue;
         }
@@ -99,7 +100,7 @@ pub fn read(folder: &Path, window: &RangeInclusive<f64>) -> Result<Recording, Im
 ///
 /// # Errors
 /// If the file is missing, empty, not a table, or has a bad row.
-pub fn read_batch_solution(folder: &Path) -> Result<Vec<Truth>, ImportError> {
+pub fn read_batch_solution(folder: &Path) -> Result<Vec<Truth>, TextFileError> {
     let rows = read_rows(&folder.join("reference_smoothed.csv"), 4)?;
     let pose = |row: &Row| Truth {
         time: Time::from_seconds(row.numbers[0]),

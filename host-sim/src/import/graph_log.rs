@@ -3,14 +3,14 @@
 //! A `ROBOTLASER1` line follows its vertex and repeats robot and laser poses, corrected or not; only the laser's place
 //! on the robot is taken from them. Edges are relations after correction, not odometry.
 
-use std::io::BufRead;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
 
 use super::{PosedScan, ScanLog};
 use crate::recording::RecordedScan;
+use crate::text_file::{self, TextFileError};
 
 /// A relation between two vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,54 +32,25 @@ pub struct GraphLog {
     pub edges: Vec<Edge>,
 }
 
-/// Why a graph log cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum GraphLogError {
-    /// The file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A line lacks a field or has one that is no number.
-    #[error("{}:{line}: {record} has a field that is missing or no number", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// First word of the line.
-        record: String,
-    },
-    /// A scan without a vertex before it.
-    #[error("{}:{line}: a scan comes before the first vertex", path.display())]
-    NoVertex {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-    },
-}
-
 /// Reads a graph log.
-pub fn read(path: &Path) -> Result<GraphLog, GraphLogError> {
-    let unreadable = |source| GraphLogError::Unreadable { path: path.to_owned(), source };
-    let file = std::fs::File::open(path).map_err(unreadable)?;
+///
+/// # Errors
+/// If the file is missing, is not text, a line lacks a field or has one that is no number, or a scan has no vertex.
+pub fn read(path: &Path) -> Result<GraphLog, TextFileError> {
+    let text = text_file::read(path, "a pose graph with scans")?;
     let mut graph = GraphLog::default();
     let mut vertex = None;
     let mut start = None;
-    for (line, text) in (1..).zip(std::io::BufReader::new(file).lines()) {
-        let text = text.map_err(unreadable)?;
+    for (line, text) in (1..).zip(text.lines()) {
         let mut words = text.split_ascii_whitespace();
         let record = words.next().unwrap_or_default();
-        let malformed = || GraphLogError::Malformed { path: path.to_owned(), line, record: record.to_owned() };
+        let malformed = || TextFileError::of_line(path, line, super::missing_field(record));
+        let no_vertex = || TextFileError::of_line(path, line, "a scan comes before the first vertex");
         match record {
             "VERTEX2" => vertex = Some(parse_vertex(words).ok_or_else(malformed)?),
             "EDGE2" => graph.edges.push(parse_edge(words).ok_or_else(malformed)?),
             "ROBOTLASER1" => {
-                let robot = vertex.ok_or_else(|| GraphLogError::NoVertex { path: path.to_owned(), line })?;
+                let robot = vertex.ok_or_else(no_vertex)?;
                 graph.log.scans.push(parse_scan(words, robot, &mut start).ok_or_else(malformed)?);
             }
             _ => {}

@@ -10,4 +10,8 @@ mod table;
 
 pub use posed_scan::{PosedScan, ScanLog};
 pub use scan_drive::drive;
-pub use table::ImportError;
+
+/// What is wrong with a line of that record.
+fn missing_field(record: &str) -> String {
+    format!("{record} has a field that is missing or no number")
+}

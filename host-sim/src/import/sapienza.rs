@@ -10,8 +10,9 @@ use agv_core::localizer::Parameters;
 use agv_core::measurement::{EncoderSample, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 
-use super::table::{ImportError, read_text, shorten};
+use super::table::shorten;
 use crate::recording::{RecordedEvent, Recording, Reference};
+use crate::text_file::{self, TextFileError};
 
 /// What every such file begins with.
 pub const SIGNATURE: &str = "#kinematic_model:";
@@ -35,18 +36,18 @@ struct Header {
 ///
 /// # Errors
 /// If the file is missing, empty, something else, or has a bad line.
-pub fn read(path: &Path) -> Result<Recording, ImportError> {
+pub fn read(path: &Path) -> Result<Recording, TextFileError> {
     let expected = "a tricycle dataset of the Sapienza University";
-    let text = read_text(path, expected)?;
+    let text = text_file::read(path, expected)?;
     if !text.starts_with(SIGNATURE) {
         let looks_like = crate::file_kind::describe(text.as_bytes());
-        return Err(ImportError::Foreign { path: path.to_owned(), expected, looks_like });
+        return Err(TextFileError::Foreign { path: path.to_owned(), expected, looks_like });
     }
     let mut header = Header::default();
     let mut start = None;
     let (mut events, mut references) = (Vec::new(), Vec::new());
     for (line, text) in (1..).zip(text.lines()) {
-        let problem = |problem: String| ImportError::Line { path: path.to_owned(), line, problem };
+        let problem = |problem: String| TextFileError::Line { path: path.to_owned(), line, problem };
         if let Some(comment) = text.strip_prefix('#') {
             header
                 .take(comment)
@@ -65,9 +66,9 @@ pub fn read(path: &Path) -> Result<Recording, ImportError> {
         references.push(Reference { time, x, y, heading: Some(agv_core::geometry::wrap(heading)) });
     }
     if events.is_empty() {
-        return Err(ImportError::Empty { path: path.to_owned() });
+        return Err(TextFileError::Empty { path: path.to_owned() });
     }
-    let parameters = header.parameters().ok_or_else(|| ImportError::Line {
+    let parameters = header.parameters().ok_or_else(|| TextFileError::Line {
         path: path.to_owned(),
         line: 1,
         problem: "the header does not state the vehicle's parameters".to_owned(),

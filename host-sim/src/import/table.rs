@@ -1,77 +1,8 @@
 //! Rows of numbers, with the place of every fault.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::file_kind;
-
-/// Why a file of others cannot be imported.
-#[derive(Debug, thiserror::Error)]
-pub enum ImportError {
-    /// The file does not exist.
-    #[error("{}: there is no such file", path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The operating system refused.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
-    /// The file holds nothing.
-    #[error("{}: there are no data in the file", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file is something else.
-    #[error("{}: this is not {expected} but {looks_like}", path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-        /// What it should be.
-        expected: &'static str,
-        /// What it seems to be.
-        looks_like: &'static str,
-    },
-    /// A line is not what it should be.
-    #[error("{}:{line}: {problem}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        problem: String,
-    },
-}
-
-/// The text of a file.
-///
-/// # Errors
-/// If the file is missing, cannot be read, is empty, or is not text.
-pub fn read_text(path: &Path, expected: &'static str) -> Result<String, ImportError> {
-    let bytes = std::fs::read(path).map_err(|source| {
-        let path = path.to_owned();
-        if source.kind() == std::io::ErrorKind::NotFound {
-            ImportError::Missing { path }
-        } else {
-            ImportError::Io { path, source }
-        }
-    })?;
-    if bytes.trim_ascii().is_empty() {
-        return Err(ImportError::Empty { path: path.to_owned() });
-    }
-    let looks_like = file_kind::describe(&bytes[..bytes.len().min(4096)]);
-    let foreign = |looks_like| ImportError::Foreign { path: path.to_owned(), expected, looks_like };
-    if !looks_like.starts_with("text") {
-        return Err(foreign(looks_like));
-    }
-    String::from_utf8(bytes).map_err(|_| foreign("text with binary data in it"))
-}
+use crate::text_file::{self, TextFileError};
 
 /// One row and where it stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,10 +17,10 @@ pub struct Row {
 ///
 /// # Errors
 /// If the file is missing, empty, not text, or a row has another number of columns or something that is no finite number.
-pub fn read_rows(path: &Path, columns: usize) -> Result<Vec<Row>, ImportError> {
+pub fn read_rows(path: &Path, columns: usize) -> Result<Vec<Row>, TextFileError> {
     let expected = "a table of numbers";
-    let text = read_text(path, expected)?;
-    let problem = |line, problem| ImportError::Line { path: path.to_owned(), line, problem };
+    let text = text_file::read(path, expected)?;
+    let problem = |line, problem| TextFileError::Line { path: path.to_owned(), line, problem };
     let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
     let mut rows = Vec::new();
     for (index, record) in table.records().enumerate() {
@@ -112,7 +43,7 @@ pub fn read_rows(path: &Path, columns: usize) -> Result<Vec<Row>, ImportError> {
             .collect::<Result<_, _>>()?;
         rows.push(Row { line, numbers });
     }
-    if rows.is_empty() { Err(ImportError::Empty { path: path.to_owned() }) } else { Ok(rows) }
+    if rows.is_empty() { Err(TextFileError::Empty { path: path.to_owned() }) } else { Ok(rows) }
 }
 
 /// A word that fits on a line of a message.

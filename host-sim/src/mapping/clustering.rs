@@ -12,6 +12,8 @@ pub struct Sighting {
     pub kind: LandmarkKind,
     /// Where, in W, m.
     pub position: Point,
+    /// Variance an axis of where, as far as the pose from which it was seen is to blame, m^2.
+    pub pose_variance: f64,
 }
 
 /// What makes a cluster a landmark.
@@ -43,11 +45,25 @@ struct Cluster {
     count: usize,
     sum: Point,
     square_sum: f64,
+    pose_variance_sum: f64,
 }
 
 impl Cluster {
     fn new(sighting: &Sighting) -> Self {
-        Self { kind: sighting.kind, centre: sighting.position, count: 0, sum: Point::zeros(), square_sum: 0.0 }
+        Self {
+            kind: sighting.kind,
+            centre: sighting.position,
+            count: 0,
+            sum: Point::zeros(),
+            square_sum: 0.0,
+            pose_variance_sum: 0.0,
+        }
+    }
+
+    /// Mean variance of the poses from which the points were seen, m^2. It does not average out: the poses of a drive
+    /// share their error.
+    fn pose_variance(&self) -> f64 {
+        self.pose_variance_sum / self.count.max(1) as f64
     }
 
     /// Standard deviation along an axis, m.
@@ -97,7 +113,8 @@ pub fn cluster(sightings: impl IntoIterator<Item = Sighting>, parameters: &Clust
             if cluster.count > 0 {
                 cluster.centre = cluster.sum / cluster.count as f64;
             }
-            *cluster = Cluster { count: 0, sum: Point::zeros(), square_sum: 0.0, ..cluster.clone() };
+            *cluster =
+                Cluster { count: 0, sum: Point::zeros(), square_sum: 0.0, pose_variance_sum: 0.0, ..cluster.clone() };
             index.insert(&cluster.centre, number);
         }
         for sighting in &sightings {
@@ -113,6 +130,7 @@ pub fn cluster(sightings: impl IntoIterator<Item = Sighting>, parameters: &Clust
             let cluster = &mut clusters[number];
             cluster.count += 1;
             cluster.sum += sighting.position;
+            cluster.pose_variance_sum += sighting.pose_variance;
             cluster.square_sum += (sighting.position - cluster.centre).norm_squared();
         }
         clusters.retain(|cluster| cluster.count > 0);
@@ -127,7 +145,7 @@ pub fn cluster(sightings: impl IntoIterator<Item = Sighting>, parameters: &Clust
             kind: cluster.kind,
             x: cluster.centre.x,
             y: cluster.centre.y,
-            deviation: (parameters.deviation_share * cluster.deviation()) as f32,
+            deviation: (parameters.deviation_share * cluster.deviation()).hypot(cluster.pose_variance().sqrt()) as f32,
         })
         .collect()
 }

@@ -1,9 +1,14 @@
 //! The core against a recording.
 
+mod comparison;
+
+pub use comparison::{Comparison, compare};
+
 use std::time::{Duration, Instant};
 
 use agv_core::landmarks::MapError;
 use agv_core::localizer::{LandmarkUse, Localizer, PoseOutput};
+use agv_core::record::Output;
 use thiserror::Error;
 
 use crate::recording::Recording;
@@ -13,12 +18,24 @@ use crate::recording::Recording;
 pub struct Replay {
     /// The pose after each event.
     pub poses: Vec<PoseOutput>,
-    /// What became of each observation.
+    /// What became of each observation, event by event.
     pub uses: Vec<LandmarkUse>,
+    /// For each event, how many observations there were up to and including it.
+    pub use_ends: Vec<usize>,
     /// Landmarks that were found while driving, as they are at the end.
     pub dynamic_landmarks: Vec<[f64; 2]>,
     /// Processor time that the core took.
     pub elapsed: Duration,
+}
+
+impl Replay {
+    /// What the localiser answered to the event of that index.
+    #[must_use]
+    pub fn output(&self, event: usize) -> Option<Output<'_>> {
+        let end = *self.use_ends.get(event)?;
+        let start = event.checked_sub(1).map_or(0, |before| self.use_ends[before]);
+        Some(Output { pose: *self.poses.get(event)?, uses: &self.uses[start..end] })
+    }
 }
 
 /// Why a recording cannot be replayed.
@@ -48,6 +65,7 @@ pub fn replay(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<
         let outputs = localizer.handle(&event.view());
         replay.poses.push(outputs.pose);
         replay.uses.extend_from_slice(&outputs.uses);
+        replay.use_ends.push(replay.uses.len());
         if index % 1024 == 0 {
             progress(index);
         }

@@ -3,10 +3,12 @@
 mod charts;
 mod figure;
 mod page;
+mod state_timeline;
 mod thinning;
 mod trajectories;
 
 pub use charts::{Bounds, LandmarkMark, landmark_timeline, line_chart, scatter_chart};
 pub use figure::{Figure, FigureError, PointSet, Series};
 pub use page::{Page, Table};
+pub use state_timeline::{StateSpan, state_timeline};
 pub use trajectories::{Map, trajectory_plot};

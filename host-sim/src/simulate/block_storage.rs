@@ -22,7 +22,7 @@ pub enum ReflectorPlacement {
     /// On columns, hall walls, machine, and posts at the lane's mouth and beside the opposite block: many are seen from
     /// the aisle, one or two from the first metres of the lane, none from its end.
     Aisle,
-    /// In the aisle, and at the end of the lane.
+    /// In the aisle, and in line with the lane: at its end, and on the opposite block, where they are seen all the way.
     AisleAndLaneEnd,
 }
 
@@ -109,8 +109,9 @@ impl BlockStorage {
             aisle_reflectors(&mut world, half_lane, &columns, &machine);
         }
         if self.reflectors == ReflectorPlacement::AisleAndLaneEnd {
-            for y in [-0.55, 0.2, 0.75] {
-                add_reflector(&mut world, Point::new(LANE_DEPTH - 0.1, y));
+            let end = LANE_DEPTH - 0.1;
+            for (x, y) in [(end, -0.55), (end, 0.2), (end, 0.75), (-7.7, 0.6), (-7.7, -0.5)] {
+                add_reflector(&mut world, Point::new(x, y));
             }
         }
         world
@@ -195,9 +196,7 @@ fn aisle_reflectors(world: &mut World, half_lane: f64, columns: &[Rectangle; 3],
     ] {
         add_reflector(world, before_face(rectangle, along, across));
     }
-    for (x, y) in
-        [(-0.25, half_lane + 0.3), (-0.35, -half_lane - 0.45), (-7.7, 3.4), (-7.7, -2.6), (-7.7, 0.6), (-7.7, -0.5)]
-    {
+    for (x, y) in [(-0.25, half_lane + 0.3), (-0.35, -half_lane - 0.45), (-7.7, 3.4), (-7.7, -2.6)] {
         add_reflector(world, Point::new(x, y));
     }
 }

@@ -120,18 +120,10 @@ impl Disc {
     /// Position of a return relative to the centre. None if it is not inside.
     #[inline]
     fn contains(&self, point: ScanPoint, range: f32) -> Option<ScanPoint> {
-        // The range alone excludes most of what is not inside, absent returns among it.
-        if libm::fabsf(range - self.range) > self.radius + TRAVEL {
-            return None;
-        }
         let relative = point - self.centre;
         (relative.norm_squared() <= self.radius * self.radius && range > 0.0).then_some(relative)
     }
 }
-
-/// Farthest that the sensor may move within one scan, m: ranges are measured from wherever it was, points are in one
-/// frame.
-const TRAVEL: f32 = 0.3;
 
 /// Number of beams whose directions differ by less than asin(`sine`); possibly one more, never one less.
 #[inline]

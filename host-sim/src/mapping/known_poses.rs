@@ -1,0 +1,55 @@
+//! Sightings of landmarks from poses that another instrument has measured.
+
+use agv_core::geometry::Point;
+use agv_core::landmarks::LandmarkKind;
+use agv_core::localizer::{MapUse, PoseFix};
+
+use super::Sighting;
+use crate::recording::{RecordedEvent, Recording, Truth, truth_at};
+use crate::replay::{ReplayError, replay};
+
+/// The poses of R that the recording's references state: those with a heading, in order of time.
+#[must_use]
+pub fn referenced_poses(recording: &Recording) -> Vec<Truth> {
+    let laser_in_reverse = recording.parameters.laser.inverse();
+    let poses = recording.references.iter().filter_map(|reference| {
+        let laser = agv_core::geometry::Pose::new(reference.x, reference.y, reference.heading?);
+        Some(Truth { time: reference.time, pose: laser.compose(&laser_in_reverse) })
+    });
+    poses.collect()
+}
+
+/// Everything that is seen of the wanted kinds between the first and the last of the known poses, where it is as seen
+/// from them. What stands in the recording's map does not matter.
+///
+/// # Errors
+/// [`ReplayError`] if the recording cannot be replayed.
+pub fn sightings(
+    recording: &Recording,
+    poses: &[Truth],
+    is_wanted: impl Fn(LandmarkKind) -> bool,
+) -> Result<Vec<Sighting>, ReplayError> {
+    let Some(first) = poses.first() else {
+        return Ok(Vec::new());
+    };
+    let mut recording = recording.clone();
+    recording.landmarks.clear();
+    recording.events.retain(|event| !matches!(event, RecordedEvent::SetPose(_)));
+    // The localiser only finds the landmarks; it must not mind that its own pose rests on odometry alone.
+    let start = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or(first.time);
+    let fix = PoseFix { time: start, pose: first.pose, position_deviation: 0.0, heading_deviation: 0.0 };
+    recording.events.insert(0, RecordedEvent::SetPose(fix));
+    let parameters = &mut recording.parameters;
+    parameters.maps = MapUse { reflectors: true, features: true, dynamic: false };
+    parameters.consistency.least_acceptance = 0.0;
+    parameters.limits.lost_after = f64::INFINITY;
+    parameters.limits.largest_position_deviation = f64::INFINITY;
+    parameters.limits.largest_heading_deviation = f64::INFINITY;
+    let replay = replay(&recording, |_| {})?;
+    let sightings = replay.uses.iter().filter(|used| is_wanted(used.kind)).filter_map(|used| {
+        let laser = truth_at(poses, used.time)?.compose(&recording.parameters.laser);
+        let [x, y] = used.position.map(f64::from);
+        Some(Sighting { kind: used.kind, position: laser.transform(&Point::new(x, y)), pose_variance: 0.0 })
+    });
+    Ok(sightings.collect())
+}

@@ -1,0 +1,34 @@
+//! Whether a replay says what was said when the recording was made.
+
+use agv_core::record::{MAX_FRAME, Output, Record, encode};
+use serde::Serialize;
+
+use super::Replay;
+use crate::recording::RecordedOutput;
+
+/// How recorded outputs compare with those of a replay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Comparison {
+    /// Number of recorded outputs.
+    pub compared: usize,
+    /// Index of the first event whose output is not the recorded one, bit for bit; None if all are.
+    pub first_difference: Option<usize>,
+}
+
+/// Compares recorded outputs with those of a replay of the same events.
+#[must_use]
+pub fn compare(recorded: &[RecordedOutput], replay: &Replay) -> Comparison {
+    let mut frames = [vec![0; MAX_FRAME], vec![0; MAX_FRAME]];
+    let differs = |output: &&RecordedOutput| {
+        let [first, second] = &mut frames;
+        replay.output(output.event).is_none_or(|again| bytes(output.view(), first) != bytes(again, second))
+    };
+    Comparison { compared: recorded.len(), first_difference: recorded.iter().find(differs).map(|output| output.event) }
+}
+
+/// The output as a log holds it: unlike a comparison of numbers, bytes tell the zeros apart and know one NaN from no NaN.
+fn bytes<'a>(output: Output, frame: &'a mut [u8]) -> &'a [u8] {
+    // Outputs fit, because a localiser's observations are bounded.
+    let length = encode(&Record::Output(output), 0, frame).unwrap_or_default();
+    &frame[..length]
+}

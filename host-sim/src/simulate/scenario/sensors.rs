@@ -1,0 +1,109 @@
+//! The laser, and what it finds.
+
+use serde::{Deserialize, Serialize};
+
+use super::PoseOptions;
+
+/// The laser.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LaserOptions {
+    /// Whether the localiser is given scans.
+    pub scans: bool,
+    /// Believed mounting, S in R.
+    pub mounting: PoseOptions,
+    /// Beams a revolution.
+    pub beams: u32,
+    /// Revolutions a second.
+    pub frequency: f64,
+    /// Standard deviation of a range up to 30 m, m.
+    pub range_noise: f64,
+    /// Standard deviation of a range beyond 30 m, m.
+    pub far_range_noise: f64,
+    /// Standard deviation of a beam's direction.
+    pub bearing_noise_deg: f64,
+    /// Nearest return, m.
+    pub nearest: f64,
+    /// Farthest return, m.
+    pub farthest: f64,
+    /// From the last beam to the arrival of the scan, s.
+    pub latency: f64,
+    /// Whether strengths are reported; returns of foil are bright.
+    pub intensities: bool,
+    /// Share of the beams on an edge that report a distance between its two sides, 0 to 1.
+    pub mixed_share: f64,
+    /// Width of a beam, for mixing.
+    pub divergence_deg: f64,
+    /// Share of the beams that are lost, 0 to 1.
+    pub lost_share: f64,
+    /// Where the window is dirty.
+    pub dirty_sectors: Vec<DirtySector>,
+}
+
+impl Default for LaserOptions {
+    fn default() -> Self {
+        Self {
+            scans: true,
+            mounting: PoseOptions { x: 0.9, y: 0.0, heading_deg: 0.0 },
+            beams: 1440,
+            frequency: 8.0,
+            range_noise: 0.010,
+            far_range_noise: 0.025,
+            bearing_noise_deg: 0.02,
+            nearest: 0.5,
+            farthest: 70.0,
+            latency: 0.010,
+            intensities: false,
+            mixed_share: 0.0,
+            divergence_deg: 0.25,
+            lost_share: 0.0,
+            dirty_sectors: Vec::new(),
+        }
+    }
+}
+
+/// A part of the laser's window that lets some beams through.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirtySector {
+    /// Where it starts, in S, counter-clockwise.
+    pub from_deg: f64,
+    /// Where it ends, in S.
+    pub to_deg: f64,
+    /// Share of its beams that are lost, 0 to 1.
+    pub lost_share: f64,
+}
+
+/// Detection and survey of reflectors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReflectorOptions {
+    /// Standard deviation of a range, m.
+    pub range_noise: f64,
+    /// Standard deviation of a bearing.
+    pub bearing_noise_deg: f64,
+    /// None is detected beyond this distance, m.
+    pub farthest: f64,
+    /// Probability that a visible reflector is missed in a revolution.
+    pub missing_share: f64,
+    /// False reflectors for each detected one; each stands on a surface in a random direction.
+    pub false_share: f64,
+    /// Standard deviation of a surveyed position along each axis, m.
+    pub survey_deviation: f64,
+    /// From the end of the revolution to the arrival of its reflectors, s.
+    pub latency: f64,
+}
+
+impl Default for ReflectorOptions {
+    fn default() -> Self {
+        Self {
+            range_noise: 0.008,
+            bearing_noise_deg: 0.05,
+            farthest: 30.0,
+            missing_share: 0.0,
+            false_share: 0.01,
+            survey_deviation: 0.002,
+            latency: 0.010,
+        }
+    }
+}

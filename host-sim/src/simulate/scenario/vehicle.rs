@@ -1,0 +1,155 @@
+//! How the way is driven, and what the vehicle is like, in truth and in belief.
+
+use serde::{Deserialize, Serialize};
+
+use super::PoseOptions;
+
+/// How the way is driven.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveOptions {
+    /// Speed of the logical point, m/s.
+    pub speed: f64,
+    /// Acceleration, m/s2.
+    pub acceleration: f64,
+    /// Braking, m/s2.
+    pub braking: f64,
+    /// Standstill at the start, s.
+    pub start_standstill: f64,
+    /// Standstill at the end, s.
+    pub end_standstill: f64,
+    /// Fastest turn of the driving wheel, degrees a second.
+    pub steering_rate_deg: f64,
+}
+
+impl Default for DriveOptions {
+    fn default() -> Self {
+        Self {
+            speed: 0.8,
+            acceleration: 0.3,
+            braking: 0.3,
+            start_standstill: 1.0,
+            end_standstill: 0.5,
+            steering_rate_deg: 60.0,
+        }
+    }
+}
+
+/// The vehicle.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VehicleOptions {
+    /// What it reports of its motion.
+    pub reports: MotionReport,
+    /// What the localiser believes.
+    pub believed: BelievedVehicle,
+    /// In what the truth differs.
+    #[serde(rename = "true")]
+    pub truth: VehicleErrors,
+}
+
+/// What the vehicle reports of its motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionReport {
+    /// Counters of a tricycle's wheel.
+    #[default]
+    Encoders,
+    /// Speed and steering angle of a car.
+    Speed,
+    /// Displacements.
+    Increments,
+}
+
+/// What the localiser believes of the vehicle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BelievedVehicle {
+    /// Distance from the rear axle to the steering axis, m.
+    pub wheelbase: f64,
+    /// Way of the driving wheel for one tick, m. The standard one is that of K table 5.1.
+    pub drive_scale: f64,
+    /// Values of the driving wheel's counter. The standard one has 16 bits, as the incremental encoders of drives have.
+    pub drive_counter: u64,
+    /// Values of the steering counter, which makes one turn with the wheel. The standard one is an absolute encoder of
+    /// 16 bits a turn, 0.0055 degrees a tick.
+    pub steering_counter: u64,
+    /// Steering offset while driving forward.
+    pub steering_offset_forward_deg: f64,
+    /// Steering offset while driving backward.
+    pub steering_offset_backward_deg: f64,
+    /// Distance of the wheel with the speed sensor to the left of the axis, m; for a car.
+    pub encoder_offset: f64,
+}
+
+impl Default for BelievedVehicle {
+    fn default() -> Self {
+        Self {
+            wheelbase: 1.5,
+            drive_scale: 0.249_75e-3,
+            drive_counter: 1 << 16,
+            steering_counter: 1 << 16,
+            steering_offset_forward_deg: 0.0,
+            steering_offset_backward_deg: 0.0,
+            encoder_offset: 0.0,
+        }
+    }
+}
+
+/// In what the true vehicle differs from the believed one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VehicleErrors {
+    /// True way for a tick over the believed one, minus one.
+    pub drive_scale_error: f64,
+    /// True steering offset minus the believed one, in both senses of travel.
+    pub steering_offset_error_deg: f64,
+    /// Whether the seed chooses the signs of the two errors above.
+    pub random_signs: bool,
+    /// True wheelbase minus the believed one, m.
+    pub wheelbase_error: f64,
+    /// True mounting of the laser (S in R) minus the believed one, component by component.
+    pub laser_error: PoseOptions,
+}
+
+impl Default for VehicleErrors {
+    fn default() -> Self {
+        Self {
+            drive_scale_error: 0.002,
+            steering_offset_error_deg: 0.05,
+            random_signs: true,
+            wheelbase_error: 0.0,
+            laser_error: PoseOptions::default(),
+        }
+    }
+}
+
+/// Disturbances of the motion and noise of the encoders.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OdometryOptions {
+    /// Samples a second.
+    pub rate: f64,
+    /// Standard deviation of what the driving wheel turns too much or too little, m for the root of a metre.
+    pub slip: f64,
+    /// Standard deviation of a reading of the steering angle.
+    pub steering_noise_deg: f64,
+    /// Standard deviation of the heading's walk, degrees for the root of a metre.
+    pub yaw_walk_deg: f64,
+    /// Standard deviation of the shift to the side, m for the root of a metre.
+    pub side_slip: f64,
+}
+
+impl Default for OdometryOptions {
+    fn default() -> Self {
+        Self { rate: 100.0, slip: 3e-3, steering_noise_deg: 0.01, yaw_walk_deg: 0.02, side_slip: 0.5e-3 }
+    }
+}
+
+impl OdometryOptions {
+    /// Perfect wheels on a perfect floor.
+    #[must_use]
+    pub fn perfect() -> Self {
+        Self { slip: 0.0, steering_noise_deg: 0.0, yaw_walk_deg: 0.0, side_slip: 0.0, ..Self::default() }
+    }
+}
