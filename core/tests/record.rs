@@ -148,6 +148,7 @@ fn landmark_use() -> impl Strategy<Value = LandmarkUse> {
     (time(), landmark_kind(), landmark, verdict, numbers).prop_map(
         |(time, kind, landmark, verdict, (position, residual, test_ratio))| LandmarkUse {
             located: [residual[1], residual[0]],
+            residual_deviation: [test_ratio, residual[0]],
             time,
             kind,
             landmark,

@@ -305,6 +305,10 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 position: [position.x as f32, position.y as f32],
                 located,
                 residual: association.nearest.map_or([0.0; 2], |landmark| landmark.innovation.residual.into()),
+                residual_deviation: association.nearest.map_or([0.0; 2], |landmark| {
+                    let covariance = &landmark.innovation.covariance;
+                    [libm::sqrt(covariance.m11), libm::sqrt(covariance.m22)]
+                }),
                 test_ratio: association
                     .nearest
                     .map_or(0.0, |landmark| landmark.innovation.normalised_square / self.parameters.association.gate),

@@ -56,6 +56,8 @@ pub struct LandmarkUse {
     pub located: [f64; 2],
     /// Observation minus expectation for the nearest landmark; m and rad, or m and m.
     pub residual: [f64; 2],
+    /// Standard deviation that the filter expects of the residual, in its units; zero without a landmark.
+    pub residual_deviation: [f64; 2],
     /// Squared Mahalanobis distance to the nearest landmark, divided by the gate: below one is inside.
     pub test_ratio: f64,
 }

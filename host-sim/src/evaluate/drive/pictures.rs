@@ -8,7 +8,7 @@ use agv_core::measurement::Time;
 use super::figures::{KINDS, MODES};
 use super::names::{kind_name, mode_name};
 use super::track::Track;
-use crate::evaluate::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, pose_at};
+use crate::evaluate::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, Spread, pose_at};
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::replay::Replay;
 use crate::report::{
@@ -231,36 +231,46 @@ fn add_innovations(page: &mut Page, recording: &Recording, replay: &Replay) -> R
     let bearings = residuals(&is_reflector, &|used| used.residual[1].to_degrees());
     let first = residuals(&is_feature, &millimetres(0));
     let second = residuals(&is_feature, &millimetres(1));
-    add_residuals(page, "range, mm", &[("reflectors", &ranges)], "Range of the reflectors minus its expectation.")?;
+    let expected = |wanted: &dyn Fn(LandmarkKind) -> bool, axis: usize| {
+        let accepted = replay.uses.iter().filter(|used| used.verdict == Verdict::Accepted && wanted(used.kind));
+        3.0 * Spread::of(accepted.map(|used| used.residual_deviation[axis])).median
+    };
+    add_residuals(
+        page,
+        "range, mm",
+        &[("reflectors", &ranges)],
+        1e3 * expected(&is_reflector, 0),
+        "Range of the reflectors minus its expectation.",
+    )?;
     add_residuals(
         page,
         "bearing, deg",
         &[("reflectors", &bearings)],
+        expected(&is_reflector, 1).to_degrees(),
         "Bearing of the reflectors minus its expectation.",
     )?;
     add_residuals(
         page,
         "position, mm",
         &[("along the first axis of the sensor", &first), ("along the second", &second)],
+        1e3 * expected(&is_feature, 0),
         "Position of the features in the sensor's frame minus its expectation.",
     )
 }
 
-/// Residuals with three times their root mean square.
+/// Residuals with what the filter expects of them.
 fn add_residuals(
     page: &mut Page,
     label: &str,
     sets: &[(&str, &Vec<(f64, f64)>)],
+    bound: f64,
     caption: &str,
 ) -> Result<(), FigureError> {
-    let values = || sets.iter().flat_map(|(_, points)| points.iter().map(|point| point.1));
-    let count = values().count();
-    if count == 0 {
+    if sets.iter().all(|(_, points)| points.is_empty()) {
         return Ok(());
     }
-    let bound = 3.0 * (values().map(|value| value * value).sum::<f64>() / count as f64).sqrt();
     let sets: Vec<PointSet> = sets.iter().map(|(name, points)| PointSet { name, points }).collect();
-    let bounds = Bounds { name: "three times the root mean square", heights: &[-bound, bound] };
+    let bounds = Bounds { name: "three expected standard deviations, median", heights: &[-bound, bound] };
     page.figure(&scatter_chart(["time, s", label], &sets, Some(bounds))?, caption);
     Ok(())
 }
