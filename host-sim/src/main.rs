@@ -34,6 +34,8 @@ enum Command {
     Map(command::map::Map),
     Evaluate(command::evaluate::Evaluate),
     Features(command::features::Features),
+    Nav350(command::nav350::Nav350),
+    Record(command::record::Record),
 }
 
 fn main() -> ExitCode {
@@ -47,6 +49,8 @@ fn main() -> ExitCode {
         Some(Command::Map(command)) => command.run(),
         Some(Command::Evaluate(command)) => command.run(),
         Some(Command::Features(command)) => command.run(),
+        Some(Command::Nav350(command)) => command.run(),
+        Some(Command::Record(command)) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
