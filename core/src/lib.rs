@@ -11,7 +11,7 @@
 //! | 5 | [`record`], [`wire`] |
 //! | 4 | [`localizer`] |
 //! | 3 | [`features`], [`filter`] |
-//! | 2 | [`odometry`], [`landmarks`] |
+//! | 2 | [`odometry`], [`landmarks`], [`wire`] |
 //! | 1 | [`geometry`], [`measurement`] |
 //!
 //! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.

@@ -7,8 +7,8 @@ use agv_core::localizer::{Event, LandmarkSource, LandmarkUse, Mode, Parameters, 
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
-    Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Record, Reference, Scratch,
-    Step, Truth, encode,
+    Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Raw, RawSource, Record,
+    Reference, Scratch, Step, Truth, encode,
 };
 use proptest::prelude::*;
 
@@ -27,6 +27,7 @@ enum Owned {
     Truth(Truth),
     Reference(Reference),
     Note(String),
+    Raw(RawSource, Time, Vec<u8>),
     End,
 }
 
@@ -56,6 +57,7 @@ impl Owned {
             Self::Truth(truth) => Record::Truth(*truth),
             Self::Reference(reference) => Record::Reference(*reference),
             Self::Note(text) => Record::Note(text),
+            Self::Raw(source, time, bytes) => Record::Raw(Raw { source: *source, time: *time, bytes }),
             Self::End => Record::End,
         })
     }
@@ -203,6 +205,9 @@ fn record() -> impl Strategy<Value = Owned> {
         (time(), number(), number(), prop::option::of(number()))
             .prop_map(|(time, x, y, heading)| Owned::Reference(Reference { time, x, y, heading })),
         ".{0,100}".prop_map(Owned::Note),
+        (any::<bool>(), time(), prop::collection::vec(any::<u8>(), 0..300)).prop_map(|(is_received, time, bytes)| {
+            Owned::Raw(if is_received { RawSource::FromNav350 } else { RawSource::ToNav350 }, time, bytes)
+        }),
         Just(Owned::End),
     ]
 }
@@ -321,7 +326,7 @@ proptest! {
     #[test]
     fn arbitrary_payloads_are_records_or_damage(kind in 0_u8..16, payload in prop::collection::vec(any::<u8>(), 0..200)) {
         // A frame with a good checksum around anything.
-        let mut frame = vec![0xD6, 0x41, 0x47, 0x56, 1, kind, payload.len() as u8, 0, 3, 0, 0, 0];
+        let mut frame = vec![0xD6, 0x41, 0x47, 0x56, 2, kind, payload.len() as u8, 0, 3, 0, 0, 0];
         frame.extend(payload);
         frame.extend([0; 4]);
         let end = frame.len() - 4;
@@ -442,7 +447,7 @@ fn another_version_is_told_apart_from_damage() {
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 1, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 2, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }
@@ -458,6 +463,10 @@ fn what_does_not_fit_is_refused() {
     let landmark = Landmark { id: 0, kind: LandmarkKind::Reflector, x: 0.0, y: 0.0, deviation: 0.0 };
     assert_eq!(encode(&Record::Landmarks(&[landmark; 51]), 0, &mut buffer), Err(EncodeError::TooLong));
     assert!(encode(&Record::Note(&note[..32_768]), 0, &mut buffer).is_ok());
+    let mut raw = Raw { source: RawSource::FromNav350, time: Time::default(), bytes: &note.as_bytes()[..16_385] };
+    assert_eq!(encode(&Record::Raw(raw), 0, &mut buffer), Err(EncodeError::TooLong));
+    raw.bytes = &raw.bytes[..16_384];
+    assert!(encode(&Record::Raw(raw), 0, &mut buffer).is_ok());
 
     let ranges = [1.0; 5];
     let scan = Scan {

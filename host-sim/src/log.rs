@@ -350,7 +350,7 @@ pub fn write_with_outputs<'a>(
     writer.finish()
 }
 
-/// Everything that a log holds, except notes.
+/// Everything that a log holds, except notes and raw bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contents {
     /// Name and version of the program that wrote the log.
@@ -413,7 +413,7 @@ pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Conte
                 Record::Truth(one) => truth.push(one),
                 Record::Reference(one) => references.push(one),
                 Record::End => is_complete = true,
-                Record::Output(_) | Record::Note(_) => {}
+                Record::Output(_) | Record::Note(_) | Record::Raw(_) => {}
             },
         }
     }

@@ -35,6 +35,8 @@ enum Command {
     Evaluate(command::evaluate::Evaluate),
     Features(command::features::Features),
     Can(command::can::Can),
+    Nav350(command::nav350::Nav350),
+    Record(command::record::Record),
 }
 
 fn main() -> ExitCode {
@@ -49,6 +51,8 @@ fn main() -> ExitCode {
         Some(Command::Evaluate(command)) => command.run(),
         Some(Command::Features(command)) => command.run(),
         Some(Command::Can(command)) => command.run(),
+        Some(Command::Nav350(command)) => command.run(),
+        Some(Command::Record(command)) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -272,8 +272,8 @@ fn two_drives_in_one_file_are_refused() {
 
 #[test]
 fn a_log_of_another_version_is_refused() {
-    // A note of format version 2: the layout of a frame is the same in all versions.
-    let body = [0xD6, 0x41, 0x47, 0x56, 2, 11, 2, 0, 0, 0, 0, 0, b'h', b'i'];
+    // A note of format version 1: the layout of a frame is the same in all versions.
+    let body = [0xD6, 0x41, 0x47, 0x56, 1, 11, 2, 0, 0, 0, 0, 0, b'h', b'i'];
     let checksum = !body.iter().fold(u32::MAX, |state, byte| {
         (0..8).fold(
             state ^ u32::from(*byte),
@@ -284,5 +284,5 @@ fn a_log_of_another_version_is_refused() {
     let path = folder.path().join("drive.agvlog");
     std::fs::write(&path, [&body[..], &checksum.to_le_bytes()].concat()).unwrap();
     let message = log::read(&path).unwrap_err().to_string();
-    assert!(message.ends_with(": the log has format version 2, this program reads 1"), "{message}");
+    assert!(message.ends_with(": the log has format version 1, this program reads 2"), "{message}");
 }

@@ -1,6 +1,7 @@
 //! The project's own commands: `cargo xtask --help`.
 
 mod packages;
+mod seeds;
 mod test;
 
 use std::process::ExitCode;
@@ -16,11 +17,13 @@ struct Xtask {
 
 #[derive(Subcommand)]
 enum Command {
+    Seeds(seeds::Seeds),
     Test(test::Test),
 }
 
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
+        Command::Seeds(seeds) => seeds.run(),
         Command::Test(test) => test.run(),
     };
     match outcome {

@@ -66,8 +66,33 @@ pub enum Record<'a> {
     Reference(Reference),
     /// A short text for people.
     Note(&'a str),
+    /// Bytes as they passed a link, beside what was made of them.
+    Raw(Raw<'a>),
     /// The log is complete.
     End,
+}
+
+/// Where raw bytes come from or go to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RawSource {
+    /// From a NAV350 to the host.
+    FromNav350,
+    /// From the host to a NAV350.
+    ToNav350,
+}
+
+/// Greatest number of bytes in one raw record; more are written in pieces.
+pub const RAW_A_RECORD: usize = 16 * 1024;
+
+/// Bytes as they passed a link, a piece of at most [`RAW_A_RECORD`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Raw<'a> {
+    /// On which link, and in which direction.
+    pub source: RawSource,
+    /// When they arrived or were sent.
+    pub time: Time,
+    /// The bytes.
+    pub bytes: &'a [u8],
 }
 
 /// Why a record cannot be encoded.
@@ -120,6 +145,7 @@ mod kind {
     pub const REFERENCE: u8 = 10;
     pub const NOTE: u8 = 11;
     pub const END: u8 = 12;
+    pub const RAW: u8 = 13;
 }
 
 /// What stands before the beams of a scan.
@@ -160,6 +186,7 @@ impl Record<'_> {
             Self::Truth(_) => kind::TRUTH,
             Self::Reference(_) => kind::REFERENCE,
             Self::Note(_) => kind::NOTE,
+            Self::Raw(_) => kind::RAW,
             Self::End => kind::END,
         }
     }
@@ -184,6 +211,9 @@ impl Record<'_> {
             Self::Truth(truth) => put(truth, room),
             Self::Reference(reference) => put(reference, room),
             Self::Note(text) => put_bytes(text.as_bytes(), room),
+            Self::Raw(raw) if raw.bytes.len() > RAW_A_RECORD => return Err(EncodeError::TooLong),
+            Self::Raw(raw) => put(&(raw.source, raw.time), room)
+                .and_then(|head| put_bytes(raw.bytes, room.get_mut(head..)?).map(|length| head + length)),
             Self::End => Some(0),
         };
         written.ok_or(full)
@@ -222,6 +252,13 @@ impl Record<'_> {
             kind::TRUTH => Record::Truth(take(payload)?),
             kind::REFERENCE => Record::Reference(take(payload)?),
             kind::NOTE => Record::Note(core::str::from_utf8(payload).map_err(|_| DecodeError::Content)?),
+            kind::RAW => {
+                let ((source, time), bytes) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+                if bytes.len() > RAW_A_RECORD {
+                    return Err(DecodeError::Content);
+                }
+                Record::Raw(Raw { source, time, bytes })
+            }
             kind::END if payload.is_empty() => Record::End,
             kind::END => return Err(DecodeError::Content),
             _ => return Err(DecodeError::Kind),

@@ -1,0 +1,9 @@
+#![no_main]
+
+use agv_core::wire::cola::Dialect;
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    agv_fuzz::decode(Dialect::Ascii, bytes);
+    agv_fuzz::stream(bytes);
+});

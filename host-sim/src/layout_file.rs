@@ -1,0 +1,125 @@
+//! Layouts of a NAV350 as files.
+//!
+//! An imk file has one landmark a line: `globID x_mm y_mm type subtype size_mm layer1 [layer2 ...]`; lines that begin
+//! with `#` or `globID` are skipped. A csv file has the same columns behind a line of their names, with the layers
+//! separated by spaces.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
+
+use crate::text_file::{self, TextFileError};
+
+/// How a layout is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// As the maker's programs do.
+    Imk,
+    /// Comma-separated.
+    Csv,
+}
+
+impl Format {
+    /// The format that the ending of the name says.
+    ///
+    /// # Errors
+    /// If it is neither `imk` nor `csv`.
+    pub fn of(path: &Path) -> Result<Self, TextFileError> {
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some(ending) if ending.eq_ignore_ascii_case("imk") => Ok(Self::Imk),
+            Some(ending) if ending.eq_ignore_ascii_case("csv") => Ok(Self::Csv),
+            _ => Err(TextFileError::Foreign {
+                path: path.to_owned(),
+                expected: "a layout, whose name ends in .imk or .csv,",
+                looks_like: "a file of another name",
+            }),
+        }
+    }
+}
+
+/// The layout in a text.
+///
+/// # Errors
+/// The number of the first line that is no landmark, from 1, and what is wrong with it.
+pub fn parse(text: &str) -> Result<Vec<IdentifiedLandmark>, (usize, &'static str)> {
+    let mut landmarks: Vec<IdentifiedLandmark> = Vec::new();
+    for (line, number) in text.lines().zip(1..) {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') || line.starts_with("globID") {
+            continue;
+        }
+        let landmark = parse_line(line).map_err(|problem| (number, problem))?;
+        if landmarks.iter().any(|known| known.id == landmark.id) {
+            return Err((number, "the name was used before"));
+        }
+        landmarks.push(landmark);
+    }
+    Ok(landmarks)
+}
+
+fn parse_line(line: &str) -> Result<IdentifiedLandmark, &'static str> {
+    fn next<'a, T: FromStr>(words: &mut impl Iterator<Item = &'a str>) -> Result<T, &'static str> {
+        let word = words.next().ok_or("a landmark has a name, two coordinates, type, subtype, size and layers")?;
+        word.parse().map_err(|_| "a number is not whole or too large")
+    }
+    let mut words = line.split(|letter: char| letter == ',' || letter.is_whitespace()).filter(|word| !word.is_empty());
+    let words = &mut words;
+    let id = next(words)?;
+    let mut landmark = LayoutLandmark {
+        x: Coordinate(next(words)?),
+        y: Coordinate(next(words)?),
+        kind: next(words)?,
+        subtype: next(words)?,
+        size: Size(next(words)?),
+        layers: heapless::Vec::new(),
+    };
+    for word in words {
+        let layer = word.parse().map_err(|_| "a number is not whole or too large")?;
+        landmark.layers.push(layer).map_err(|_| "there are too many layers")?;
+    }
+    Ok(IdentifiedLandmark { id, landmark })
+}
+
+/// A layout as a text.
+#[must_use]
+pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
+    let (separator, mut text) = match format {
+        Format::Imk => (' ', "# globID x_mm y_mm type subtype size_mm layer1 layer2 layer3\n".to_owned()),
+        Format::Csv => (',', "globID,x_mm,y_mm,type,subtype,size_mm,layers\n".to_owned()),
+    };
+    for IdentifiedLandmark { id, landmark } in landmarks {
+        let LayoutLandmark { x, y, kind, subtype, size, layers } = landmark;
+        let numbers = [
+            id.to_string(),
+            x.0.to_string(),
+            y.0.to_string(),
+            kind.to_string(),
+            subtype.to_string(),
+            size.0.to_string(),
+            layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "),
+        ];
+        text.push_str(numbers.join(&separator.to_string()).trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+/// Reads a layout from a file.
+///
+/// # Errors
+/// If the file cannot be read, or a line is no landmark.
+pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
+    Format::of(path)?;
+    let text = text_file::read(path, "a layout")?;
+    parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem))
+}
+
+/// Writes a layout to a file.
+///
+/// # Errors
+/// If the file cannot be written, or the ending of its name is of no known format.
+pub fn save(path: &Path, landmarks: &[IdentifiedLandmark]) -> Result<(), TextFileError> {
+    let text = write(landmarks, Format::of(path)?);
+    std::fs::write(path, text).map_err(|source| TextFileError::of_system(path, source))
+}

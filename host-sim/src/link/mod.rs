@@ -1,0 +1,4 @@
+//! Connections to sensors.
+
+pub mod clock;
+pub mod nav350;

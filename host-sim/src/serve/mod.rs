@@ -1,0 +1,3 @@
+//! Emulated sensors.
+
+pub mod nav350;

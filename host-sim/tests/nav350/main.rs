@@ -1,0 +1,9 @@
+//! The NAV350: recorded telegrams, the emulated sensor, and what is recorded from it.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod commands;
+mod layout;
+mod live;
+mod recorded;
