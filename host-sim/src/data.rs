@@ -23,14 +23,20 @@ pub fn folder() -> Option<PathBuf> {
 pub fn for_test(test: &str, name: &str) -> Option<PathBuf> {
     let found = folder().map(|folder| folder.join(name)).filter(|path| path.exists());
     if found.is_none() {
-        let line = format!("skipped: {test}, because there is no {name} in the folder of real data (AGV_DATA)\n");
-        eprint!("{line}");
-        if let Some(path) = std::env::var_os("AGV_SKIPPED")
-            && let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(path)
-        {
-            // A line that cannot be written changes nothing about the test.
-            let _ = file.write_all(line.as_bytes());
-        }
+        skip(test, &format!("there is no {name} in the folder of real data (AGV_DATA)"));
     }
     found
+}
+
+/// Says in one line that `test` is skipped, and why: on standard error, and in the file that the environment variable
+/// `AGV_SKIPPED` names.
+pub fn skip(test: &str, reason: &str) {
+    let line = format!("skipped: {test}, because {reason}\n");
+    eprint!("{line}");
+    if let Some(path) = std::env::var_os("AGV_SKIPPED")
+        && let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(path)
+    {
+        // A line that cannot be written changes nothing about the test.
+        let _ = file.write_all(line.as_bytes());
+    }
 }

@@ -1,6 +1,8 @@
 //! The localiser on a desktop: simulation, replay, import, evaluation and reports.
 
+pub mod bus;
 pub mod data;
+pub mod emulate;
 pub mod evaluate;
 pub mod export;
 pub mod file_kind;

@@ -34,6 +34,7 @@ enum Command {
     Map(command::map::Map),
     Evaluate(command::evaluate::Evaluate),
     Features(command::features::Features),
+    Can(command::can::Can),
     Nav350(command::nav350::Nav350),
     Record(command::record::Record),
 }
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Some(Command::Map(command)) => command.run(),
         Some(Command::Evaluate(command)) => command.run(),
         Some(Command::Features(command)) => command.run(),
+        Some(Command::Can(command)) => command.run(),
         Some(Command::Nav350(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
     };

@@ -140,6 +140,19 @@ impl RecordedOutput {
     }
 }
 
+impl Recording {
+    /// The poses of R that the references state: those with a heading, in order of time.
+    #[must_use]
+    pub fn referenced_poses(&self) -> Vec<Truth> {
+        let laser_in_reverse = self.parameters.laser.inverse();
+        let poses = self.references.iter().filter_map(|reference| {
+            let laser = Pose::new(reference.x, reference.y, reference.heading?);
+            Some(Truth { time: reference.time, pose: laser.compose(&laser_in_reverse) })
+        });
+        poses.collect()
+    }
+}
+
 /// The true pose at a time, at constant body velocity between its neighbours. None outside the recorded truth.
 #[must_use]
 pub fn truth_at(truth: &[Truth], time: Time) -> Option<Pose> {

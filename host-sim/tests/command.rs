@@ -95,6 +95,30 @@ fn import_writes_a_log_and_a_summary() {
 }
 
 #[test]
+fn an_imported_log_exports_what_its_source_does() {
+    let files = Files::new();
+    let source = files.write("good.log", GRAPH.as_bytes());
+    let log = files.path("good.agvlog");
+    assert!(agv(&["import", "graph", &source, "-o", &log]).status.success());
+    let [direct, imported] = ["direct", "imported"].map(|name| files.path(name));
+    for (input, folder) in [(&source, &direct), (&log, &imported)] {
+        let run = agv(&["features", "export", input, folder, "--json"]);
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let counts: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+        assert_eq!(counts["scans"], 2);
+    }
+    let numbers = |folder: &str, name: &str| -> Vec<f64> {
+        let content = std::fs::read_to_string(Path::new(folder).join(name)).unwrap();
+        content.split_whitespace().map(|word| word.parse().unwrap()).collect()
+    };
+    for name in ["scans.txt", "poses.txt"] {
+        let (direct, imported) = (numbers(&direct, name), numbers(&imported, name));
+        assert_eq!(direct.len(), imported.len());
+        assert!(direct.iter().zip(&imported).all(|(a, b)| (a - b).abs() < 1e-9), "{name}: {direct:?} {imported:?}");
+    }
+}
+
+#[test]
 fn import_finds_out_what_the_real_data_are() {
     let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "carpark") else { return };
     let files = Files::new();

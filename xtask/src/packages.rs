@@ -1,5 +1,6 @@
 //! Programs of others that the tests call.
 
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// One thing that must be there.
@@ -12,11 +13,53 @@ struct Requirement {
     packages: &'static [&'static str],
 }
 
-const REQUIREMENTS: [Requirement; 1] = [Requirement {
-    purpose: "the script that scores keypoints apart from this program",
-    probe: &["python3", "-c", "import numpy, scipy, shapely"],
-    packages: &["python3", "python3-numpy", "python3-scipy", "python3-shapely"],
-}];
+const REQUIREMENTS: [Requirement; 2] = [
+    Requirement {
+        purpose: "the script that scores keypoints apart from this program",
+        probe: &["python3", "-c", "import numpy, scipy, shapely"],
+        packages: &["python3", "python3-numpy", "python3-scipy", "python3-shapely"],
+    },
+    // A kernel with CAN in an ordinary process, for machines whose own kernel has none.
+    Requirement {
+        purpose: "the tests on a real CAN stack",
+        probe: &["sh", "-c", "command -v linux.uml && command -v candump && command -v insmod && command -v ip"],
+        packages: &["user-mode-linux", "kmod", "iproute2", "can-utils"],
+    },
+];
+
+/// Packages of Python that Debian does not have, and the modules that they bring.
+const PYTHON_PACKAGES: [(&str, &str); 2] = [("cantools>=39,<50", "cantools"), ("canopen>=2.2,<3", "canopen")];
+
+/// Puts the Python packages into `folder`. Returns what is still missing, one line each.
+pub fn prepare_python(folder: &Path) -> Vec<String> {
+    let modules: Vec<&str> = PYTHON_PACKAGES.iter().map(|(_, module)| *module).collect();
+    let is_there = || {
+        let import = format!("import {}", modules.join(", "));
+        succeeds(Command::new("python3").args(["-c", &import]).env("PYTHONPATH", folder))
+    };
+    if is_there() {
+        return Vec::new();
+    }
+    let packages = PYTHON_PACKAGES.map(|(package, _)| package);
+    eprintln!("installing {} into {}", packages.join(" "), folder.display());
+    let install = || {
+        let arguments = ["-m", "pip", "install", "--quiet", "--target"];
+        succeeds(Command::new("python3").args(arguments).arg(folder).args(packages))
+    };
+    if !install() && is_root() {
+        let arguments = ["install", "--yes", "--no-install-recommends", "python3-pip"];
+        succeeds(Command::new("apt-get").args(arguments).env("DEBIAN_FRONTEND", "noninteractive"));
+        install();
+    }
+    if is_there() {
+        return Vec::new();
+    }
+    vec![format!(
+        "missing: the independent readers of agv.dbc and agv.eds; install them with `python3 -m pip install --target {} {}`",
+        folder.display(),
+        packages.map(|package| format!("'{package}'")).join(" ")
+    )]
+}
 
 impl Requirement {
     fn is_met(&self) -> bool {

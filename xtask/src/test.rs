@@ -40,7 +40,8 @@ struct Outcome {
 impl Test {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let missing = packages::prepare();
+        let mut missing = packages::prepare();
+        missing.extend(packages::prepare_python(&repository().join("target/python")));
         let mut summary = Vec::new();
         let mut remarks = missing;
         let mut is_ok = true;

@@ -1,4 +1,5 @@
-//! Bytes and what they mean: protocols of sensors, without sockets and without a clock.
+//! Bytes in and values out, and back: what the vehicle's devices say on their wires. No sockets, no drivers, no clock.
 
+pub mod can;
 pub mod cola;
 pub mod nav350;

@@ -5,15 +5,23 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use agv_host_sim::import::{self, ScanLog, carmen, carpark, graph_log, sapienza};
-use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use flate2::read::MultiGzDecoder;
 use indicatif::ProgressBar;
 
+use super::summary::Summary;
+
+const HELP: &str = "\
+Examples:
+  agv import auto fr079.log --output fr079.agvlog
+  agv import carpark shared/data/carpark --output carpark.agvlog";
+
 /// Turn the recordings of others into logs.
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct Import {
     /// What the input is.
     format: Format,
@@ -61,14 +69,7 @@ impl Import {
         progress.set_message(format!("writing {}", self.output.display()));
         log::write(&self.output, &recording)?;
         progress.finish_and_clear();
-        let bytes = std::fs::metadata(&self.output).context("the log has vanished")?.len();
-        let summary = Summary::of(&recording, bytes);
-        if self.json {
-            println!("{}", serde_json::to_string(&summary)?);
-        } else {
-            summary.print();
-        }
-        Ok(())
+        Summary::of(&recording).print(self.json)
     }
 }
 
@@ -116,43 +117,4 @@ fn beginning(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut beginning = Vec::new();
     std::fs::File::open(path)?.take(1 << 16).read_to_end(&mut beginning)?;
     Ok(beginning)
-}
-
-/// What has become of the input.
-#[derive(serde::Serialize)]
-struct Summary {
-    odometry: usize,
-    scans: usize,
-    reflectors: usize,
-    landmarks: usize,
-    truth: usize,
-    references: usize,
-    bytes: u64,
-}
-
-impl Summary {
-    fn of(recording: &Recording, bytes: u64) -> Self {
-        let count = |is: fn(&RecordedEvent) -> bool| recording.events.iter().filter(|event| is(event)).count();
-        Self {
-            odometry: count(|event| {
-                matches!(event, RecordedEvent::Encoders(_) | RecordedEvent::Speed(_) | RecordedEvent::Increment(_))
-            }),
-            scans: count(|event| matches!(event, RecordedEvent::Scan(_))),
-            reflectors: count(|event| matches!(event, RecordedEvent::Reflectors(_))),
-            landmarks: recording.landmarks.len(),
-            truth: recording.truth.len(),
-            references: recording.references.len(),
-            bytes,
-        }
-    }
-
-    fn print(&self) {
-        println!("odometry samples  {}", self.odometry);
-        println!("scans             {}", self.scans);
-        println!("reflector sets    {}", self.reflectors);
-        println!("landmarks         {}", self.landmarks);
-        println!("true poses        {}", self.truth);
-        println!("reference poses   {}", self.references);
-        println!("bytes             {}", self.bytes);
-    }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_host_sim::log;
 use agv_host_sim::mapping::{
-    Clustering, map_features, map_features_at, map_file, map_reflectors_at, referenced_poses, reflector_clustering,
+    Clustering, map_features, map_features_at, map_file, map_reflectors_at, reflector_clustering,
 };
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
@@ -85,7 +85,7 @@ impl Map {
         let poses = match self.poses.unwrap_or(default) {
             Poses::Localiser => None,
             Poses::Truth => Some((recording.truth.clone(), "true poses")),
-            Poses::References => Some((referenced_poses(&recording), "reference poses with a heading")),
+            Poses::References => Some((recording.referenced_poses(), "reference poses with a heading")),
         };
         if let Some((poses, name)) = &poses {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());

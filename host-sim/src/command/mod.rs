@@ -3,6 +3,7 @@
 //! A subcommand is a clap `Args` structure with `run(self) -> anyhow::Result<()>`. Results go to standard output,
 //! progress to standard error.
 
+pub mod can;
 pub mod demonstration;
 pub mod evaluate;
 pub mod features;
@@ -15,3 +16,4 @@ mod progress;
 pub mod record;
 pub mod replay;
 pub mod simulate;
+mod summary;

@@ -8,7 +8,7 @@ use agv_core::localizer::{MapUse, PoseFix};
 use agv_core::record::Damage;
 use agv_host_sim::evaluate::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
-use agv_host_sim::mapping::{map_file, referenced_poses};
+use agv_host_sim::mapping::map_file;
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
 use agv_host_sim::replay::{Comparison, compare, replay};
 use agv_host_sim::report::Page;
@@ -216,7 +216,7 @@ const RECORDED_DEVIATIONS: (f64, f64) = (0.05, 1.0 * std::f64::consts::PI / 180.
 
 /// Puts a start pose before all events; other poses that the log gives stay.
 fn set_start(recording: &mut Recording, start: Start) -> anyhow::Result<()> {
-    let known = || recording.truth.first().copied().or_else(|| referenced_poses(recording).first().copied());
+    let known = || recording.truth.first().copied().or_else(|| recording.referenced_poses().first().copied());
     let (time, pose, (position_deviation, heading_deviation)) = match start {
         Start::Given(pose) => {
             let first = recording.events.iter().filter_map(RecordedEvent::time).min();

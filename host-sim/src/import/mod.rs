@@ -1,5 +1,6 @@
 //! Recordings of others.
 
+pub mod candump;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;

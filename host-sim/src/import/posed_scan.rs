@@ -3,7 +3,7 @@
 use agv_core::geometry::Pose;
 use agv_core::measurement::PoseIncrement;
 
-use crate::recording::RecordedScan;
+use crate::recording::{RecordedEvent, RecordedScan, Recording, truth_at};
 
 /// A scan and where the laser was.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,23 @@ pub struct PosedScan {
     pub laser: Pose,
     /// Pose of the robot in the same frame.
     pub robot: Pose,
+}
+
+impl PosedScan {
+    /// The scans of a recording, where its true poses say that the first beam was taken, or else its references.
+    #[must_use]
+    pub fn of_recording(recording: &Recording) -> Vec<Self> {
+        let poses = if recording.truth.is_empty() { recording.referenced_poses() } else { recording.truth.clone() };
+        let scans = recording.events.iter().filter_map(|event| match event {
+            RecordedEvent::Scan(scan) => Some(scan),
+            _ => None,
+        });
+        let posed = scans.filter_map(|scan| {
+            let robot = truth_at(&poses, scan.start)?;
+            Some(Self { scan: scan.clone(), laser: robot.compose(&recording.parameters.laser), robot })
+        });
+        posed.collect()
+    }
 }
 
 /// What a log of scans holds.

@@ -8,17 +8,6 @@ use super::Sighting;
 use crate::recording::{RecordedEvent, Recording, Truth, truth_at};
 use crate::replay::{ReplayError, replay};
 
-/// The poses of R that the recording's references state: those with a heading, in order of time.
-#[must_use]
-pub fn referenced_poses(recording: &Recording) -> Vec<Truth> {
-    let laser_in_reverse = recording.parameters.laser.inverse();
-    let poses = recording.references.iter().filter_map(|reference| {
-        let laser = agv_core::geometry::Pose::new(reference.x, reference.y, reference.heading?);
-        Some(Truth { time: reference.time, pose: laser.compose(&laser_in_reverse) })
-    });
-    poses.collect()
-}
-
 /// Everything that is seen of the wanted kinds between the first and the last of the known poses, where it is as seen
 /// from them. What stands in the recording's map does not matter.
 ///

@@ -5,7 +5,6 @@ mod known_poses;
 pub mod map_file;
 
 pub use clustering::{Clustering, Sighting, cluster};
-pub use known_poses::referenced_poses;
 
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{MapUse, Mode, PoseOutput};

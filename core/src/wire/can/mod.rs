@@ -1,0 +1,29 @@
+//! The CAN bus: frames, CANopen as a master of encoders sees it, serial line adapters, and the controller's own messages.
+//!
+//! | concept | module |
+//! |---|---|
+//! | classic and FD frames | [`frame`] |
+//! | frames as text on a serial line | [`slcan`] |
+//! | CANopen: identifiers and the messages behind them | [`canopen`], [`nmt`], [`sdo`], [`emcy`], [`pdo`] |
+//! | one CiA 406 encoder and its states | [`encoder`] |
+//! | is the encoder to be believed | [`supervision`] |
+//! | two encoders as one measurement | [`encoder_pair`] |
+//! | numbers in frames of unknown makers | [`signal`], [`drive_unit`] |
+//! | what the controller says and hears | [`controller`] |
+//!
+//! Times are passed in. State machines have `handle` for what arrives and `poll` for what is due; `poll` gives one frame
+//! a call and none when nothing is left to send.
+
+pub mod canopen;
+pub mod controller;
+pub mod drive_unit;
+pub mod emcy;
+pub mod encoder;
+pub mod encoder_pair;
+pub mod frame;
+pub mod nmt;
+pub mod pdo;
+pub mod sdo;
+pub mod signal;
+pub mod slcan;
+pub mod supervision;

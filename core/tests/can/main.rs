@@ -1,0 +1,12 @@
+//! The CAN bus: literal bytes, properties, and state machines against a scripted node.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "a panic is how a test fails")]
+
+mod canopen;
+mod controller;
+mod drive_unit;
+mod encoder;
+mod frames;
+mod node;
+mod pair;
+mod slcan;
+mod supervision;

@@ -1,0 +1,159 @@
+//! Two encoders as one measurement.
+
+use agv_core::measurement::{EncoderSample, Time};
+use agv_core::wire::can::canopen::NodeId;
+use agv_core::wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
+use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderFaults, EncoderPair};
+use agv_core::wire::can::frame::Frame;
+use agv_core::wire::can::supervision::{EncoderFault, SupervisionLimits};
+
+use crate::frames::frame;
+use crate::node::Node;
+
+fn at(milliseconds: u64) -> Time {
+    Time::from_micros(milliseconds * 1000)
+}
+
+fn channel(number: u8, reporting: Reporting) -> ChannelSettings {
+    ChannelSettings {
+        encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
+        limits: SupervisionLimits::every_10_ms(20_000.0, 25_000.0),
+    }
+}
+
+struct Bench {
+    pair: EncoderPair,
+    nodes: [Node; 2],
+    samples: Vec<EncoderSample>,
+    syncs: usize,
+}
+
+impl Bench {
+    fn new(reporting: Reporting) -> Self {
+        let pair = EncoderPair::new(&channel(1, reporting), &channel(2, reporting), 0.010, at(0));
+        Self { pair, nodes: [Node::new(1), Node::new(2)], samples: Vec::new(), syncs: 0 }
+    }
+
+    fn poll(&mut self, now: Time) {
+        for _ in 0..8 {
+            let Some(sent) = self.pair.poll(now) else { continue };
+            self.syncs += usize::from(sent == frame("080#"));
+            for index in 0..2 {
+                for answer in self.nodes[index].handle(&sent) {
+                    self.hear(&answer, now);
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, frame: &Frame, now: Time) {
+        self.samples.extend(self.pair.handle(frame, now));
+    }
+
+    fn start(reporting: Reporting) -> Self {
+        let mut bench = Self::new(reporting);
+        (0..30).for_each(|millisecond| bench.poll(at(millisecond)));
+        assert_eq!(bench.pair.states(), [EncoderState::Reporting; 2]);
+        bench
+    }
+
+    /// Positions of both, the steering's `lag` ms after the drive's.
+    fn report(&mut self, millisecond: u64, drive: u32, steering: u32, lag: u64) {
+        self.hear(&self.nodes[0].position(drive), at(millisecond));
+        self.hear(&self.nodes[1].position(steering), at(millisecond + lag));
+    }
+}
+
+#[test]
+fn synchronous_encoders_give_exact_samples() {
+    let mut bench = Bench::start(Reporting::Synchronous);
+    bench.syncs = 0;
+    let mut expected = Vec::new();
+    for step in 3..20u32 {
+        let millisecond = 10 * u64::from(step);
+        bench.poll(at(millisecond));
+        // The frames come a little later, in either order; the positions are those at the SYNC.
+        let (drive, steering) = (1000 + 7 * step, 500 - step);
+        let frames = [bench.nodes[0].position(drive), bench.nodes[1].position(steering)];
+        let order = if step % 2 == 0 { [0, 1] } else { [1, 0] };
+        for (delay, index) in (1..).zip(order) {
+            bench.hear(&frames[index], at(millisecond + delay));
+        }
+        expected.push(EncoderSample { time: at(millisecond), drive, steering });
+    }
+    assert_eq!(bench.samples, expected);
+    assert_eq!(bench.syncs, expected.len());
+}
+
+#[test]
+fn the_steering_is_taken_where_the_driving_wheel_was_read() {
+    let mut bench = Bench::start(Reporting::Timer { period: 10 });
+    // The steering crosses zero; its readings come 4 ms after those of the driving wheel.
+    for step in 0..5u32 {
+        let steering = 20u32.wrapping_sub(10 * step) & 0x00FF_FFFF;
+        bench.report(30 + 10 * u64::from(step), 100 * step, steering, 4);
+    }
+    let sample = |millisecond, drive, steering| EncoderSample { time: at(millisecond), drive, steering };
+    // At the first reading of the driving wheel the steering was not known yet.
+    assert_eq!(
+        bench.samples,
+        [sample(40, 100, 14), sample(50, 200, 4), sample(60, 300, 0x00FF_FFFA), sample(70, 400, 0x00FF_FFF0)]
+    );
+}
+
+#[test]
+fn no_sample_while_an_encoder_is_faulty_and_no_false_way_after_a_jump() {
+    let mut bench = Bench::start(Reporting::Timer { period: 10 });
+    let mut raw = 16_777_000u32;
+    let mut millisecond = 30;
+    for step in 0..100 {
+        raw = if step == 40 { 5_000_000 } else { (raw + 50) % (1 << 24) };
+        bench.report(millisecond, raw, 0, 0);
+        let faults = bench.pair.faults(at(millisecond));
+        let expected = (40..=60).contains(&step).then_some(EncoderFault::Jumped);
+        assert_eq!(faults, EncoderFaults { drive: expected, steering: None }, "{step}");
+        millisecond += 10;
+    }
+    assert_eq!(bench.samples.len(), 40 + 39);
+    let steps: Vec<i64> = bench
+        .samples
+        .windows(2)
+        .map(|pair| agv_core::odometry::CounterRange::BITS_24.step(pair[0].drive, pair[1].drive))
+        .collect();
+    // The way between the jump and the withdrawal is there; only that of the jump itself is lost.
+    assert_eq!(steps[39], 21 * 50);
+    assert!(steps.iter().enumerate().all(|(index, step)| index == 39 || *step == 50), "{steps:?}");
+}
+
+#[test]
+fn one_missing_encoder_is_told_from_the_other() {
+    let mut bench = Bench::start(Reporting::Timer { period: 10 });
+    for step in 0..10 {
+        bench.report(30 + 10 * step, 0, 0, 0);
+    }
+    for step in 10..16 {
+        bench.hear(&bench.nodes[0].position(0), at(30 + 10 * step));
+    }
+    let count = bench.samples.len();
+    // The steering spoke last at 120 ms.
+    assert_eq!(bench.pair.faults(at(145)), EncoderFaults::default());
+    assert_eq!(bench.pair.faults(at(146)), EncoderFaults { drive: None, steering: Some(EncoderFault::Late) });
+    assert_eq!(bench.pair.faults(at(166)), EncoderFaults { drive: None, steering: Some(EncoderFault::Missing) });
+    assert_eq!(count, 10);
+}
+
+#[test]
+fn an_emergency_holds_until_it_is_over() {
+    let mut bench = Bench::start(Reporting::Timer { period: 10 });
+    for step in 0..200 {
+        let millisecond = 30 + 10 * step;
+        match step {
+            50 => bench.hear(&frame("082#1050050000000000"), at(millisecond)),
+            120 => bench.hear(&frame("082#0000000000000000"), at(millisecond)),
+            _ => {}
+        }
+        bench.report(millisecond, 0, 0, 0);
+        let expected = (50..=139).contains(&step).then_some(EncoderFault::Reported);
+        assert_eq!(bench.pair.faults(at(millisecond)).steering, expected, "{step}");
+    }
+}

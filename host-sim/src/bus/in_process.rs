@@ -1,0 +1,62 @@
+//! A bus inside this program, for tests and emulators.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use agv_core::wire::can::frame::AnyFrame;
+
+use super::{Bus, BusError};
+
+/// The wire. What one node sends, all others receive, in the order of sending.
+#[derive(Clone, Debug, Default)]
+pub struct InProcessBus {
+    nodes: Arc<Mutex<Vec<Sender<AnyFrame>>>>,
+}
+
+/// One node on the wire.
+#[derive(Debug)]
+pub struct InProcessNode {
+    bus: InProcessBus,
+    number: usize,
+    received: Receiver<AnyFrame>,
+}
+
+impl InProcessBus {
+    /// A wire without nodes.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a node; it receives what is sent from now on.
+    #[must_use]
+    pub fn join(&self) -> InProcessNode {
+        let (sender, received) = channel();
+        let mut nodes = self.nodes.lock().unwrap_or_else(PoisonError::into_inner);
+        nodes.push(sender);
+        InProcessNode { bus: self.clone(), number: nodes.len() - 1, received }
+    }
+}
+
+impl Bus for InProcessNode {
+    fn send(&mut self, frame: &AnyFrame) -> Result<(), BusError> {
+        let nodes = self.bus.nodes.lock().unwrap_or_else(PoisonError::into_inner);
+        for (number, node) in nodes.iter().enumerate() {
+            if number != self.number {
+                // A node that is gone hears nothing, as on a real bus.
+                let _ = node.send(*frame);
+            }
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, deadline: Instant) -> Result<Option<AnyFrame>, BusError> {
+        match self.received.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            Ok(frame) => Ok(Some(frame)),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            // The bus itself holds the other end.
+            Err(RecvTimeoutError::Disconnected) => Err(BusError::Closed { name: "in-process bus".to_owned() }),
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! CAN buses of a host.
+
+mod in_process;
+#[cfg(target_os = "linux")]
+mod slcan;
+#[cfg(target_os = "linux")]
+mod socket_can;
+
+use std::time::Instant;
+
+use agv_core::wire::can::frame::AnyFrame;
+
+pub use in_process::{InProcessBus, InProcessNode};
+#[cfg(target_os = "linux")]
+pub use slcan::SlcanBus;
+#[cfg(target_os = "linux")]
+pub use socket_can::SocketCanBus;
+
+/// Why a bus cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The name is none of a bus.
+    #[error(
+        "{name}: no bus has such a name; use can0, slcan:/dev/ttyACM0 or slcan-tcp:HOST:PORT, and @BITRATE for slcan"
+    )]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// The operating system refused.
+    #[error("{name}: {source}")]
+    Io {
+        /// Name of the bus.
+        name: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The other end is gone.
+    #[error("{name}: the other end has closed the connection")]
+    Closed {
+        /// Name of the bus.
+        name: String,
+    },
+}
+
+/// A bus that this program takes part in. Nothing here waits by asking again and again.
+pub trait Bus: Send {
+    /// Sends a frame.
+    ///
+    /// # Errors
+    /// If the bus is gone or takes no frames.
+    fn send(&mut self, frame: &AnyFrame) -> Result<(), BusError>;
+
+    /// The next frame of others. None if there is none until `deadline`.
+    ///
+    /// # Errors
+    /// If the bus is gone.
+    fn receive(&mut self, deadline: Instant) -> Result<Option<AnyFrame>, BusError>;
+}
+
+/// Opens the bus with that name: `slcan:DEVICE[@BITRATE]`, `slcan-tcp:HOST:PORT[@BITRATE]` (500 kbit/s if no bit rate is
+/// named), else an interface of SocketCAN.
+///
+/// # Errors
+/// If there is no such bus, or it cannot be used.
+#[cfg(target_os = "linux")]
+pub fn open(name: &str) -> Result<Box<dyn Bus>, BusError> {
+    use agv_core::wire::can::slcan::BitRate;
+
+    let wrong = || BusError::Name { name: name.to_owned() };
+    let with_rate = |text: &str| match text.rsplit_once('@') {
+        None => Some((text.to_owned(), BitRate::Kbit500)),
+        Some((place, rate)) => Some((place.to_owned(), BitRate::from_bits_per_second(rate.parse().ok()?)?)),
+    };
+    if let Some(device) = name.strip_prefix("slcan:") {
+        let (device, rate) = with_rate(device).ok_or_else(wrong)?;
+        Ok(Box::new(SlcanBus::open_device(&device, rate)?))
+    } else if let Some(address) = name.strip_prefix("slcan-tcp:") {
+        let (address, rate) = with_rate(address).ok_or_else(wrong)?;
+        Ok(Box::new(SlcanBus::connect(&address, rate)?))
+    } else if name.is_empty() || name.contains([':', '/', '@']) {
+        Err(wrong())
+    } else {
+        Ok(Box::new(SocketCanBus::open(name)?))
+    }
+}
+
+/// This system has no CAN.
+///
+/// # Errors
+/// Always.
+#[cfg(not(target_os = "linux"))]
+pub fn open(name: &str) -> Result<Box<dyn Bus>, BusError> {
+    Err(BusError::Name { name: name.to_owned() })
+}

@@ -1,0 +1,322 @@
+//! `agv can`.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use agv_core::localizer::Event;
+use agv_core::measurement::{EncoderSample, Time};
+use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_core::wire::can::canopen::{Message, NodeId};
+use agv_core::wire::can::controller::{Content, PoseReceiver};
+use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
+use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_core::wire::can::frame::{AnyFrame, Frame};
+use agv_core::wire::can::sdo::{Request, Response};
+use agv_core::wire::can::supervision::SupervisionLimits;
+use agv_host_sim::bus::{self, Bus};
+use agv_host_sim::emulate::encoder::EmulatedEncoder;
+use agv_host_sim::import::candump;
+use agv_host_sim::recording::Recording;
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+use anyhow::Context;
+
+/// Take part in a CAN bus: can0, slcan:/dev/ttyACM0@500000, slcan-tcp:HOST:PORT
+#[derive(clap::Args)]
+pub struct Can {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(clap::Subcommand)]
+enum Action {
+    Monitor(Monitor),
+    Encoders(Encoders),
+    Pose(Pose),
+    ServeEncoders(ServeEncoders),
+}
+
+/// Print every frame as candump does, and what it means
+#[derive(clap::Args)]
+struct Monitor {
+    /// The bus
+    bus: String,
+    /// Node of the controller
+    #[arg(long, default_value = "16", value_parser = node)]
+    controller: NodeId,
+    /// Stop after so many seconds
+    #[arg(long)]
+    seconds: Option<f64>,
+}
+
+/// Set up two encoders and print their positions and faults
+#[derive(clap::Args)]
+struct Encoders {
+    /// The bus
+    bus: String,
+    /// Node of the driving wheel's encoder
+    #[arg(long, default_value = "1", value_parser = node)]
+    drive: NodeId,
+    /// Node of the steering's encoder
+    #[arg(long, default_value = "2", value_parser = node)]
+    steering: NodeId,
+    /// Read positions at SYNC instead of by the encoders' own timers
+    #[arg(long)]
+    sync: bool,
+    /// Fastest motion, ticks/s
+    #[arg(long, default_value = "1e6")]
+    fastest: f64,
+    /// Hardest braking, ticks/s^2
+    #[arg(long, default_value = "1e6")]
+    braking: f64,
+    /// Stop after so many seconds
+    #[arg(long)]
+    seconds: Option<f64>,
+}
+
+/// Print the pose that the controller says
+#[derive(clap::Args)]
+struct Pose {
+    /// The bus
+    bus: String,
+    /// Node of the controller
+    #[arg(long, default_value = "16", value_parser = node)]
+    controller: NodeId,
+    /// Stop after so many seconds
+    #[arg(long)]
+    seconds: Option<f64>,
+}
+
+/// Be two encoders whose counters follow a simulated drive or a log
+#[derive(clap::Args)]
+struct ServeEncoders {
+    /// The bus
+    bus: String,
+    /// Scenario file to simulate; see host-sim/scenarios
+    #[arg(long, required_unless_present = "log", conflicts_with = "log")]
+    scenario: Option<PathBuf>,
+    /// Log to play
+    #[arg(long)]
+    log: Option<PathBuf>,
+    /// Node of the driving wheel's encoder
+    #[arg(long, default_value = "1", value_parser = node)]
+    drive: NodeId,
+    /// Node of the steering's encoder
+    #[arg(long, default_value = "2", value_parser = node)]
+    steering: NodeId,
+    /// Stop after so many seconds; else at the end of the drive
+    #[arg(long)]
+    seconds: Option<f64>,
+}
+
+fn node(text: &str) -> Result<NodeId, String> {
+    text.parse().ok().and_then(NodeId::new).ok_or_else(|| "a node is a number from 1 to 127".to_owned())
+}
+
+impl Can {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        match self.action {
+            Action::Monitor(command) => command.run(),
+            Action::Encoders(command) => command.run(),
+            Action::Pose(command) => command.run(),
+            Action::ServeEncoders(command) => command.run(),
+        }
+    }
+}
+
+/// The time since a program began, as the core wants it.
+struct Clock {
+    start: Instant,
+    end: Option<Instant>,
+}
+
+impl Clock {
+    fn new(seconds: Option<f64>) -> anyhow::Result<Self> {
+        let start = Instant::now();
+        let duration = seconds.map(Duration::try_from_secs_f64).transpose().context("--seconds")?;
+        Ok(Self { start, end: duration.map(|duration| start + duration) })
+    }
+
+    fn now(&self) -> Time {
+        Time::from_micros(self.start.elapsed().as_micros() as u64)
+    }
+
+    fn is_over(&self) -> bool {
+        self.end.is_some_and(|end| Instant::now() >= end)
+    }
+
+    /// Waits for a frame, at most so long.
+    fn receive(&self, bus: &mut dyn Bus, patience: Duration) -> anyhow::Result<Option<AnyFrame>> {
+        let deadline = Instant::now() + patience;
+        Ok(bus.receive(self.end.map_or(deadline, |end| deadline.min(end)))?)
+    }
+}
+
+/// How long a command that only listens waits before it looks at the clock.
+const LISTENING: Duration = Duration::from_millis(500);
+/// How often state machines are asked what is due.
+const STEP: Duration = Duration::from_millis(1);
+
+impl Monitor {
+    fn run(self) -> anyhow::Result<()> {
+        let mut bus = bus::open(&self.bus)?;
+        let clock = Clock::new(self.seconds)?;
+        while !clock.is_over() {
+            let Some(frame) = clock.receive(&mut *bus, LISTENING)? else { continue };
+            let meaning = frame.classic().and_then(|frame| meaning(frame, self.controller)).unwrap_or_default();
+            let line = candump::screen_line(&self.bus, &frame);
+            println!("{}", format!("{line:<56}  {meaning}").trim_end());
+        }
+        Ok(())
+    }
+}
+
+/// What a frame means, in a few words.
+fn meaning(frame: &Frame, controller: NodeId) -> Option<String> {
+    if let Ok((content, counter)) = Content::decode(frame, controller) {
+        return Some(format!("{content:?} #{counter}"));
+    }
+    Some(match Message::decode(frame).ok()? {
+        Message::SdoRequest { node, bytes } => {
+            format!(
+                "SDO to {}: {}",
+                node.number(),
+                Request::decode(bytes).map_or("?".to_owned(), |r| format!("{r:X?}"))
+            )
+        }
+        Message::SdoResponse { node, bytes } => {
+            format!(
+                "SDO of {}: {}",
+                node.number(),
+                Response::decode(bytes).map_or("?".to_owned(), |r| format!("{r:X?}"))
+            )
+        }
+        Message::Nmt { command, node: None } => format!("NMT {command:?}, all nodes"),
+        Message::Nmt { command, node: Some(node) } => format!("NMT {command:?}, node {}", node.number()),
+        Message::Sync { .. } => "SYNC".to_owned(),
+        Message::Emergency { node, emergency } => {
+            format!("emergency of {}: {:04X}, register {:02X}", node.number(), emergency.code, emergency.register)
+        }
+        Message::TransmitPdo { node, number, .. } => format!("PDO {number} of {}", node.number()),
+        Message::ReceivePdo { node, number, .. } => format!("PDO {number} to {}", node.number()),
+        Message::Heartbeat { node, state } => format!("node {} is {state:?}", node.number()),
+    })
+}
+
+impl Encoders {
+    fn run(self) -> anyhow::Result<()> {
+        let mut bus = bus::open(&self.bus)?;
+        let clock = Clock::new(self.seconds)?;
+        let reporting = if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
+        let channel = |node| ChannelSettings {
+            encoder: EncoderSettings { reporting, ..EncoderSettings::new(node) },
+            limits: SupervisionLimits::every_10_ms(self.fastest, self.braking),
+        };
+        let mut pair = EncoderPair::new(&channel(self.drive), &channel(self.steering), 0.010, clock.now());
+        let mut known = None;
+        while !clock.is_over() {
+            while let Some(frame) = pair.poll(clock.now()) {
+                bus.send(&frame.into())?;
+            }
+            if let Some(frame) = clock.receive(&mut *bus, STEP)?
+                && let Some(sample) = frame.classic().and_then(|frame| pair.handle(frame, clock.now()))
+            {
+                println!("{:12.6}  drive {:10}  steering {:10}", sample.time.seconds(), sample.drive, sample.steering);
+            }
+            let now = clock.now();
+            let state = (pair.states(), pair.faults(now));
+            if known.replace(state) != Some(state) {
+                let (states, faults) = state;
+                println!("{:12.6}  states {states:?}, faults {:?} {:?}", now.seconds(), faults.drive, faults.steering);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Pose {
+    fn run(self) -> anyhow::Result<()> {
+        let mut bus = bus::open(&self.bus)?;
+        let clock = Clock::new(self.seconds)?;
+        let mut receiver = PoseReceiver::new(self.controller);
+        while !clock.is_over() {
+            let Some(frame) = clock.receive(&mut *bus, LISTENING)? else { continue };
+            let Some(pose) = frame.classic().and_then(|frame| receiver.handle(frame)) else { continue };
+            println!(
+                "x {:10.4} m  y {:10.4} m  heading {:9.4} deg  +- {:.4} {:.4} m {:.3} deg  {:?} ({:?})  {:.2} m without correction",
+                pose.pose.x,
+                pose.pose.y,
+                pose.pose.theta.to_degrees(),
+                pose.deviations[0],
+                pose.deviations[1],
+                pose.deviations[2].to_degrees(),
+                pose.mode,
+                pose.reason,
+                pose.dead_reckoning_distance,
+            );
+        }
+        Ok(())
+    }
+}
+
+impl ServeEncoders {
+    fn run(self) -> anyhow::Result<()> {
+        let recording = self.recording()?;
+        let samples: Vec<EncoderSample> = recording
+            .events
+            .iter()
+            .filter_map(|event| if let Event::Encoders(sample) = event.view() { Some(sample) } else { None })
+            .collect();
+        let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+            anyhow::bail!("the drive has no encoders");
+        };
+        let (drive_range, steering_range) = match recording.parameters.vehicle {
+            Vehicle::Tricycle(Tricycle { drive_range, steering_range, .. }) => (drive_range, steering_range),
+            _ => (CounterRange::BITS_32, CounterRange::BITS_32),
+        };
+        let mut nodes =
+            [EmulatedEncoder::new(self.drive, drive_range), EmulatedEncoder::new(self.steering, steering_range)];
+        let mut bus = bus::open(&self.bus)?;
+        let clock = Clock::new(self.seconds.or(Some(last.time.since(first.time))))?;
+        // The drive begins when the encoders are started.
+        let mut start = None;
+        while !clock.is_over() {
+            let now = clock.now();
+            if start.is_none() && nodes.iter().all(EmulatedEncoder::is_operational) {
+                start = Some(now);
+            }
+            let elapsed = start.map_or(0.0, |start| now.since(start));
+            let reached = samples.partition_point(|sample| sample.time.since(first.time) <= elapsed).max(1);
+            let sample = &samples[reached - 1];
+            nodes[0].set_position(sample.drive);
+            nodes[1].set_position(sample.steering);
+            for node in &mut nodes {
+                while let Some(frame) = node.poll(now) {
+                    bus.send(&frame.into())?;
+                }
+            }
+            let Some(frame) = clock.receive(&mut *bus, STEP)? else { continue };
+            for node in &mut nodes {
+                if let Some(answer) = frame.classic().and_then(|frame| node.handle(frame)) {
+                    bus.send(&answer.into())?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn recording(&self) -> anyhow::Result<Recording> {
+        if let Some(scenario) = &self.scenario {
+            let mut scenario = Scenario::read(scenario)?;
+            scenario.laser.scans = false;
+            return Ok(simulate(&scenario)?.recording);
+        }
+        let log = self.log.as_ref().context("neither a scenario nor a log")?;
+        let (recording, damages) = agv_host_sim::log::read(log)?;
+        if !damages.is_empty() {
+            eprintln!("{}: {} places are damaged", log.display(), damages.len());
+        }
+        Ok(recording)
+    }
+}

@@ -1,0 +1,3 @@
+//! Devices that are not there.
+
+pub mod encoder;

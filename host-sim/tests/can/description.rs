@@ -1,0 +1,209 @@
+//! The description files that ship with the project, as programs of others read them.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use agv_core::localizer::{Mode, Reason};
+use agv_core::wire::can::canopen::NodeId;
+use agv_core::wire::can::controller::{Content, Health, LaserHealth, WantedMode};
+use agv_core::wire::can::frame::{Frame, Id};
+use agv_core::wire::can::supervision::EncoderFault;
+use agv_host_sim::data;
+use serde_json::Value;
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+fn python() -> Command {
+    let mut python = Command::new("python3");
+    // Where `cargo xtask test` puts packages that Debian does not have.
+    let inherited = std::env::var("PYTHONPATH").unwrap_or_default();
+    python.env("PYTHONPATH", format!("{}:{inherited}", repository("target/python").display()));
+    python
+}
+
+fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
+    let mut all = Vec::new();
+    let numbers = [-1.0, -0.37, 0.0, 0.001, 0.25, 0.9];
+    for (index, number) in (0u8..).zip(numbers) {
+        let (x, y) = (53_000.0 * number, -1234.5678 * number);
+        let position = BTreeMap::from([("X", x), ("Y", y)]);
+        all.push((Content::Position { x, y }, position.clone()));
+        all.push((Content::InitialPosition { x, y }, position));
+        let (heading, distance) = (std::f64::consts::PI * number, 600.0 * number.abs());
+        all.push((
+            Content::Heading { heading, time: 1000 * u16::from(index) + 7, dead_reckoning_distance: distance },
+            BTreeMap::from([
+                ("Heading", heading),
+                ("Time", f64::from(index) + 0.007),
+                ("DeadReckoningDistance", distance),
+            ]),
+        ));
+        let deviations = [number.abs(), 2.0 * number.abs(), 0.5 * number.abs()];
+        let correlations = [number, -number, 0.5 * number];
+        all.push((
+            Content::Covariance { deviations, correlations },
+            BTreeMap::from([
+                ("DeviationX", deviations[0]),
+                ("DeviationY", deviations[1]),
+                ("DeviationHeading", deviations[2]),
+                ("CorrelationXY", correlations[0]),
+                ("CorrelationXHeading", correlations[1]),
+                ("CorrelationYHeading", correlations[2]),
+            ]),
+        ));
+        all.push((
+            Content::InitialHeading {
+                heading,
+                position_deviation: 60.0 * number.abs(),
+                heading_deviation: number.abs(),
+            },
+            BTreeMap::from([
+                ("Heading", heading),
+                ("PositionDeviation", 60.0 * number.abs()),
+                ("HeadingDeviation", number.abs()),
+            ]),
+        ));
+    }
+    for is_standstill in [false, true] {
+        all.push((
+            Content::Command { mode: WantedMode::Mixed, layer: 513, is_standstill },
+            BTreeMap::from([
+                ("WantedMode", 3.0),
+                ("WantedLayer", 513.0),
+                ("Standstill", f64::from(u8::from(is_standstill))),
+            ]),
+        ));
+    }
+    all
+}
+
+/// Every value that a status can name.
+fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
+    use EncoderFault::{Frozen, HeartbeatLost, Jumped, Late, Missing, OutOfRange, Reported};
+    let modes = [Mode::NotLocalised, Mode::Reflectors, Mode::Features, Mode::Mixed, Mode::DeadReckoning, Mode::Lost];
+    let reasons = [
+        Reason::None,
+        Reason::NoPose,
+        Reason::NoLandmarks,
+        Reason::LandmarksRejected,
+        Reason::InnovationsTooLarge,
+        Reason::Uncertain,
+        Reason::OdometryImplausible,
+    ];
+    let faults = [
+        None,
+        Some(Late),
+        Some(Missing),
+        Some(Frozen),
+        Some(Jumped),
+        Some(OutOfRange),
+        Some(Reported),
+        Some(HeartbeatLost),
+    ];
+    let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
+    (0..8)
+        .map(|index| {
+            let (mode, reason) = (modes[index % 6], reasons[index % 7]);
+            let (drive, steering, laser) = (faults[index], faults[7 - index], lasers[index % 4]);
+            let fault = |fault: Option<EncoderFault>| fault.map_or("None".to_owned(), |fault| format!("{fault:?}"));
+            let status = Content::Status {
+                mode,
+                reason,
+                acceptance: 0.5,
+                normalised_square: 2.0,
+                health: Health { drive, steering, laser, layer: 40_000 },
+            };
+            let names = BTreeMap::from([
+                ("Mode", format!("{mode:?}")),
+                ("Reason", format!("{reason:?}")),
+                ("DriveFault", fault(drive)),
+                ("SteeringFault", fault(steering)),
+                ("Laser", format!("{laser:?}")),
+                ("Layer", "40000".to_owned()),
+            ]);
+            (status, names)
+        })
+        .collect()
+}
+
+fn line(frame: &Frame) -> String {
+    let Id::Standard(id) = frame.id() else { panic!("29 bits") };
+    let bytes: String = frame.data().iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("{:03X}#{bytes}", id.as_raw())
+}
+
+/// What cantools makes of each frame. None if it is not installed.
+fn described(frames: &[Frame]) -> Option<Vec<Value>> {
+    let has_packages = python().args(["-c", "import cantools, canopen"]).output().is_ok_and(|run| run.status.success());
+    if !has_packages {
+        data::skip("agv.dbc and agv.eds", "python3 with cantools and canopen is not there");
+        return None;
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/can/agv_description.py");
+    let mut child = python()
+        .arg(script)
+        .args([repository("docs/agv.dbc"), repository("docs/agv.eds")])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines: Vec<String> = frames.iter().map(line).collect();
+    child.stdin.take().unwrap().write_all((lines.join("\n") + "\n").as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let answers = std::str::from_utf8(&output.stdout).unwrap().lines();
+    Some(answers.map(|answer| serde_json::from_str(answer).unwrap()).collect())
+}
+
+/// Half a step of each signal; deviations are rounded up, so a whole one.
+fn tolerance(signal: &str) -> f64 {
+    match signal {
+        "X" | "Y" => 0.5e-4,
+        "Heading" => 0.5e-6,
+        "Time" => 1e-9,
+        "DeadReckoningDistance" => 0.01,
+        "DeviationX" | "DeviationY" => 0.00025,
+        "DeviationHeading" | "HeadingDeviation" => 1e-4,
+        "CorrelationXY" | "CorrelationXHeading" | "CorrelationYHeading" => 0.01,
+        "PositionDeviation" => 1e-3,
+        _ => 0.0,
+    }
+}
+
+#[test]
+fn cantools_decodes_what_we_say_and_encodes_what_we_hear() {
+    let node = NodeId::new(16).unwrap();
+    let (contents, statuses) = (contents(), statuses());
+    let all: Vec<Content> =
+        contents.iter().map(|(content, _)| *content).chain(statuses.iter().map(|(content, _)| *content)).collect();
+    let frames: Vec<Frame> = (0..).zip(&all).map(|(count, content)| content.encode(node, count % 16)).collect();
+    let Some(answers) = described(&frames) else { return };
+    assert_eq!(answers.len(), frames.len());
+    for (count, (frame, answer)) in frames.iter().zip(&answers).enumerate() {
+        assert_eq!(answer["signals"]["Counter"], count % 16);
+        let Value::String(again) = &answer["again"] else { panic!("{answer}") };
+        // Their encoding of the values is our frame, so what they encode is what we decode.
+        assert_eq!(*again, line(frame)[4..], "{answer}");
+    }
+    for ((content, expected), answer) in contents.iter().zip(&answers) {
+        let signals = answer["signals"].as_object().unwrap();
+        assert_eq!(signals.len(), expected.len() + 1, "{content:?}");
+        for (name, value) in expected {
+            let found = signals[*name].as_f64().unwrap();
+            assert!((found - value).abs() <= tolerance(name) + 1e-9, "{name}: {found}, not {value}");
+        }
+    }
+    for ((content, expected), answer) in statuses.iter().zip(&answers[contents.len()..]) {
+        for (name, value) in expected {
+            assert_eq!(answer["names"][*name], **value, "{content:?}");
+        }
+        assert_eq!(
+            (answer["signals"]["Acceptance"].as_f64(), answer["signals"]["NormalisedSquare"].as_f64()),
+            (Some(0.5), Some(2.0))
+        );
+    }
+}
