@@ -36,9 +36,9 @@ pub fn record_nav350(link: &mut Link, until: Time, writer: &mut Writer) -> Resul
             Happening::Connected => writer.write(&Record::Note("nav350: connected"))?,
             Happening::Lost(reason) => {
                 summary.lost += 1;
-                writer.write(&Record::Note(&format!("nav350: lost: {reason:?}")))?;
+                writer.write(&Record::Note(&format!("nav350: lost: {reason}")))?;
             }
-            Happening::Report(report) => writer.write(&Record::Note(&format!("nav350: {report:?}")))?,
+            Happening::Report(report) => writer.write(&Record::Note(&format!("nav350: {report}")))?,
             Happening::Sent(bytes) => write_raw(writer, RawSource::ToNav350, time, bytes)?,
             Happening::Received(bytes) => {
                 summary.received += bytes.len();

@@ -150,6 +150,16 @@ fn a_silent_sensor_is_given_up_and_found_again() {
     assert!(scene.is_running());
 }
 
+/// A late answer about the time must never be taken for that to a later question.
+#[test]
+fn an_unanswered_question_about_the_time_ends_the_connection() {
+    let mut scene = speaking(Dialect::Binary);
+    scene.run(5.0);
+    scene.moods.ignores_method = Some(MethodName::GetTimestamp);
+    scene.run(2.5);
+    assert_eq!(scene.lost[0].1, LostReason::NoAnswer(State::Running));
+}
+
 #[test]
 fn a_sensor_that_says_nothing_at_all() {
     let mut scene = speaking(Dialect::Binary);

@@ -185,7 +185,7 @@ fn probe(host: &str) -> anyhow::Result<()> {
     });
     match (outcome, trouble) {
         (Err(()), _) => Ok(()),
-        (Ok(()), Some(reason)) => bail!("{address}: no revolution came: {reason:?}"),
+        (Ok(()), Some(reason)) => bail!("{address}: no revolution came: {reason}"),
         (Ok(()), None) => bail!("{address}: no revolution came"),
     }
 }

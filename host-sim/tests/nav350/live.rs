@@ -284,7 +284,12 @@ fn a_bad_line_is_survived_and_told() {
     let (numbers, _) = check_events(&turns, &again.events);
     assert!(numbers.len() > 10);
     let notes = notes(&path);
-    for expected in ["lost: Closed", "lost: NoAnswer", "Rubbish(8)", "State(Running)"] {
+    for expected in [
+        "nav350: lost: the connection was closed",
+        "nav350: lost: no answer while identifying",
+        "nav350: 8 bytes belong to no telegram",
+        "nav350: running",
+    ] {
         assert!(notes.iter().any(|note| note.contains(expected)), "{expected}: {notes:#?}");
     }
 }

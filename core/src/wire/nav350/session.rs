@@ -1,5 +1,7 @@
 //! The conversation with one sensor, without sockets and without a clock.
 
+use core::fmt;
+
 use heapless::{Deque, Vec};
 
 use super::{
@@ -125,6 +127,35 @@ pub enum LostReason {
     Overflow,
 }
 
+impl fmt::Display for State {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Waiting => "waiting",
+            Self::Connecting => "connecting",
+            Self::Identifying => "identifying",
+            Self::LoggingIn => "logging in",
+            Self::Configuring => "configuring",
+            Self::EnteringMode => "entering the operating mode",
+            Self::Synchronising => "synchronising",
+            Self::Running => "running",
+        })
+    }
+}
+
+impl fmt::Display for LostReason {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotConnected => write!(formatter, "no connection"),
+            Self::Closed => write!(formatter, "the connection was closed"),
+            Self::NoAnswer(state) => write!(formatter, "no answer while {state}"),
+            Self::AccessDenied => write!(formatter, "the user level was not granted"),
+            Self::Refused(state, fault) => write!(formatter, "refused while {state}: {fault}"),
+            Self::Failed(method, error) => write!(formatter, "{} failed: {error}", method.name()),
+            Self::Overflow => write!(formatter, "a telegram was too long"),
+        }
+    }
+}
+
 /// Something worth telling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Report {
@@ -150,6 +181,26 @@ pub enum Report {
     Clock(ClockError),
     /// An answer did not become a revolution.
     Revolution(RevolutionError),
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::State(state) => write!(formatter, "{state}"),
+            Self::Dialect(Dialect::Ascii) => write!(formatter, "the sensor speaks CoLa-A"),
+            Self::Dialect(Dialect::Binary) => write!(formatter, "the sensor speaks CoLa-B"),
+            Self::Rubbish(count) => write!(formatter, "{count} bytes belong to no telegram"),
+            Self::Undecodable(error) => write!(formatter, "a telegram cannot be read: {error:?}"),
+            Self::Unexpected => write!(formatter, "a telegram answers no question"),
+            Self::SettingRefused(variable, fault) => write!(formatter, "{} was refused: {fault}", variable.name()),
+            Self::CallRefused(method, fault) => write!(formatter, "{} was refused: {fault}", method.name()),
+            Self::CallUnanswered(method) => write!(formatter, "{} was not answered", method.name()),
+            Self::MethodFailed(method, error) => write!(formatter, "{} failed: {error}", method.name()),
+            Self::Clock(ClockError::RoundTrip) => write!(formatter, "an answer about the time came too late"),
+            Self::Clock(ClockError::Restarted) => write!(formatter, "the sensor's clock was started again"),
+            Self::Revolution(error) => write!(formatter, "a revolution cannot be used: {error:?}"),
+        }
+    }
 }
 
 /// What the caller must do next.
@@ -451,11 +502,8 @@ impl Conversation {
                 self.has_changed_dialect = true;
                 self.dialect = self.dialect.other();
             }
-            Subject::Method(method @ (MethodName::SetSpeed | MethodName::GetTimestamp))
-                if self.state == State::Running =>
-            {
-                self.report(Report::CallUnanswered(method));
-            }
+            Subject::Method(MethodName::SetSpeed) => self.report(Report::CallUnanswered(MethodName::SetSpeed)),
+            // A late answer about the time would be taken for that to the next question. A new connection has none.
             _ => self.lose(LostReason::NoAnswer(self.state)),
         }
     }
