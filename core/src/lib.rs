@@ -8,7 +8,7 @@
 //!
 //! | floor | rooms |
 //! |---|---|
-//! | 5 | [`record`], [`wire`] |
+//! | 5 | [`record`]; the controller's own messages in [`wire::can`] |
 //! | 4 | [`localizer`] |
 //! | 3 | [`features`], [`filter`] |
 //! | 2 | [`odometry`], [`landmarks`], [`wire`] |
