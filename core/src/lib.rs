@@ -8,11 +8,11 @@
 //!
 //! | floor | rooms |
 //! |---|---|
-//! | 5 | [`record`]; the controller's own messages in [`wire::can`] |
+//! | 5 | [`record`] |
 //! | 4 | [`localizer`] |
 //! | 3 | [`features`], [`filter`] |
 //! | 2 | [`odometry`], [`landmarks`], [`wire`] |
-//! | 1 | [`geometry`], [`measurement`] |
+//! | 1 | [`geometry`], [`measurement`], [`state`] |
 //!
 //! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.
 //! Units: SI and radians. Poses and covariances are f64, scans and features f32.
@@ -29,4 +29,5 @@ pub mod localizer;
 pub mod measurement;
 pub mod odometry;
 pub mod record;
+pub mod state;
 pub mod wire;

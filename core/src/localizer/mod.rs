@@ -3,12 +3,13 @@
 mod event;
 mod machine;
 mod maps;
-mod mode;
 mod output;
 mod parameters;
 
-pub use event::{Event, PoseFix};
+pub use event::Event;
 pub use machine::Localizer;
-pub use mode::{Mode, Reason};
-pub use output::{LandmarkSource, LandmarkUse, Outputs, PoseOutput};
+pub use output::{LandmarkSource, LandmarkUse, Outputs};
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
+
+pub use crate::measurement::PoseFix;
+pub use crate::state::{Mode, PoseOutput, Reason};

@@ -1,11 +1,13 @@
 //! What a sensor said, and when it was true.
 
 mod encoder;
+mod pose_fix;
 mod reflectors;
 mod scan;
 mod time;
 
 pub use encoder::{EncoderSample, PoseIncrement, SpeedSample};
+pub use pose_fix::PoseFix;
 pub use reflectors::{ReflectorObservation, Reflectors};
 pub use scan::Scan;
 pub use time::Time;

@@ -21,8 +21,8 @@ use super::canopen::{NodeId, receive_pdo_id, transmit_pdo_id};
 use super::frame::{Frame, Id};
 use super::supervision::EncoderFault;
 use crate::geometry::{Pose, wrap};
-use crate::localizer::{Mode, PoseFix, PoseOutput, Reason};
-use crate::measurement::Time;
+use crate::measurement::{PoseFix, Time};
+use crate::state::{Mode, PoseOutput, Reason};
 
 /// Time between two poses on the bus, s.
 pub const PERIOD: f64 = 0.010;
