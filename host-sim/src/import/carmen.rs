@@ -8,10 +8,10 @@
 use std::path::Path;
 
 use agv_core::geometry::Pose;
-use agv_core::measurement::{PoseIncrement, Time};
+use agv_core::measurement::PoseIncrement;
 
+use super::scan_record::{Clock, number, pose, ranges, robot_laser, scan};
 use super::{PosedScan, ScanLog};
-use crate::recording::RecordedScan;
 use crate::text_file::{self, TextFileError};
 
 /// A CARMEN log by laser.
@@ -39,8 +39,8 @@ pub fn read(path: &Path) -> Result<CarmenLog, TextFileError> {
         let parsed = match record {
             "FLASER" => old_scan(words, &mut clock).map(|scan| log.front.scans.push(scan)),
             "RLASER" => old_scan(words, &mut clock).map(|scan| log.rear.push(scan)),
-            "ROBOTLASER1" => new_scan(words, &mut clock).map(|scan| log.front.scans.push(scan)),
-            "ROBOTLASER2" => new_scan(words, &mut clock).map(|scan| log.rear.push(scan)),
+            "ROBOTLASER1" => robot_laser(words, &mut clock).map(|scan| log.front.scans.push(scan)),
+            "ROBOTLASER2" => robot_laser(words, &mut clock).map(|scan| log.rear.push(scan)),
             "ODOM" => odometry(words).map(|(pose, seconds)| {
                 let before = anchor.replace(pose);
                 if seconds > 0.0 {
@@ -57,39 +57,6 @@ pub fn read(path: &Path) -> Result<CarmenLog, TextFileError> {
     Ok(log)
 }
 
-/// Times of a log count from its first one, in case they are seconds since 1970.
-#[derive(Default)]
-struct Clock {
-    start: Option<f64>,
-}
-
-impl Clock {
-    fn at(&mut self, seconds: f64) -> Time {
-        let start = *self.start.get_or_insert(seconds);
-        Time::from_seconds((seconds - start).max(0.0))
-    }
-}
-
-fn number<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<f64> {
-    words.next()?.parse().ok()
-}
-
-fn count<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<usize> {
-    words.next()?.parse().ok()
-}
-
-fn pose<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Pose> {
-    Some(Pose::new(number(words)?, number(words)?, number(words)?))
-}
-
-fn ranges<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Vec<f32>> {
-    (0..count(words)?).map(|_| number(words).map(|range| range as f32)).collect()
-}
-
-fn scan(start: Time, first_bearing: f64, bearing_step: f64, ranges: Vec<f32>) -> RecordedScan {
-    RecordedScan { start, beam_interval: 0.0, first_bearing, bearing_step, ranges, intensities: Vec::new() }
-}
-
 /// Fields: n, n ranges, laser pose, robot pose, time, host, time of logging. The angles are not written: half a turn,
 /// of which both ends are measured if n is odd.
 fn old_scan<'a>(words: &mut impl Iterator<Item = &'a str>, clock: &mut Clock) -> Option<PosedScan> {
@@ -99,28 +66,6 @@ fn old_scan<'a>(words: &mut impl Iterator<Item = &'a str>, clock: &mut Clock) ->
     let steps = if ranges.len() % 2 == 1 { ranges.len() - 1 } else { ranges.len() };
     let step = std::f64::consts::PI / steps.max(1) as f64;
     Some(PosedScan { scan: scan(time, -std::f64::consts::FRAC_PI_2, step, ranges), laser, robot })
-}
-
-/// Fields: type, start angle, field of view, step, largest range, accuracy, remission mode, n, n ranges, m, m
-/// remissions, laser pose, robot pose, five values of the base, time, host, time of logging.
-fn new_scan<'a>(words: &mut impl Iterator<Item = &'a str>, clock: &mut Clock) -> Option<PosedScan> {
-    number(words)?;
-    let first_bearing = number(words)?;
-    number(words)?;
-    let bearing_step = number(words)?;
-    for _ in 0..3 {
-        number(words)?;
-    }
-    let ranges = ranges(words)?;
-    for _ in 0..count(words)? {
-        number(words)?;
-    }
-    let (laser, robot) = (pose(words)?, pose(words)?);
-    for _ in 0..5 {
-        number(words)?;
-    }
-    let time = clock.at(number(words)?);
-    Some(PosedScan { scan: scan(time, first_bearing, bearing_step, ranges), laser, robot })
 }
 
 /// Fields: robot pose, three values of its motion, time, host, time of logging.

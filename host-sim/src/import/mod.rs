@@ -7,6 +7,7 @@ pub mod graph_log;
 mod posed_scan;
 pub mod sapienza;
 mod scan_drive;
+mod scan_record;
 mod table;
 
 pub use posed_scan::{PosedScan, ScanLog};

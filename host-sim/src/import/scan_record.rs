@@ -1,0 +1,62 @@
+//! Fields that CARMEN and pose-graph logs share: numbers, poses and the record of a laser. Lengths are in m, angles in rad.
+
+use agv_core::geometry::Pose;
+use agv_core::measurement::Time;
+
+use super::PosedScan;
+use crate::recording::RecordedScan;
+
+/// Times of a log count from its first one, in case they are seconds since 1970.
+#[derive(Default)]
+pub(super) struct Clock {
+    start: Option<f64>,
+}
+
+impl Clock {
+    pub(super) fn at(&mut self, seconds: f64) -> Time {
+        let start = *self.start.get_or_insert(seconds);
+        Time::from_seconds((seconds - start).max(0.0))
+    }
+}
+
+pub(super) fn number<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<f64> {
+    words.next()?.parse().ok()
+}
+
+pub(super) fn count<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<usize> {
+    words.next()?.parse().ok()
+}
+
+pub(super) fn pose<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Pose> {
+    Some(Pose::new(number(words)?, number(words)?, number(words)?))
+}
+
+pub(super) fn ranges<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Vec<f32>> {
+    (0..count(words)?).map(|_| number(words).map(|range| range as f32)).collect()
+}
+
+pub(super) fn scan(start: Time, first_bearing: f64, bearing_step: f64, ranges: Vec<f32>) -> RecordedScan {
+    RecordedScan { start, beam_interval: 0.0, first_bearing, bearing_step, ranges, intensities: Vec::new() }
+}
+
+/// A `ROBOTLASER1` or `ROBOTLASER2` record behind its name. Fields: type, start angle, field of view, step, largest range, accuracy, remission mode, n, n ranges, m, m
+/// remissions, laser pose, robot pose, five values of the base, time, host, time of logging.
+pub(super) fn robot_laser<'a>(words: &mut impl Iterator<Item = &'a str>, clock: &mut Clock) -> Option<PosedScan> {
+    number(words)?;
+    let first_bearing = number(words)?;
+    number(words)?;
+    let bearing_step = number(words)?;
+    for _ in 0..3 {
+        number(words)?;
+    }
+    let ranges = ranges(words)?;
+    for _ in 0..count(words)? {
+        number(words)?;
+    }
+    let (laser, robot) = (pose(words)?, pose(words)?);
+    for _ in 0..5 {
+        number(words)?;
+    }
+    let time = clock.at(number(words)?);
+    Some(PosedScan { scan: scan(time, first_bearing, bearing_step, ranges), laser, robot })
+}
