@@ -27,16 +27,10 @@ const REFLECTORS: [[f64; 2]; 5] = [[-4.9, 1.0], [5.9, 0.5], [1.5, 5.9], [1.0, -5
 
 /// A short drive among boxes and reflectors.
 fn scenario() -> Scenario {
-    let [left, low, right, high] = [-5.0, -6.0, 6.0, 6.0];
     Scenario {
         seed: 11,
         world: WorldOptions::Shapes(Shapes {
-            walls: vec![
-                [left, low, right, low],
-                [right, low, right, high],
-                [right, high, left, high],
-                [left, high, left, low],
-            ],
+            walls: Shapes::hall([-5.0, -6.0], [6.0, 6.0]),
             rectangles: BOXES
                 .map(|[x, y, length, width]| RectangleOptions { x, y, heading_deg: 0.0, length, width })
                 .to_vec(),

@@ -77,15 +77,7 @@ pub fn hall_scenario() -> Scenario {
     let (left, low, right, high) = HALL;
     Scenario {
         seed: 7,
-        world: WorldOptions::Shapes(Shapes {
-            walls: vec![
-                [left, low, right, low],
-                [right, low, right, high],
-                [right, high, left, high],
-                [left, high, left, low],
-            ],
-            ..Shapes::default()
-        }),
+        world: WorldOptions::Shapes(Shapes { walls: Shapes::hall([left, low], [right, high]), ..Shapes::default() }),
         path: PathOptions {
             kind: PathKind::Legs,
             start: PoseOptions { x: -3.0, y: -2.0, heading_deg: 20.0 },

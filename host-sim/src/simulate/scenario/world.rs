@@ -102,6 +102,12 @@ impl ReflectorShape {
 }
 
 impl Shapes {
+    /// The four walls of a rectangular hall: its low and its high corner in W, m.
+    #[must_use]
+    pub fn hall([left, low]: [f64; 2], [right, high]: [f64; 2]) -> Vec<[f64; 4]> {
+        vec![[left, low, right, low], [right, low, right, high], [right, high, left, high], [left, high, left, low]]
+    }
+
     /// The world of these shapes.
     #[must_use]
     pub fn world(&self) -> World {
