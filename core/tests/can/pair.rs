@@ -1,11 +1,11 @@
 //! Two encoders as one measurement.
 
-use agv_core::measurement::{EncoderSample, Time};
+use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderFaults, EncoderPair};
+use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair, FAULT_PERIOD};
 use agv_core::wire::can::frame::Frame;
-use agv_core::wire::can::supervision::{EncoderFault, SupervisionLimits};
+use agv_core::wire::can::supervision::SupervisionLimits;
 
 use crate::frames::frame;
 use crate::node::Node;
@@ -111,7 +111,7 @@ fn no_sample_while_an_encoder_is_faulty_and_no_false_way_after_a_jump() {
         bench.report(millisecond, raw, 0, 0);
         let faults = bench.pair.faults(at(millisecond));
         let expected = (40..=60).contains(&step).then_some(EncoderFault::Jumped);
-        assert_eq!(faults, EncoderFaults { drive: expected, steering: None }, "{step}");
+        assert_eq!((faults.drive, faults.steering), (expected, None), "{step}");
         millisecond += 10;
     }
     assert_eq!(bench.samples.len(), 40 + 39);
@@ -136,9 +136,13 @@ fn one_missing_encoder_is_told_from_the_other() {
     }
     let count = bench.samples.len();
     // The steering spoke last at 120 ms.
-    assert_eq!(bench.pair.faults(at(145)), EncoderFaults::default());
-    assert_eq!(bench.pair.faults(at(146)), EncoderFaults { drive: None, steering: Some(EncoderFault::Late) });
-    assert_eq!(bench.pair.faults(at(166)), EncoderFaults { drive: None, steering: Some(EncoderFault::Missing) });
+    assert!(!bench.pair.faults(at(145)).any());
+    let steering_fault = |faults: EncoderFaults| {
+        assert_eq!(faults.drive, None);
+        faults.steering
+    };
+    assert_eq!(steering_fault(bench.pair.faults(at(146))), Some(EncoderFault::Late));
+    assert_eq!(steering_fault(bench.pair.faults(at(166))), Some(EncoderFault::Missing));
     assert_eq!(count, 10);
 }
 
@@ -156,4 +160,26 @@ fn an_emergency_holds_until_it_is_over() {
         let expected = (50..=139).contains(&step).then_some(EncoderFault::Reported);
         assert_eq!(bench.pair.faults(at(millisecond)).steering, expected, "{step}");
     }
+}
+
+#[test]
+fn faults_are_told_when_they_change_and_while_they_last() {
+    let mut bench = Bench::start(Reporting::Timer { period: 10 });
+    let mut told = Vec::new();
+    for millisecond in 30..600 {
+        let is_silent = (100..200).contains(&millisecond);
+        if millisecond % 10 == 0 && !is_silent {
+            bench.report(millisecond, 0, 0, 0);
+        }
+        told.extend(bench.pair.poll_faults(at(millisecond)));
+    }
+    let reported: Vec<_> = told.iter().map(|faults| (faults.time, faults.drive)).collect();
+    // The last reading was at 90 ms.
+    assert_eq!(reported[0], (at(116), Some(EncoderFault::Late)));
+    assert!(reported.contains(&(at(136), Some(EncoderFault::Missing))));
+    assert!(told.windows(2).all(|pair| pair[1].time.since(pair[0].time) <= FAULT_PERIOD + 1e-9), "{reported:?}");
+    // The reading at 200 ms ended it; then the recovery time of 200 ms goes by.
+    let last = told.last().unwrap();
+    assert!(!last.any());
+    assert_eq!(last.time, at(400));
 }
