@@ -1,6 +1,9 @@
 //! Two encoders as one measurement.
 
+use agv_core::geometry::Pose;
+use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, Reason};
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
+use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
 use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair, FAULT_PERIOD};
@@ -182,4 +185,85 @@ fn faults_are_told_when_they_change_and_while_they_last() {
     let last = told.last().unwrap();
     assert!(!last.any());
     assert_eq!(last.time, at(400));
+}
+
+fn localizer() -> Box<Localizer<16, 16, 16, 16>> {
+    let vehicle = Vehicle::Tricycle(Tricycle {
+        wheelbase: 1.5,
+        drive_scale: 1e-4,
+        drive_range: CounterRange::BITS_24,
+        steering_scale: 1e-3,
+        steering_range: CounterRange::BITS_24,
+        steering_offset_forward: 0.0,
+        steering_offset_backward: 0.0,
+    });
+    let mut localizer = Box::new(Localizer::new(Parameters::new(vehicle, Pose::new(0.9, 0.0, 0.0))));
+    let fix = PoseFix { time: at(25), pose: Pose::default(), position_deviation: 0.01, heading_deviation: 0.001 };
+    localizer.handle(&Event::SetPose(fix));
+    localizer
+}
+
+/// What befalls the encoders of a vehicle that drives 1 m/s, from 1 s on.
+#[derive(Clone, Copy, Debug)]
+enum Trouble {
+    DriveSilent,
+    SteeringSilent,
+    DriveFrozen,
+    DriveJump,
+    SteeringOutOfRange,
+    DriveEmergency,
+}
+
+#[test]
+fn every_trouble_is_a_mode_with_its_reason_within_50_ms() {
+    use Trouble::{DriveEmergency, DriveFrozen, DriveJump, DriveSilent, SteeringOutOfRange, SteeringSilent};
+    for (trouble, reason) in [
+        (DriveSilent, Reason::DriveEncoder),
+        (SteeringSilent, Reason::SteeringEncoder),
+        (DriveFrozen, Reason::DriveEncoder),
+        (DriveJump, Reason::DriveEncoder),
+        (SteeringOutOfRange, Reason::SteeringEncoder),
+        (DriveEmergency, Reason::DriveEncoder),
+    ] {
+        let mut bench = Bench::start(Reporting::Timer { period: 10 });
+        let mut localizer = localizer();
+        let mut changed = None;
+        for millisecond in 30..1200u64 {
+            let is_troubled = millisecond >= 1000;
+            let now = at(millisecond);
+            if millisecond % 10 == 0 {
+                let ticks = (10 * (millisecond - 30)) as u32;
+                let drive = match trouble {
+                    DriveFrozen if is_troubled => 9_600,
+                    DriveJump if is_troubled => ticks + 1_000_000,
+                    _ => ticks,
+                };
+                // The other encoder's range is 24 bits.
+                let steering = if matches!(trouble, SteeringOutOfRange) && is_troubled { u32::MAX } else { 0 };
+                if !(matches!(trouble, DriveSilent) && is_troubled) {
+                    bench.hear(&bench.nodes[0].position(drive), now);
+                }
+                if !(matches!(trouble, SteeringSilent) && is_troubled) {
+                    bench.hear(&bench.nodes[1].position(steering), now);
+                }
+            }
+            if matches!(trouble, DriveEmergency) && millisecond == 1000 {
+                bench.hear(&frame("081#1050050000000000"), now);
+            }
+            for sample in bench.samples.drain(..) {
+                localizer.handle(&Event::Encoders(sample));
+            }
+            if let Some(faults) = bench.pair.poll_faults(now) {
+                localizer.handle(&Event::EncoderFaults(faults));
+            }
+            let output = localizer.outputs().pose;
+            if output.mode == Mode::WithoutOdometry && changed.is_none() {
+                changed = Some((millisecond, output.reason));
+            }
+            assert!(is_troubled || output.mode == Mode::DeadReckoning, "{trouble:?} {millisecond} {output:?}");
+        }
+        let (millisecond, told) = changed.unwrap_or_else(|| panic!("{trouble:?} was not told"));
+        assert_eq!(told, reason, "{trouble:?}");
+        assert!(millisecond <= 1050, "{trouble:?}: {millisecond}");
+    }
 }
