@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use agv_core::localizer::Event;
-use agv_core::measurement::{EncoderSample, Time};
-use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_core::measurement::Time;
 use agv_core::wire::can::canopen::{Message, NodeId};
 use agv_core::wire::can::controller::{Content, PoseReceiver};
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
@@ -14,12 +12,14 @@ use agv_core::wire::can::frame::{AnyFrame, Frame};
 use agv_core::wire::can::sdo::{Object, Request, Response};
 use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::bus::{self, Bus};
-use agv_host_sim::emulate::encoder::EmulatedEncoder;
+use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::import::candump;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use anyhow::Context;
+
+use super::encoder_arguments::node;
 
 /// Take part in a CAN bus: can0, slcan:/dev/ttyACM0@500000, slcan-tcp:HOST:PORT
 #[derive(clap::Args)]
@@ -107,10 +107,6 @@ struct ServeEncoders {
     /// Stop after so many seconds; else at the end of the drive
     #[arg(long)]
     seconds: Option<f64>,
-}
-
-fn node(text: &str) -> Result<NodeId, String> {
-    text.parse().ok().and_then(NodeId::new).ok_or_else(|| "a node is a number from 1 to 127".to_owned())
 }
 
 impl Can {
@@ -274,44 +270,22 @@ impl Pose {
 impl ServeEncoders {
     fn run(self) -> anyhow::Result<()> {
         let recording = self.recording()?;
-        let samples: Vec<EncoderSample> = recording
-            .events
-            .iter()
-            .filter_map(|event| if let Event::Encoders(sample) = event.view() { Some(sample) } else { None })
-            .collect();
-        let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
-            anyhow::bail!("the drive has no encoders");
-        };
-        let (drive_range, steering_range) = match recording.parameters.vehicle {
-            Vehicle::Tricycle(Tricycle { drive_range, steering_range, .. }) => (drive_range, steering_range),
-            _ => (CounterRange::BITS_32, CounterRange::BITS_32),
-        };
-        let mut nodes =
-            [EmulatedEncoder::new(self.drive, drive_range), EmulatedEncoder::new(self.steering, steering_range)];
+        let mut pair = EmulatedPair::new(&recording, self.drive, self.steering)?;
         let mut bus = bus::open(&self.bus)?;
-        let clock = Clock::new(self.seconds.or(Some(last.time.since(first.time))))?;
-        // The drive begins when the encoders are started.
-        let mut start = None;
+        let clock = Clock::new(self.seconds)?;
         while !clock.is_over() {
             let now = clock.now();
-            if start.is_none() && nodes.iter().all(EmulatedEncoder::is_operational) {
-                start = Some(now);
+            // Without a stated time the program ends with the drive.
+            let is_done = pair.start().is_some_and(|start| now.since(start) > pair.duration());
+            if self.seconds.is_none() && is_done {
+                break;
             }
-            let elapsed = start.map_or(0.0, |start| now.since(start));
-            let reached = samples.partition_point(|sample| sample.time.since(first.time) <= elapsed).max(1);
-            let sample = &samples[reached - 1];
-            nodes[0].set_position(sample.drive);
-            nodes[1].set_position(sample.steering);
-            for node in &mut nodes {
-                while let Some(frame) = node.poll(now) {
-                    bus.send(&frame.into())?;
-                }
+            for frame in pair.poll(now) {
+                bus.send(&frame.into())?;
             }
             let Some(frame) = clock.receive(&mut *bus, STEP)? else { continue };
-            for node in &mut nodes {
-                if let Some(answer) = frame.classic().and_then(|frame| node.handle(frame)) {
-                    bus.send(&answer.into())?;
-                }
+            for answer in frame.classic().map(|frame| pair.handle(frame)).unwrap_or_default() {
+                bus.send(&answer.into())?;
             }
         }
         Ok(())

@@ -6,12 +6,12 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use agv_core::localizer::{Event, Localizer};
-use agv_core::record::{Capacities, Header, Item, RawSource, Record};
+use agv_core::record::{Item, RawSource, Record};
 use agv_core::wire::cola::{Deframed, Deframer, Dialect};
 use agv_core::wire::nav350::{Answer, Configuration, MethodResult, NavigationData, SensorFrame};
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::Link;
-use agv_host_sim::live::{self, Summary};
+use agv_host_sim::live::{self, Recorder, Summary};
 use agv_host_sim::log::{self, Reader, Writer};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options, Turn};
@@ -46,11 +46,7 @@ impl Drop for StopOnDrop<'_> {
 
 fn record(address: SocketAddr, recording: &Recording, seconds: f64, first: Dialect, path: &Path) -> Summary {
     let parameters = &recording.parameters;
-    let header = Header { software: log::SOFTWARE, parameters, capacities: Capacities::default() };
-    let mut writer = Writer::create(path, &header).unwrap();
-    for piece in recording.landmarks.chunks(50) {
-        writer.write(&Record::Landmarks(piece)).unwrap();
-    }
+    let recorder = Recorder::new(Writer::begin(path, parameters, &recording.landmarks).unwrap());
     let clock = Clock::new(SPEED);
     let configuration = Configuration {
         first_dialect: first,
@@ -60,8 +56,9 @@ fn record(address: SocketAddr, recording: &Recording, seconds: f64, first: Diale
         ..Configuration::default()
     };
     let mut link = Link::new(&address.to_string(), configuration, clock);
-    let summary = live::record_nav350(&mut link, clock.now().offset(seconds), &mut writer).unwrap();
-    writer.finish().unwrap();
+    let is_stopped = AtomicBool::new(false);
+    let summary = live::record_nav350(&mut link, clock.now().offset(seconds), &is_stopped, &recorder).unwrap();
+    recorder.finish().unwrap();
     summary
 }
 
