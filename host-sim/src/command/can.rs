@@ -21,8 +21,18 @@ use anyhow::Context;
 
 use super::encoder_arguments::node;
 
+const HELP: &str = "\
+A bus is an interface of SocketCAN, or an adapter that speaks SLCAN.
+
+Examples:
+  agv can monitor can0
+  agv can encoders slcan:/dev/ttyACM0@500000 --drive 1 --steering 2
+  agv can pose slcan-tcp:localhost:3333 --json
+  agv can serve-encoders vcan0 --scenario host-sim/scenarios/block_storage_p1.toml";
+
 /// Take part in a CAN bus: can0, slcan:/dev/ttyACM0@500000, slcan-tcp:HOST:PORT
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct Can {
     #[command(subcommand)]
     action: Action,

@@ -4,7 +4,7 @@ use std::net::TcpListener;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-use agv_core::wire::cola::Sequence;
+use agv_core::wire::cola::{Dialect, Sequence};
 use agv_core::wire::nav350::{
     Answer, Configuration, ErrorCode, IdentifiedLandmark, LANDMARKS_A_TELEGRAM, Method, MethodResult, OperatingMode,
     Request, SensorFrame, UserLevel, Value, Variable,
@@ -19,8 +19,17 @@ use agv_host_sim::simulate::simulate;
 use anyhow::{Context, bail};
 use clap::Subcommand;
 
+const HELP: &str = "\
+Examples:
+  agv nav350 probe 192.168.1.10
+  agv nav350 layout download 192.168.1.10 hall.imk
+  agv nav350 layout convert hall.imk hall.csv
+  agv nav350 serve --scenario host-sim/scenarios/warehouse_hall.toml --port 2112
+  agv nav350 serve --log drive.agvlog --dialect cola-a";
+
 /// Talk to a NAV350, or be one
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct Nav350 {
     #[command(subcommand)]
     command: Command,
@@ -56,6 +65,31 @@ struct Serve {
     /// How much faster than real time the drive goes.
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
+    /// The only dialect that is understood; both if absent.
+    #[arg(long)]
+    dialect: Option<DialectChoice>,
+    /// What the sensor's clock shows at its start, ms; near 4294967295 it wraps soon.
+    #[arg(long, value_name = "MS", default_value_t = 0)]
+    clock: u32,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum DialectChoice {
+    /// CoLa-A: ASCII.
+    #[value(name = "cola-a")]
+    Ascii,
+    /// CoLa-B: binary.
+    #[value(name = "cola-b")]
+    Binary,
+}
+
+impl From<DialectChoice> for Dialect {
+    fn from(choice: DialectChoice) -> Self {
+        match choice {
+            DialectChoice::Ascii => Self::Ascii,
+            DialectChoice::Binary => Self::Binary,
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -126,7 +160,10 @@ impl Serve {
         let listener = TcpListener::bind(("0.0.0.0", self.port)).with_context(|| format!("port {}", self.port))?;
         let port = listener.local_addr()?.port();
         eprintln!("serving {} revolutions on port {port}", drive.turns().len());
-        let sensor = Sensor::new(drive, Options { speed: self.speed, ..Options::default() });
+        let sensor = Sensor::new(
+            drive,
+            Options { speed: self.speed, clock_start: self.clock, dialect: self.dialect.map(Into::into) },
+        );
         Ok(sensor.serve(&listener, &AtomicBool::new(false))?)
     }
 }

@@ -7,4 +7,5 @@ mod capture;
 mod commands;
 mod layout;
 mod live;
+mod minute;
 mod recorded;
