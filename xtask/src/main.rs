@@ -1,9 +1,11 @@
 //! The project's own commands: `cargo xtask --help`.
 
+mod fuzz;
 mod packages;
 mod seeds;
 mod test;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -17,12 +19,14 @@ struct Xtask {
 
 #[derive(Subcommand)]
 enum Command {
+    Fuzz(fuzz::Fuzz),
     Seeds(seeds::Seeds),
     Test(test::Test),
 }
 
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
+        Command::Fuzz(fuzz) => fuzz.run(),
         Command::Seeds(seeds) => seeds.run(),
         Command::Test(test) => test.run(),
     };
@@ -33,4 +37,10 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The top of the repository.
+fn repository() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
 }

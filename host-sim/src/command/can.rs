@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use agv_core::measurement::Time;
+use agv_core::measurement::{EncoderSample, Time};
 use agv_core::wire::can::canopen::{Message, NodeId};
-use agv_core::wire::can::controller::{Content, PoseReceiver};
+use agv_core::wire::can::controller::{Content, PoseReceiver, PublishedPose};
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
 use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_core::wire::can::frame::{AnyFrame, Frame};
@@ -18,6 +18,7 @@ use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use anyhow::Context;
+use serde_json::json;
 
 use super::encoder_arguments::node;
 
@@ -36,6 +37,9 @@ Examples:
 pub struct Can {
     #[command(subcommand)]
     action: Action,
+    /// Print one JSON object a line.
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(clap::Subcommand)]
@@ -123,9 +127,9 @@ impl Can {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.action {
-            Action::Monitor(command) => command.run(),
-            Action::Encoders(command) => command.run(),
-            Action::Pose(command) => command.run(),
+            Action::Monitor(command) => command.run(self.json),
+            Action::Encoders(command) => command.run(self.json),
+            Action::Pose(command) => command.run(self.json),
             Action::ServeEncoders(command) => command.run(),
         }
     }
@@ -165,13 +169,19 @@ const LISTENING: Duration = Duration::from_millis(500);
 const STEP: Duration = Duration::from_millis(1);
 
 impl Monitor {
-    fn run(self) -> anyhow::Result<()> {
+    fn run(self, as_json: bool) -> anyhow::Result<()> {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         while !clock.is_over() {
             let Some(frame) = clock.receive(&mut *bus, LISTENING)? else { continue };
             let meaning = frame.classic().and_then(|frame| meaning(frame, self.controller)).unwrap_or_default();
             let line = candump::screen_line(&self.bus, &frame);
+            if as_json {
+                let time = Some(clock.now());
+                let seen = candump::SeenFrame { time, interface: self.bus.clone(), frame };
+                println!("{}", json!({ "frame": candump::log_line(&seen), "meaning": meaning }));
+                continue;
+            }
             println!("{}", format!("{line:<56}  {meaning}").trim_end());
         }
         Ok(())
@@ -222,7 +232,7 @@ fn response(bytes: [u8; 8]) -> String {
 }
 
 impl Encoders {
-    fn run(self) -> anyhow::Result<()> {
+    fn run(self, as_json: bool) -> anyhow::Result<()> {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         let reporting = if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
@@ -239,13 +249,25 @@ impl Encoders {
             if let Some(frame) = clock.receive(&mut *bus, STEP)?
                 && let Some(sample) = frame.classic().and_then(|frame| pair.handle(frame, clock.now()))
             {
-                println!("{:12.6}  drive {:10}  steering {:10}", sample.time.seconds(), sample.drive, sample.steering);
+                if as_json {
+                    let EncoderSample { time, drive, steering } = sample;
+                    println!("{}", json!({ "time_s": time.seconds(), "drive": drive, "steering": steering }));
+                } else {
+                    let time = sample.time.seconds();
+                    println!("{time:12.6}  drive {:10}  steering {:10}", sample.drive, sample.steering);
+                }
             }
             let now = clock.now();
-            let state = (pair.states(), pair.faults(now));
+            let faults = pair.faults(now);
+            let state = (pair.states(), [faults.drive, faults.steering]);
             if known.replace(state) != Some(state) {
                 let (states, faults) = state;
-                println!("{:12.6}  states {states:?}, faults {:?} {:?}", now.seconds(), faults.drive, faults.steering);
+                if as_json {
+                    let states = states.map(|state| format!("{state:?}"));
+                    println!("{}", json!({ "time_s": now.seconds(), "states": states, "faults": faults }));
+                } else {
+                    println!("{:12.6}  states {states:?}, faults {:?} {:?}", now.seconds(), faults[0], faults[1]);
+                }
             }
         }
         Ok(())
@@ -253,13 +275,17 @@ impl Encoders {
 }
 
 impl Pose {
-    fn run(self) -> anyhow::Result<()> {
+    fn run(self, as_json: bool) -> anyhow::Result<()> {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         let mut receiver = PoseReceiver::new(self.controller);
         while !clock.is_over() {
             let Some(frame) = clock.receive(&mut *bus, LISTENING)? else { continue };
             let Some(pose) = frame.classic().and_then(|frame| receiver.handle(frame)) else { continue };
+            if as_json {
+                println!("{}", pose_json(&pose));
+                continue;
+            }
             println!(
                 "x {:10.4} m  y {:10.4} m  heading {:9.4} deg  +- {:.4} {:.4} m {:.3} deg  {:?} ({:?})  {:.2} m without correction",
                 pose.pose.x,
@@ -275,6 +301,25 @@ impl Pose {
         }
         Ok(())
     }
+}
+
+fn pose_json(pose: &PublishedPose) -> serde_json::Value {
+    json!({
+        "x_m": pose.pose.x,
+        "y_m": pose.pose.y,
+        "heading_rad": pose.pose.theta,
+        "deviations": pose.deviations,
+        "correlations": pose.correlations,
+        "mode": pose.mode,
+        "reason": pose.reason,
+        "dead_reckoning_distance_m": pose.dead_reckoning_distance,
+        "drive_fault": pose.health.drive,
+        "steering_fault": pose.health.steering,
+        "laser": format!("{:?}", pose.health.laser),
+        "layer": pose.health.layer,
+        "counter": pose.counter,
+        "time_ms": pose.time,
+    })
 }
 
 impl ServeEncoders {

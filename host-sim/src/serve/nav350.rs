@@ -625,7 +625,7 @@ impl Nav350 {
             .filter(|_| has_angles)
             .map(|beam| 10 * (i64::from(turn.first.0) + beam * i64::from(turn.resolution)).rem_euclid(360_000) as u32)
             .collect();
-        let angles = Channel { name: ChannelName::ANGLE, samples: Sequence::Values(&directions), ..distances.clone() };
+        let angles = Channel { name: ChannelName::ANGLE, samples: Sequence::Values(&directions), ..distances };
         let remission = Channel {
             name: ChannelName::REMISSION,
             scale: 1.0,

@@ -146,11 +146,11 @@ fn raw_frames_give_the_recorded_events_again() {
                 assert!(served.iter().any(|known| known.0 == sample.drive), "{sample:?}");
             }
         }
-        let faults = recorded.events.iter().filter_map(|event| match event {
+        let mut faults = recorded.events.iter().filter_map(|event| match event {
             RecordedEvent::EncoderFaults(faults) => Some(*faults),
             _ => None,
         });
-        let last: EncoderFaults = faults.last().unwrap();
+        let last: EncoderFaults = faults.next_back().unwrap();
         assert_eq!((last.drive, last.steering), (Some(EncoderFault::Missing), Some(EncoderFault::Missing)));
         assert!(notes(&path).iter().any(|note| note.contains("drive missing, steering missing")));
         let (again, _) = raw::read_drive(&path, &nodes(is_synchronous)).unwrap();
