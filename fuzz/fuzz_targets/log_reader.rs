@@ -22,7 +22,8 @@ fuzz_target!(|bytes: &[u8]| {
         if let Ok(record) = frame.record(&mut scratch) {
             let mut buffer = vec![0; MAX_FRAME];
             let length = encode(&record, 0, &mut buffer).expect("what was read can be written");
-            let (consumed, step) = LogReader::new().step(&buffer[..length], true, &mut Scratch::<4096, 1024>::new());
+            let mut scratch = Box::new(Scratch::<4096, 1024>::new());
+            let (consumed, step) = LogReader::new().step(&buffer[..length], true, &mut scratch);
             assert!(consumed == length && matches!(step, Step::Item(Item::Record { .. })));
         }
     }

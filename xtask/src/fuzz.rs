@@ -41,17 +41,17 @@ impl Fuzz {
             }
         }
         Seeds {}.run()?;
+        if !fuzz(&["build"]).status().context("cargo cannot be started")?.success() {
+            bail!("the fuzz targets do not build");
+        }
         let targets: Vec<&str> = match self.targets.as_slice() {
             [] => TARGETS.to_vec(),
             named => named.iter().map(String::as_str).collect(),
         };
         for target in targets {
             println!("fuzzing {target} for {} s", self.seconds);
-            let mut run = Command::new("cargo");
-            run.args(["+nightly", "fuzz", "run", target, "--", "-print_final_stats=1"]);
-            run.arg(format!("-max_total_time={}", self.seconds)).current_dir(repository().join("fuzz"));
-            // The toolchain that runs this command is not the one that fuzzes.
-            run.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
+            let mut run = fuzz(&["run", target, "--", "-print_final_stats=1"]);
+            run.arg(format!("-max_total_time={}", self.seconds));
             if !run.status().context("cargo cannot be started")?.success() {
                 bail!("{target} has found something; see fuzz/artifacts/{target}");
             }
@@ -61,8 +61,14 @@ impl Fuzz {
     }
 }
 
+/// `cargo fuzz` in its folder. The toolchain that runs this program is not the one that fuzzes.
+fn fuzz(arguments: &[&str]) -> Command {
+    let mut command = Command::new("cargo");
+    command.args(["+nightly", "fuzz"]).args(arguments).current_dir(repository().join("fuzz"));
+    command.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
+    command
+}
+
 fn is_there() -> bool {
-    let mut probe = Command::new("cargo");
-    probe.args(["+nightly", "fuzz", "--version"]).env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
-    probe.output().is_ok_and(|output| output.status.success())
+    fuzz(&["--version"]).output().is_ok_and(|output| output.status.success())
 }
