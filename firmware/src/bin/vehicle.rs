@@ -64,7 +64,7 @@ async fn log_task(stack: Stack<'static>, settings: &'static Settings) -> ! {
 /// Starts the network on the executor that runs it: its tasks may not move to another one.
 #[embassy_executor::task]
 #[allow(unsafe_code, reason = "the spawner of an interrupt executor is to be had in no other way")]
-async fn start_network(revolutions: exchange::RevolutionSender, settings: &'static Settings) {
+async fn start_network(device: Lan9118, revolutions: exchange::RevolutionSender, settings: &'static Settings) {
     // SAFETY: this task was made by embassy's macro, so its context is embassy's.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     let address = Ipv4Cidr::new(Ipv4Address::new(10, 0, 2, 15), 24);
@@ -74,7 +74,6 @@ async fn start_network(revolutions: exchange::RevolutionSender, settings: &'stat
         dns_servers: heapless::Vec::new(),
     });
     let resources = RESOURCES.init_with(StackResources::new);
-    let device = Lan9118::start([2, 0, 0, 0, 0, 1]);
     let (stack, runner) = embassy_net::new(device, config, resources, 0x5eed);
     spawner.spawn(network_task(runner).expect("the task runs once"));
     spawner.spawn(laser_task(stack, revolutions, settings).expect("the task runs once"));
@@ -94,11 +93,13 @@ fn main() -> ! {
     let mut log = LogWriter::new(FRAME.take());
     time_driver::start();
     uart::start();
+    // Before its interrupt is let through, which it holds active until it is set up.
+    let device = Lan9118::start([2, 0, 0, 0, 0, 1]);
     interrupts::enable(&mut core.NVIC);
     let bus = BUS_TASKS.start(Interrupt::BusTasks);
     bus.spawn(bus_task(settings).expect("the task runs once"));
     let network = NETWORK_TASKS.start(Interrupt::NetworkTasks);
-    network.spawn(start_network(sender, settings).expect("the task runs once"));
+    network.spawn(start_network(device, sender, settings).expect("the task runs once"));
     defmt::info!("{} landmarks", settings.landmarks.len());
     loop {
         if !localize::step(localizer, &mut receiver, &mut log) {
