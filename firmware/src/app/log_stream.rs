@@ -3,6 +3,8 @@
 //! Frames are numbered. What does not fit the queue, because the network is slow or nobody listens, is dropped whole; the
 //! gap in the numbers tells how much. Nothing ever waits.
 
+use agv_core::landmarks::Landmark;
+use agv_core::localizer::Parameters;
 use agv_core::record::{Capacities, Header, LANDMARKS_A_RECORD, Record, encode};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
@@ -11,7 +13,6 @@ use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::settings::Settings;
 
 /// Bytes that wait for the network.
 const QUEUE: usize = 24 * 1024;
@@ -88,15 +89,21 @@ impl Default for LogMemory {
 }
 
 /// Gives the stream to one listener after the other, for ever.
-pub async fn run(stack: Stack<'static>, memory: &'static mut LogMemory, settings: &Settings) -> ! {
+pub async fn run(
+    stack: Stack<'static>,
+    memory: &'static mut LogMemory,
+    port: u16,
+    parameters: &Parameters,
+    landmarks: &[Landmark],
+) -> ! {
     let LogMemory { receive, transmit, piece } = memory;
     let mut socket = TcpSocket::new(stack, receive, transmit);
     loop {
         socket.abort();
-        if socket.accept(settings.log_port).await.is_err() {
+        if socket.accept(port).await.is_err() {
             continue;
         }
-        if greet(&mut socket, piece, settings).await.is_ok() {
+        if greet(&mut socket, piece, parameters, landmarks).await.is_ok() {
             PIPE.clear();
             IS_HEARD.store(true, Ordering::Relaxed);
             loop {
@@ -125,12 +132,17 @@ async fn send(socket: &mut TcpSocket<'_>, mut bytes: &[u8]) -> Result<(), Gone> 
 }
 
 /// Sends what a log begins with.
-async fn greet(socket: &mut TcpSocket<'_>, frame: &mut [u8], settings: &Settings) -> Result<(), Gone> {
-    let header = Header { software: SOFTWARE, parameters: &settings.parameters, capacities: Capacities::default() };
+async fn greet(
+    socket: &mut TcpSocket<'_>,
+    frame: &mut [u8],
+    parameters: &Parameters,
+    landmarks: &[Landmark],
+) -> Result<(), Gone> {
+    let header = Header { software: SOFTWARE, parameters, capacities: Capacities::default() };
     let mut sequence = 0;
     let first = encode(&Record::Header(header), sequence, frame).map_err(|_| Gone)?;
     send(socket, frame.get(..first).unwrap_or_default()).await?;
-    for piece in settings.landmarks.chunks(LANDMARKS_A_RECORD) {
+    for piece in landmarks.chunks(LANDMARKS_A_RECORD) {
         sequence += 1;
         let length = encode(&Record::Landmarks(piece), sequence, frame).map_err(|_| Gone)?;
         send(socket, frame.get(..length).unwrap_or_default()).await?;
