@@ -41,11 +41,11 @@ pub struct LogWriter {
 }
 
 impl LogWriter {
-    /// A writer that makes its frames in `frame`.
+    /// A writer that makes its frames in `frame`, for a map of so many landmarks.
     #[must_use]
-    pub const fn new(frame: &'static mut [u8; LONGEST]) -> Self {
+    pub const fn new(frame: &'static mut [u8; LONGEST], landmarks: usize) -> Self {
         // The header and the map, which each listener is given, come first.
-        Self { sequence: FIRST_SEQUENCE, frame }
+        Self { sequence: 1 + landmarks.div_ceil(LANDMARKS_A_RECORD) as u32, frame }
     }
 
     /// Queues a record, or drops it.
@@ -56,16 +56,19 @@ impl LogWriter {
             return;
         }
         let length = encode(record, sequence, self.frame).ok().filter(|length| *length <= PIPE.free_capacity());
-        let frame = length.and_then(|length| self.frame.get(..length));
-        // This is the only writer, so there is room for all of it.
-        if frame.is_none_or(|frame| PIPE.try_write(frame) != Ok(frame.len())) {
+        let Some(mut rest) = length.and_then(|length| self.frame.get(..length)) else {
             DROPPED.fetch_add(1, Ordering::Relaxed);
+            return;
+        };
+        // There is room for all of it, as nobody else writes; at the end of the queue's memory it goes in two pieces.
+        while let Ok(count) = PIPE.try_write(rest) {
+            rest = rest.get(count..).unwrap_or_default();
+            if rest.is_empty() {
+                break;
+            }
         }
     }
 }
-
-/// Number of the first record behind header and map.
-const FIRST_SEQUENCE: u32 = 1000;
 
 /// Memory of the connection.
 pub struct LogMemory {

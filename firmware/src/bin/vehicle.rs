@@ -11,7 +11,7 @@ use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::throttle::Throttle;
 use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, supervision};
-use agv_firmware::board::current::{self as board, Can, Ethernet, Flash, Watchdog};
+use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash};
 use agv_firmware::board::{retained, stack};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
@@ -32,8 +32,6 @@ defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
 
 /// Connections of the service port.
 const CONNECTIONS: usize = 2;
-/// The watchdog bites after this, us: longer than two pages of flash take to erase.
-const PATIENCE: u32 = 8_000_000;
 
 static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
 static SETTINGS: StaticCell<Settings> = StaticCell::new();
@@ -108,9 +106,9 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
 fn main() -> ! {
     stack::paint();
     let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let board = board::start(core);
+    let Board { can, ethernet, flash, mut watchdog } = board::start(core);
     let panic = retained::read();
-    let controller: Controller<Flash> = settings::read(board.flash, panic);
+    let controller: Controller<Flash> = settings::read(flash, panic);
     let landmarks = controller.landmarks;
     let settings: &'static Settings = SETTINGS.init(controller.settings.clone());
     let controller = CONTROLLER.init(SharedController::new(controller));
@@ -123,12 +121,12 @@ fn main() -> ! {
     exchange::update(&localizer.outputs().pose);
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
     let (sender, mut receiver) = channel.split();
-    let mut log = LogWriter::new(FRAME.take());
-    let mut watchdog = Watchdog::start(PATIENCE);
+    let mut log = LogWriter::new(FRAME.take(), landmarks.len());
+    watchdog.unleash();
     let has_panicked = !panic.is_empty();
-    board::bus_tasks().spawn(bus_task(board.can, settings, has_panicked).expect("the task runs once"));
+    board::bus_tasks().spawn(bus_task(can, settings, has_panicked).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
-    board::network_tasks().spawn(start_network(board.ethernet, sender, shared).expect("the task runs once"));
+    board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
     let mut deepest = 0;
     loop {
         if localize::step(localizer, &mut receiver, &mut log) {

@@ -13,3 +13,6 @@ pub mod h743;
 pub use h743 as current;
 pub mod retained;
 pub mod stack;
+
+/// The watchdog bites when it was not fed for so long, us: longer than a page of flash takes to erase.
+pub const WATCHDOG_PERIOD: u32 = 8_000_000;

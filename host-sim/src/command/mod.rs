@@ -5,6 +5,7 @@
 
 pub mod can;
 pub mod demonstration;
+pub mod emulate;
 mod encoder_arguments;
 pub mod evaluate;
 pub mod export;

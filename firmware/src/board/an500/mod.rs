@@ -29,6 +29,8 @@ pub struct Board {
     pub ethernet: Ethernet,
     /// Where settings are kept.
     pub flash: Flash,
+    /// The watchdog, not started.
+    pub watchdog: Watchdog,
 }
 
 /// Starts everything but the tasks.
@@ -39,7 +41,7 @@ pub fn start(mut core: cortex_m::Peripherals) -> Board {
     // Before its interrupt is let through, which it holds active until it is set up.
     let ethernet = Ethernet::start([2, 0, 0, 0, 0, 1]);
     interrupts::enable(&mut core.NVIC);
-    Board { can: uart::SlcanPort, ethernet, flash: Flash::open() }
+    Board { can: uart::SlcanPort, ethernet, flash: Flash::open(), watchdog: Watchdog::new() }
 }
 
 /// Starts the tasks of the bus. Call once.

@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "registers are at fixed addresses")]
 
 use super::registers::write;
+use crate::board::WATCHDOG_PERIOD;
 
 const BASE: usize = 0x4000_8000;
 const LOAD: usize = 0x00;
@@ -19,21 +20,31 @@ const TICKS_A_MICROSECOND: u32 = 25;
 pub struct Watchdog(());
 
 impl Watchdog {
-    /// Starts it: from now on it must be fed every `period` microseconds, at most 171 s.
+    /// The watchdog, not started. Call once.
     #[must_use]
-    pub fn start(period: u32) -> Self {
+    pub const fn new() -> Self {
+        Self(())
+    }
+
+    /// Starts it: from now on it must be fed.
+    pub fn unleash(&mut self) {
         // SAFETY: these are registers of a watchdog that only this driver uses.
         unsafe {
             write(BASE, LOCK, KEY);
-            write(BASE, LOAD, period.saturating_mul(TICKS_A_MICROSECOND));
+            write(BASE, LOAD, WATCHDOG_PERIOD * TICKS_A_MICROSECOND);
             write(BASE, CONTROL, ENABLE);
         }
-        Self(())
     }
 
     /// Feeds it.
     pub fn feed(&mut self) {
         // SAFETY: this is a register of a watchdog that only this driver uses.
         unsafe { write(BASE, CLEAR, 1) };
+    }
+}
+
+impl Default for Watchdog {
+    fn default() -> Self {
+        Self::new()
     }
 }
