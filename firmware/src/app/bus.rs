@@ -9,9 +9,8 @@ use agv_core::wire::can::controller::{Health, Order, OrderReceiver, PosePublishe
 use agv_core::wire::can::controller_node::ControllerNode;
 use agv_core::wire::can::emcy::Emergency;
 use agv_core::wire::can::encoder_pair::EncoderPair;
-use agv_core::wire::can::frame::AnyFrame;
-use embassy_futures::select::{Either, select};
 use agv_settings::Settings;
+use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
 
 use super::can_port::CanPort;
@@ -37,7 +36,7 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
     loop {
         let woken = select(port.receive(), ticker.next()).await;
         supervision::check_in(Task::Bus);
-        if let Either::First((AnyFrame::Classic(frame), heard)) = &woken {
+        if let Either::First((frame, heard)) = &woken {
             let time = *heard;
             if let Some(sample) = pair.handle(frame, time) {
                 exchange::take_encoders(sample);

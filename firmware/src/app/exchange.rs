@@ -105,9 +105,9 @@ pub fn latest_prediction() -> u32 {
 #[must_use]
 pub fn is_standing() -> bool {
     with(|published| {
-        published.stand.is_none_or(|(first, last)| {
-            last.since(first.time) >= STANDSTILL && now().since(last) < STANDSTILL
-        })
+        published
+            .stand
+            .is_none_or(|(first, last)| last.since(first.time) >= STANDSTILL && now().since(last) < STANDSTILL)
     })
 }
 

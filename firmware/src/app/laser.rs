@@ -17,8 +17,8 @@ const SEND: Duration = Duration::from_secs(1);
 
 /// Memory of the connection.
 pub struct LaserMemory {
-    /// The session.
-    pub session: Session,
+    /// The session, with room for the longest telegram of a revolution with 1440 beams, in either dialect.
+    pub session: Session<{ 18 * 1024 }>,
     /// Received bytes; the sensor may send no more than this ahead, which is less than the Ethernet controller holds.
     pub receive: [u8; 8192],
     /// Bytes to send.
@@ -65,7 +65,7 @@ pub async fn run(
 
 /// Holds the session until a revolution is complete.
 async fn next(
-    session: &mut Session,
+    session: &mut Session<{ 18 * 1024 }>,
     socket: &mut TcpSocket<'_>,
     is_open: &mut bool,
     endpoint: IpEndpoint,

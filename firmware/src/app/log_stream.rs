@@ -13,11 +13,10 @@ use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
-
 /// Bytes that wait for the network.
-const QUEUE: usize = 24 * 1024;
-/// Longest record: a scan of 1440 beams with strengths.
-pub const LONGEST: usize = 9 * 1024;
+const QUEUE: usize = 16 * 1024;
+/// Longest record: a scan of 1440 beams.
+pub const LONGEST: usize = 6 * 1024;
 /// How long a peer may take to read what it asked for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -74,14 +73,14 @@ impl LogWriter {
 pub struct LogMemory {
     receive: [u8; 64],
     transmit: [u8; 4096],
-    piece: [u8; 4096],
+    piece: [u8; 2048],
 }
 
 impl LogMemory {
     /// Memory of a connection that has not begun.
     #[must_use]
     pub const fn new() -> Self {
-        Self { receive: [0; 64], transmit: [0; 4096], piece: [0; 4096] }
+        Self { receive: [0; 64], transmit: [0; 4096], piece: [0; 2048] }
     }
 }
 

@@ -70,7 +70,11 @@ pub fn read() -> &'static str {
     // which leaves the text.
     let message = unsafe { &*message() };
     let text = message.text.get(..message.length as usize).unwrap_or_default();
-    if message.magic == MAGIC && message.checksum == checksum(text) { core::str::from_utf8(text).unwrap_or_default() } else { "" }
+    if message.magic == MAGIC && message.checksum == checksum(text) {
+        core::str::from_utf8(text).unwrap_or_default()
+    } else {
+        ""
+    }
 }
 
 /// Forgets it, from the next start on.

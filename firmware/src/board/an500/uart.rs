@@ -37,7 +37,7 @@ const SENT: usize = 2048;
 
 struct State {
     decoder: Decoder,
-    received: Deque<(AnyFrame, Time), RECEIVED>,
+    received: Deque<(Frame, Time), RECEIVED>,
     sent: Deque<u8, SENT>,
     waker: WakerRegistration,
     /// Frames that were lost because nobody took them, or the line was too slow.
@@ -77,7 +77,7 @@ pub fn on_receive() {
             while read(BASE, STATE) & RECEIVE_FULL != 0 {
                 let byte = read(BASE, DATA) as u8;
                 match state.decoder.push(byte) {
-                    Some(Ok(Message::Frame { frame, .. })) => {
+                    Some(Ok(Message::Frame { frame: AnyFrame::Classic(frame), .. })) => {
                         if state.received.push_back((frame, exchange::now())).is_err() {
                             state.lost += 1;
                         }
@@ -120,7 +120,7 @@ impl State {
 pub struct SlcanPort;
 
 impl CanPort for SlcanPort {
-    async fn receive(&mut self) -> (AnyFrame, Time) {
+    async fn receive(&mut self) -> (Frame, Time) {
         poll_fn(|context| {
             let frame = with(|state| {
                 state.waker.register(context.waker());

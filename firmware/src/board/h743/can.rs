@@ -6,7 +6,7 @@
 //! In the mode that takes other frames, too, it states the time of the interrupt.
 
 use agv_core::measurement::Time;
-use agv_core::wire::can::frame::{AnyFrame, Frame};
+use agv_core::wire::can::frame::Frame;
 use embassy_stm32::Peri;
 use embassy_stm32::can::config::FrameTransmissionConfig;
 use embassy_stm32::can::{BufferedCan, BufferedCanSender, CanConfigurator, RxBuf, RxPin, TxBuf, TxPin};
@@ -59,7 +59,7 @@ impl FdCanPort {
 }
 
 impl CanPort for FdCanPort {
-    async fn receive(&mut self) -> (AnyFrame, Time) {
+    async fn receive(&mut self) -> (Frame, Time) {
         loop {
             // Errors of the bus end by themselves; what they cost is missed by those who wait for it.
             let Ok(envelope) = self.bus.read().await else {
@@ -68,7 +68,7 @@ impl CanPort for FdCanPort {
             };
             let (frame, heard) = envelope.parts();
             if let Some(frame) = same::<_, Frame>(&frame) {
-                return (AnyFrame::Classic(frame), Time::from_micros(heard.as_micros()));
+                return (frame, Time::from_micros(heard.as_micros()));
             }
         }
     }

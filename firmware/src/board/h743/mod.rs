@@ -25,7 +25,9 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, bind_interrupts, interrupt, uid};
 
-bind_interrupts!(struct Interrupts {
+bind_interrupts!(
+    /// Which driver handles which interrupt.
+    pub struct Interrupts {
     ETH => eth::InterruptHandler;
     FDCAN1_IT0 => embassy_stm32::can::IT0InterruptHandler<FDCAN1>;
     FDCAN1_IT1 => embassy_stm32::can::IT1InterruptHandler<FDCAN1>;
@@ -35,7 +37,7 @@ bind_interrupts!(struct Interrupts {
 pub type Ethernet = eth::Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>;
 
 /// Frames that wait to be sent, and that were received.
-type Queue = PacketQueue<4, 8>;
+type Queue = PacketQueue<4, 6>;
 
 #[unsafe(link_section = ".ethernet")]
 static mut QUEUE: MaybeUninit<Queue> = MaybeUninit::uninit();
