@@ -14,7 +14,7 @@ use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Bytes that wait for the network.
-const QUEUE: usize = 16 * 1024;
+const QUEUE: usize = 14 * 1024;
 /// Longest record: a scan of 1440 beams.
 pub const LONGEST: usize = 6 * 1024;
 /// How long a peer may take to read what it asked for.
@@ -72,7 +72,7 @@ impl LogWriter {
 /// Memory of the connection.
 pub struct LogMemory {
     receive: [u8; 64],
-    transmit: [u8; 4096],
+    transmit: [u8; 3072],
     piece: [u8; 2048],
 }
 
@@ -80,7 +80,7 @@ impl LogMemory {
     /// Memory of a connection that has not begun.
     #[must_use]
     pub const fn new() -> Self {
-        Self { receive: [0; 64], transmit: [0; 4096], piece: [0; 2048] }
+        Self { receive: [0; 64], transmit: [0; 3072], piece: [0; 2048] }
     }
 }
 

@@ -32,8 +32,8 @@ pub struct BoardActions {
 
 /// Memory of a connection.
 pub struct ServiceMemory {
-    receive: [u8; 1024],
-    transmit: [u8; 1024],
+    receive: [u8; 512],
+    transmit: [u8; 512],
     read: [u8; 512],
     frames: Frames,
     room: [u8; LONGEST_MESSAGE],
@@ -44,8 +44,8 @@ impl ServiceMemory {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            receive: [0; 1024],
-            transmit: [0; 1024],
+            receive: [0; 512],
+            transmit: [0; 512],
             read: [0; 512],
             frames: Frames::new(),
             room: [0; LONGEST_MESSAGE],

@@ -37,7 +37,7 @@ bind_interrupts!(
 pub type Ethernet = eth::Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>;
 
 /// Frames that wait to be sent, and that were received.
-type Queue = PacketQueue<4, 6>;
+type Queue = PacketQueue<3, 6>;
 
 #[unsafe(link_section = ".ethernet")]
 static mut QUEUE: MaybeUninit<Queue> = MaybeUninit::uninit();
