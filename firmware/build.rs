@@ -21,4 +21,5 @@ fn main() {
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bin=vehicle=-Tdefmt.x");
+    println!("cargo:rustc-link-arg-bin=latency=-Tdefmt.x");
 }

@@ -13,13 +13,7 @@ use super::supervision::{self, Task};
 /// comes meanwhile waits, and the predictor publishes without it.
 pub fn step(localizer: &mut Localizer, revolutions: &mut RevolutionReceiver, log: &mut LogWriter) -> bool {
     supervision::check_in(Task::Localizer);
-    if let Ok(event) = BUS_EVENTS.try_receive() {
-        let event = match event {
-            BusEvent::Encoders(sample) => Event::Encoders(sample),
-            BusEvent::EncoderFaults(faults) => Event::EncoderFaults(faults),
-            BusEvent::SetPose(fix) => Event::SetPose(fix),
-        };
-        handle(localizer, &event, log);
+    if take_bus_event(localizer, log) {
         return true;
     }
     let Some(revolution) = revolutions.try_receive() else {
@@ -35,7 +29,20 @@ pub fn step(localizer: &mut Localizer, revolutions: &mut RevolutionReceiver, log
     true
 }
 
-fn handle(localizer: &mut Localizer, event: &Event, log: &mut LogWriter) {
+/// Handles what the bus has told, and returns whether there was anything.
+pub fn take_bus_event(localizer: &mut Localizer, log: &mut LogWriter) -> bool {
+    let Ok(event) = BUS_EVENTS.try_receive() else { return false };
+    let event = match event {
+        BusEvent::Encoders(sample) => Event::Encoders(sample),
+        BusEvent::EncoderFaults(faults) => Event::EncoderFaults(faults),
+        BusEvent::SetPose(fix) => Event::SetPose(fix),
+    };
+    handle(localizer, &event, log);
+    true
+}
+
+/// Tells the localiser something, publishes what it says, and logs both.
+pub fn handle(localizer: &mut Localizer, event: &Event, log: &mut LogWriter) {
     log.write(&Record::Event(*event));
     let outputs = localizer.handle(event);
     exchange::update(&outputs.pose);
