@@ -120,7 +120,10 @@ fn motion(step: u64) -> Motion {
 }
 
 fn past() -> Timeline<160> {
-    Timeline::new(Time::default(), Ekf::new(Pose::default(), 0.05, 0.02), laser(), 0.1)
+    let mut timeline = Timeline::new(laser(), 0.1);
+    assert!(timeline.begun().is_none());
+    timeline.begin(Time::default(), Ekf::new(Pose::default(), 0.05, 0.02));
+    timeline
 }
 
 fn laser() -> Pose {
@@ -270,7 +273,7 @@ fn the_filter_is_consistent() {
         let mut random = Normal(0x9E37_79B9_7F4A_7C15u64.wrapping_mul(run + 1));
         let start = Pose::new(0.05 * random.next(), 0.05 * random.next(), 0.02 * random.next());
         let mut truth = start;
-        let mut timeline = Timeline::<160>::new(Time::default(), Ekf::new(Pose::default(), 0.05, 0.02), laser(), 0.1);
+        let mut timeline = past();
         for step in 0..200 {
             let believed = motion(step);
             timeline.advance(&believed);

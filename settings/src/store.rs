@@ -298,6 +298,8 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// If the flash refuses.
+    // One copy: what it works with takes kilobytes of stack.
+    #[inline(never)]
     pub fn format(&mut self) -> Result<(), StoreError> {
         block_on(self.storage.erase_all()).map_err(|_| StoreError::Flash)
     }
@@ -323,6 +325,8 @@ impl<F: NorFlash> Store<F> {
         Ok(true)
     }
 
+    // One copy: what it works with takes kilobytes of stack.
+    #[inline(never)]
     fn fetch(&mut self, key: u16) -> Result<Option<&[u8]>, FetchError> {
         block_on(self.storage.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(|error| match error {
             Error::Storage { .. } => FetchError::Flash,
@@ -331,6 +335,8 @@ impl<F: NorFlash> Store<F> {
         })
     }
 
+    // One copy: what it works with takes kilobytes of stack.
+    #[inline(never)]
     fn put(&mut self, key: u16, bytes: &[u8]) -> Result<(), StoreError> {
         block_on(self.storage.store_item(&mut self.buffer, &key, &bytes)).map_err(|error| match error {
             Error::FullStorage | Error::ItemTooBig => StoreError::Full,

@@ -7,6 +7,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use agv_core::measurement::EncoderFault;
@@ -21,10 +22,13 @@ use agv_host_sim::{data, log, replay};
 use agv_settings::leaf::Value;
 use agv_settings::service::Refusal;
 
+/// One emulator at a time: they work in real time.
+static ALONE: Mutex<()> = Mutex::new(());
+
 const KEY: [u8; 32] = [0x42; 32];
 
-/// The image. None, and a word about it, if it is missing or there is no emulator.
-fn image(test: &str) -> Option<PathBuf> {
+/// The image, and the right to run it. None, and a word about it, if it is missing or there is no emulator.
+fn image(test: &str) -> Option<(PathBuf, MutexGuard<'static, ()>)> {
     let path = "../target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle";
     let image = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     if !image.exists() {
@@ -36,7 +40,7 @@ fn image(test: &str) -> Option<PathBuf> {
         data::skip(test, "there is no qemu-system-arm");
         return None;
     }
-    Some(image.canonicalize().unwrap())
+    Some((image.canonicalize().unwrap(), ALONE.lock().unwrap_or_else(PoisonError::into_inner)))
 }
 
 /// The standard hall: reflectors everywhere.
@@ -86,7 +90,7 @@ fn wait_for_drive(watch: &Watch, seconds: f64) {
 
 #[test]
 fn it_drives_through_the_hall() {
-    let Some(image) = image("it_drives_through_the_hall") else { return };
+    let Some((image, _alone)) = image("it_drives_through_the_hall") else { return };
     let recording = hall();
     let seconds = if std::env::var_os("AGV_LONG").is_some() { f64::MAX } else { 20.0 };
     let drive = drive(&image, &recording, seconds, |_| ());
@@ -96,13 +100,44 @@ fn it_drives_through_the_hall() {
     assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{errors:?}");
     assert!(drive.driven.emergencies.is_empty());
     assert_replayed(&drive, 2000);
-    // The firmware's log can be read: it begins with a frame of defmt.
-    assert!(std::fs::metadata(drive.folder.path().join("defmt.bin")).unwrap().len() > 50);
+    let lines = firmware_log(&image, drive.folder.path());
+    println!("{lines:#?}");
+    assert!(lines.iter().any(|line| line.contains("72 landmarks")), "{lines:?}");
+    check_stack(&lines);
+}
+
+/// What the firmware has logged, line by line.
+fn firmware_log(image: &Path, folder: &Path) -> Vec<String> {
+    let table = defmt_decoder::Table::parse(&std::fs::read(image).unwrap()).unwrap().unwrap();
+    let mut decoder = table.new_stream_decoder();
+    decoder.received(&std::fs::read(folder.join("defmt.bin")).unwrap());
+    let mut lines = Vec::new();
+    loop {
+        match decoder.decode() {
+            Ok(frame) => lines.push(frame.display(false).to_string()),
+            Err(defmt_decoder::DecodeError::UnexpectedEof) => return lines,
+            Err(defmt_decoder::DecodeError::Malformed) => lines.push("a line that is damaged".to_owned()),
+        }
+    }
+}
+
+/// The deepest stack, as the firmware has measured it by painting, takes at most half of what is reserved.
+fn check_stack(lines: &[String]) {
+    let mut last = None;
+    for line in lines {
+        let Some((_, rest)) = line.split_once("stack: ") else { continue };
+        let numbers: Vec<usize> = rest.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        last = Some((numbers[0], numbers[1]));
+    }
+    let (deepest, reserved) = last.expect("the firmware says how deep its stack is");
+    println!("{:<24} {:>8}", "deepest stack, bytes", deepest);
+    println!("{:<24} {:>8}", "reserved", reserved);
+    assert!(deepest > 1000 && deepest <= reserved / 2, "{deepest} of {reserved}");
 }
 
 #[test]
 fn trouble_is_said_on_the_bus_and_survived() {
-    let Some(image) = image("trouble_is_said_on_the_bus_and_survived") else { return };
+    let Some((image, _alone)) = image("trouble_is_said_on_the_bus_and_survived") else { return };
     let recording = hall();
     let mut delays = Vec::new();
     let drive = drive(&image, &recording, 30.0, |watch| {
@@ -176,7 +211,7 @@ fn flood(port: u16, start: Instant) {
 
 #[test]
 fn it_is_commissioned_over_the_service_port() {
-    let Some(image) = image("it_is_commissioned_over_the_service_port") else { return };
+    let Some((image, _alone)) = image("it_is_commissioned_over_the_service_port") else { return };
     let recording = hall();
     let folder = tempfile::tempdir().unwrap();
     let options = VehicleOptions { image: &image, folder: folder.path(), key: Some(KEY), provision: true };
@@ -233,7 +268,7 @@ fn it_is_commissioned_over_the_service_port() {
 
 #[test]
 fn rubbish_in_flash_is_said_and_replaced() {
-    let Some(image) = image("rubbish_in_flash_is_said_and_replaced") else { return };
+    let Some((image, _alone)) = image("rubbish_in_flash_is_said_and_replaced") else { return };
     let folder = tempfile::tempdir().unwrap();
     let rubbish: Vec<u8> = (0..262_144_u32).map(|place| (place.wrapping_mul(2_654_435_761) >> 23) as u8).collect();
     std::fs::write(folder.path().join("flash.bin"), &rubbish).unwrap();

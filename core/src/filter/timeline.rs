@@ -78,16 +78,12 @@ pub struct Timeline<const ENTRIES: usize> {
 }
 
 impl<const ENTRIES: usize> Timeline<ENTRIES> {
-    /// A past that begins at `time` with `state`, for a sensor at `laser` in R. Measurements may be up to
-    /// `longest_extrapolation` seconds ahead of the odometry.
+    /// A timeline that has not begun.
     #[must_use]
-    pub fn new(time: Time, state: Ekf, laser: Pose, longest_extrapolation: f64) -> Self {
-        let mut entries = Deque::new();
-        let start = Entry { motion: Motion::none(time), correction: None, state };
-        // A ring without room would be useless but not unsound.
-        let _ = entries.push_back(start);
+    pub fn new(laser: Pose, longest_extrapolation: f64) -> Self {
+        let time = Time::default();
         Self {
-            entries,
+            entries: Deque::new(),
             settled: 1,
             ahead: None,
             last_motion: Motion::none(time),
@@ -95,6 +91,29 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
             laser,
             longest_extrapolation,
         }
+    }
+
+    /// Begins, or begins anew, with a state that is true at `time`. In place: a timeline is too large for the stack of a
+    /// controller.
+    pub fn begin(&mut self, time: Time, state: Ekf) {
+        self.entries.clear();
+        // A ring without room would be useless but not unsound.
+        let _ = self.entries.push_back(Entry { motion: Motion::none(time), correction: None, state });
+        self.settled = 1;
+        self.ahead = None;
+        self.last_motion = Motion::none(time);
+        self.start = time;
+    }
+
+    /// The timeline, if it has begun.
+    #[must_use]
+    pub fn begun(&self) -> Option<&Self> {
+        (!self.entries.is_empty()).then_some(self)
+    }
+
+    /// The timeline, if it has begun.
+    pub fn begun_mut(&mut self) -> Option<&mut Self> {
+        (!self.entries.is_empty()).then_some(self)
     }
 
     /// The time at which the past began.

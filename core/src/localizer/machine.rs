@@ -30,7 +30,7 @@ pub struct Localizer<
     parameters: Parameters,
     odometer: Odometer,
     maps: Maps<REFLECTORS, FEATURES, DYNAMIC>,
-    timeline: Option<Timeline<ENTRIES>>,
+    timeline: Timeline<ENTRIES>,
     consistency: Consistency,
     lost: Option<Reason>,
     blindness: Option<Blindness>,
@@ -95,6 +95,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
 {
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
+    #[inline(always)]
     pub fn new(parameters: Parameters) -> Self {
         let pose = PoseOutput {
             time: Time::default(),
@@ -118,7 +119,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 features: FixedMap::new(),
                 dynamic: DynamicMap::new(parameters.dynamic_map),
             },
-            timeline: None,
+            timeline: Timeline::new(parameters.laser, parameters.limits.longest_extrapolation),
             consistency: Consistency::new(parameters.consistency),
             lost: None,
             blindness: None,
@@ -207,8 +208,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             return;
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
-        let limits = &self.parameters.limits;
-        self.timeline = Some(Timeline::new(fix.time, state, self.parameters.laser, limits.longest_extrapolation));
+        self.timeline.begin(fix.time, state);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
         self.blindness =
@@ -218,7 +218,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
-        let Some(timeline) = &mut self.timeline else {
+        let Some(timeline) = self.timeline.begun_mut() else {
             return;
         };
         match motion {
@@ -254,7 +254,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
 
     /// Goes on to `time` without the odometry.
     fn coast(&mut self, time: Time, reason: Reason) {
-        let Some(timeline) = &mut self.timeline else {
+        let Some(timeline) = self.timeline.begun_mut() else {
             return;
         };
         let mut coasting =
@@ -267,7 +267,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
     }
 
     fn scan(&mut self, scan: &Scan) {
-        let Some(timeline) = &self.timeline else {
+        let Some(timeline) = self.timeline.begun() else {
             return;
         };
         let workspace = &mut self.workspace;
@@ -293,7 +293,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
 
     /// Fuses the sightings of the workspace, each at its own time, and brings the dynamic map up to date.
     fn fuse(&mut self) {
-        let Some(timeline) = self.timeline.as_mut().filter(|_| self.lost.is_none()) else {
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none()) else {
             return;
         };
         let (mut expected, mut accepted, mut used, mut square_sum) = (0, 0, 0, 0.0);
@@ -362,7 +362,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
 
     /// Algorithm 1 (K 5.4.1) for the natural features of one scan, at the poses that the whole scan has led to.
     fn update_dynamic_map(&mut self) {
-        let Some(timeline) = self.timeline.as_mut().filter(|_| self.parameters.maps.dynamic) else {
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| self.parameters.maps.dynamic) else {
             return;
         };
         for sighting in &self.workspace.sightings {
@@ -380,7 +380,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
     }
 
     fn publish(&mut self) {
-        let Some(timeline) = &mut self.timeline else {
+        let Some(timeline) = self.timeline.begun_mut() else {
             return;
         };
         let state = timeline.state();

@@ -6,19 +6,20 @@ use agv_settings::service::Controller;
 use agv_settings::store::{LANDMARKS, Store};
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 use super::exchange;
 use super::log_stream::SOFTWARE;
 
-static MAP: StaticCell<Vec<Landmark, LANDMARKS>> = StaticCell::new();
+static MAP: ConstStaticCell<Vec<Landmark, LANDMARKS>> = ConstStaticCell::new(Vec::new());
 
 /// Reads settings and map, and makes what the service port speaks of. What is wrong is logged; the settings that cannot
 /// be read are the default ones.
 #[must_use]
+#[inline(never)]
 pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
     let mut settings = Settings::default();
-    let map = MAP.init_with(Vec::new);
+    let map = MAP.take();
     let mut store = Store::new(flash);
     let (mut key, mut starts) = (None, 0);
     if let Some(store) = &mut store {

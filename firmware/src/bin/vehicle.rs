@@ -4,14 +4,15 @@
 
 use core::panic::PanicInfo;
 
-use agv_core::localizer::{Localizer, OutputPredictor};
+use agv_core::localizer::{Localizer, OutputPredictor, Parameters};
 use agv_core::wire::nav350::Revolution;
+use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::throttle::Throttle;
 use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, supervision};
-use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash};
+use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, Watchdog};
 use agv_firmware::board::{retained, stack};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
@@ -102,34 +103,59 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
     }
 }
 
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    stack::paint();
+/// What the loop works with.
+struct Vehicle {
+    localizer: &'static mut Localizer,
+    revolutions: RevolutionReceiver,
+    log: LogWriter,
+    watchdog: Watchdog,
+}
+
+// Large values are built in functions of their own: on the stack they have room one after the other, not all at once.
+
+#[inline(never)]
+fn build_localizer(parameters: &Parameters) -> &'static mut Localizer {
+    LOCALIZER.init_with(|| Localizer::new(*parameters))
+}
+
+#[inline(never)]
+fn share(controller: Controller<Flash>) -> (&'static Settings, &'static SharedController<Flash>) {
+    let settings = SETTINGS.init_with(|| controller.settings.clone());
+    (settings, CONTROLLER.init_with(|| SharedController::new(controller)))
+}
+
+#[inline(never)]
+fn start() -> Vehicle {
     let core = cortex_m::Peripherals::take().expect("the program begins once");
     let Board { can, ethernet, flash, mut watchdog } = board::start(core);
     let panic = retained::read();
-    let controller: Controller<Flash> = settings::read(flash, panic);
+    let controller = settings::read(flash, panic);
     let landmarks = controller.landmarks;
-    let settings: &'static Settings = SETTINGS.init(controller.settings.clone());
-    let controller = CONTROLLER.init(SharedController::new(controller));
-    let localizer = LOCALIZER.init_with(|| Localizer::new(settings.parameters));
+    let (settings, controller) = share(controller);
+    let localizer = build_localizer(&settings.parameters);
     if localizer.add_landmarks(landmarks).is_err() {
-        defmt::error!("the map has more landmarks than the localiser takes, or the same one twice");
+        defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
         exchange::set_settings_sound(false);
     }
     exchange::start(OutputPredictor::new(&settings.parameters));
     exchange::update(&localizer.outputs().pose);
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
-    let (sender, mut receiver) = channel.split();
-    let mut log = LogWriter::new(FRAME.take(), landmarks.len());
+    let (sender, revolutions) = channel.split();
+    let log = LogWriter::new(FRAME.take(), landmarks.len());
     watchdog.unleash();
     let has_panicked = !panic.is_empty();
     board::bus_tasks().spawn(bus_task(can, settings, has_panicked).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
     board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
+    Vehicle { localizer, revolutions, log, watchdog }
+}
+
+#[inline(never)]
+fn run(vehicle: Vehicle) -> ! {
+    let Vehicle { localizer, mut revolutions, mut log, mut watchdog } = vehicle;
     let mut deepest = 0;
     loop {
-        if localize::step(localizer, &mut receiver, &mut log) {
+        if localize::step(localizer, &mut revolutions, &mut log) {
             continue;
         }
         if supervision::have_all_run() {
@@ -142,9 +168,15 @@ fn main() -> ! {
         }
         // An interrupt that comes between looking and sleeping ends the sleep at once.
         cortex_m::interrupt::free(|_| {
-            if exchange::BUS_EVENTS.is_empty() && receiver.is_empty() {
+            if exchange::BUS_EVENTS.is_empty() && revolutions.is_empty() {
                 cortex_m::asm::wfi();
             }
         });
     }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    stack::paint();
+    run(start())
 }

@@ -1,8 +1,8 @@
 //! How much of the stack was ever used: it is painted at the start.
 #![allow(unsafe_code, reason = "the stack has no owner")]
 
-/// What is reserved for the stack, bytes.
-pub const RESERVED: usize = 64 * 1024;
+/// What is reserved for the stack, bytes: the tightly coupled data memory of the STM32H743.
+pub const RESERVED: usize = 128 * 1024;
 
 const PAINT: u32 = 0xC0DE_57AC;
 

@@ -34,6 +34,7 @@ struct Neighbourhood {
 impl<const BEAMS: usize> Detector<BEAMS> {
     /// A detector with the given parameters.
     #[must_use]
+    #[inline(always)]
     pub fn new(parameters: Parameters) -> Self {
         Self {
             parameters,

@@ -13,8 +13,8 @@ const GAIN: f64 = 0.02;
 const STEADY: u8 = 6;
 /// Differences of lateness that do not count, in periods.
 const SAME: f64 = 0.25;
-/// Periods after which a late report begins anew.
-const LATEST: f64 = 8.0;
+/// Reports that are later than so many periods are not late: those before them are lost.
+const LATEST: f64 = 2.5;
 
 /// The timer of one node.
 #[derive(Clone, Copy, Debug, PartialEq)]
