@@ -122,6 +122,7 @@ struct Heard {
     emergencies: Vec<HeardEmergency>,
     /// When the drive began.
     begin: Option<Instant>,
+    longest_stall: f64,
 }
 
 impl Watch<'_> {
@@ -174,6 +175,9 @@ pub struct Driven {
     pub begin: Instant,
     /// The time of the recording at which it began.
     pub first: Time,
+    /// Longest time that this machine kept the encoders waiting, s. Encoders that are late by 20 ms are a fault, so a drive
+    /// on a machine that is too busy shows how faults are met, and no more.
+    pub longest_stall: f64,
 }
 
 /// The settings of a vehicle that is as the recording says, in the emulator's network.
@@ -239,9 +243,9 @@ pub fn drive(
     });
     outcome?;
     let stream = stream.map_err(|_| std::io::Error::other("the recording of the log stream broke down"))??;
-    let Heard { poses, emergencies, begin, .. } = heard.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let Heard { poses, emergencies, begin, longest_stall } = heard.into_inner().unwrap_or_else(PoisonError::into_inner);
     let begin = begin.ok_or(VehicleError::NotLocalised(poses.last().map(|heard| heard.pose.mode)))?;
-    Ok(Driven { log, stream, poses, emergencies, begin, first })
+    Ok(Driven { log, stream, poses, emergencies, begin, first, longest_stall })
 }
 
 /// Serves the sensor while it is on.
@@ -298,7 +302,14 @@ impl Stage<'_> {
         let mut last_order = start;
         let mut orders = 0_u8;
         let mut sent = 0_u32;
+        let mut looked = start;
         loop {
+            let now_looked = Instant::now();
+            if end.is_some() {
+                let mut heard = self.heard();
+                heard.longest_stall = heard.longest_stall.max((now_looked - looked).as_secs_f64());
+            }
+            looked = now_looked;
             if end.is_some_and(|end| Instant::now() > end) {
                 return Ok(());
             }
