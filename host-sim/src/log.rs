@@ -134,7 +134,11 @@ impl Reader {
             is_last: false,
             scratch: Box::default(),
         };
-        reader.fill()?;
+        while !reader.is_last
+            && matches!(FrameReader::new().step(&reader.buffer[reader.rest.clone()], false).1, FrameStep::NeedMore)
+        {
+            reader.fill()?;
+        }
         let beginning = &reader.buffer[reader.rest.clone()];
         if beginning.is_empty() {
             return Err(LogError::Empty { path: path.to_owned() });

@@ -39,6 +39,8 @@ enum Command {
     Nav350(command::nav350::Nav350),
     Record(command::record::Record),
     Emulate(command::emulate::Emulate),
+    Ctl(command::ctl::Ctl),
+    Provision(command::provision::Provision),
 }
 
 fn main() -> ExitCode {
@@ -57,6 +59,8 @@ fn main() -> ExitCode {
         Some(Command::Nav350(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
         Some(Command::Emulate(command)) => command.run(),
+        Some(Command::Ctl(command)) => command.run(),
+        Some(Command::Provision(command)) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,6 +4,7 @@
 //! progress to standard error.
 
 pub mod can;
+pub mod ctl;
 pub mod demonstration;
 pub mod emulate;
 mod encoder_arguments;
@@ -17,6 +18,7 @@ pub mod nav350;
 mod output;
 pub mod panic_message;
 mod progress;
+pub mod provision;
 pub mod record;
 pub mod replay;
 pub mod simulate;

@@ -1,0 +1,272 @@
+//! `agv ctl`.
+
+use std::path::{Path, PathBuf};
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
+use agv_host_sim::layout_file;
+use agv_host_sim::link::service::{Client, PORT, Setting};
+use agv_settings::leaf::Value;
+use anyhow::{Context, bail};
+use indicatif::ProgressBar;
+use serde_json::json;
+
+use super::output::print_rows;
+
+const HELP: &str = "\
+Reading needs nothing; changing needs the controller's key (64 hexadecimal digits in a file) and a vehicle that stands.
+Settings take effect with the next start, if they were stored.
+
+Examples:
+  agv ctl 192.168.1.20 version
+  agv ctl 192.168.1.20 list
+  agv ctl 192.168.1.20 --key agv.key set vehicle.wheelbase 1.482
+  agv ctl 192.168.1.20 --key agv.key map upload hall.imk
+  agv ctl 192.168.1.20 --key agv.key store
+  agv ctl 192.168.1.20 --key agv.key reboot
+  agv ctl 192.168.1.20 --key agv.key set-pose 12.5 3.2 1.57";
+
+/// Set up a controller over its service port
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Ctl {
+    /// Address of the controller, with its port unless it is 5351.
+    host: String,
+    /// File with the controller's key.
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(clap::Subcommand)]
+enum Action {
+    /// What runs there, and since when.
+    Version,
+    /// All settings with their units.
+    List,
+    /// One setting.
+    Get {
+        /// Its name.
+        name: String,
+    },
+    /// Change a setting, until the next start unless it is stored.
+    #[command(allow_negative_numbers = true)]
+    Set {
+        /// Its name.
+        name: String,
+        /// A number, true or false, or an IPv4 address.
+        value: String,
+    },
+    /// Keep all settings in flash.
+    Store,
+    /// The map of reflectors.
+    Map {
+        #[command(subcommand)]
+        action: MapAction,
+    },
+    /// Tell the vehicle where it is: x and y in metres, heading in radians.
+    #[command(allow_negative_numbers = true)]
+    SetPose {
+        /// x, m.
+        x: f64,
+        /// y, m.
+        y: f64,
+        /// Heading, rad.
+        theta: f64,
+        /// Standard deviation of the position along each axis, m.
+        #[arg(long, default_value_t = 0.1)]
+        position_deviation: f64,
+        /// Standard deviation of the heading, rad.
+        #[arg(long, default_value_t = 0.03)]
+        heading_deviation: f64,
+    },
+    /// What the last panic said.
+    Panic {
+        /// Forget it.
+        #[arg(long)]
+        forget: bool,
+    },
+    /// Start the controller again.
+    Reboot,
+}
+
+#[derive(clap::Subcommand)]
+enum MapAction {
+    /// From a file, .imk or .csv, to the controller.
+    Upload {
+        /// File to read.
+        file: PathBuf,
+    },
+    /// From the controller to a file, .imk or .csv.
+    Download {
+        /// File to write.
+        file: PathBuf,
+    },
+}
+
+/// Standard deviation of a surveyed reflector's place along each axis, m.
+const SURVEY_DEVIATION: f32 = 0.005;
+
+/// The reflectors of a layout as the localiser's map has them.
+pub fn map_of_layout(layout: &[IdentifiedLandmark]) -> Vec<Landmark> {
+    let landmark = |entry: &IdentifiedLandmark| Landmark {
+        id: entry.id,
+        kind: LandmarkKind::Reflector,
+        x: entry.landmark.x.metres(),
+        y: entry.landmark.y.metres(),
+        deviation: SURVEY_DEVIATION,
+    };
+    layout.iter().map(landmark).collect()
+}
+
+/// The reflectors of a map as a layout has them: in whole millimetres, all of one size.
+fn layout_of_map(landmarks: &[Landmark]) -> Vec<IdentifiedLandmark> {
+    let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
+    let entry = |landmark: &Landmark| IdentifiedLandmark {
+        id: landmark.id,
+        landmark: LayoutLandmark {
+            x: Coordinate::from_metres(landmark.x),
+            y: Coordinate::from_metres(landmark.y),
+            kind: 1,
+            subtype: 2,
+            size: Size(80),
+            layers: [0].into_iter().collect(),
+        },
+    };
+    reflectors.map(entry).collect()
+}
+
+/// The key in a file: 64 hexadecimal digits.
+pub fn read_key(path: &Path) -> anyhow::Result<[u8; 32]> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let digits = text.trim().as_bytes();
+    let mut key = [0; 32];
+    if digits.len() != 2 * key.len() {
+        bail!("{}: a key has 64 hexadecimal digits, not {}", path.display(), digits.len());
+    }
+    for (byte, pair) in key.iter_mut().zip(digits.chunks(2)) {
+        let pair = std::str::from_utf8(pair).ok();
+        let value = pair.and_then(|pair| u8::from_str_radix(pair, 16).ok());
+        *byte = value.with_context(|| format!("{}: the key has something else than digits", path.display()))?;
+    }
+    Ok(key)
+}
+
+/// A value as it is written on a command line or in a file, for a leaf that holds `like`.
+pub fn parse_value(text: &str, like: Value) -> anyhow::Result<Value> {
+    let value = match like {
+        Value::Number(_) => text.parse().ok().map(Value::Number),
+        Value::Whole(_) => text.parse().ok().map(Value::Whole),
+        Value::Switch(_) => text.parse().ok().map(Value::Switch),
+        Value::Address(_) => text.parse::<std::net::Ipv4Addr>().ok().map(|address| Value::Address(address.octets())),
+    };
+    let wanted = match like {
+        Value::Number(_) => "a number",
+        Value::Whole(_) => "a whole number",
+        Value::Switch(_) => "true or false",
+        Value::Address(_) => "an address such as 192.168.1.10",
+    };
+    value.with_context(|| format!("{text} is not {wanted}"))
+}
+
+fn show(value: Value) -> String {
+    match value {
+        Value::Number(number) => number.to_string(),
+        Value::Whole(whole) => whole.to_string(),
+        Value::Switch(is_on) => is_on.to_string(),
+        Value::Address([a, b, c, d]) => format!("{a}.{b}.{c}.{d}"),
+    }
+}
+
+fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {
+    if as_json {
+        let object: serde_json::Map<_, _> = settings
+            .iter()
+            .map(|setting| {
+                let value = match setting.value {
+                    Value::Number(number) => json!(number),
+                    Value::Whole(whole) => json!(whole),
+                    Value::Switch(is_on) => json!(is_on),
+                    Value::Address(_) => json!(show(setting.value)),
+                };
+                (setting.name.clone(), value)
+            })
+            .collect();
+        println!("{}", serde_json::to_string_pretty(&object)?);
+    } else {
+        let row = |setting: &Setting| {
+            [setting.name.clone(), format!("{} {}", show(setting.value), setting.unit).trim_end().to_owned()]
+        };
+        print_rows(&settings.iter().map(row).collect::<Vec<_>>());
+    }
+    Ok(())
+}
+
+impl Ctl {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let key = self.key.as_deref().map(read_key).transpose()?;
+        let host = if self.host.contains(':') { self.host.clone() } else { format!("{}:{PORT}", self.host) };
+        let mut client = Client::connect(&host, key)?;
+        match &self.action {
+            Action::Version => {
+                let version = client.version()?;
+                let rows = [
+                    ["software", &version.software],
+                    ["starts", &version.starts.to_string()],
+                    ["running for", &format!("{:.1} s", version.uptime)],
+                ];
+                self.print(&rows.map(|[name, value]| [name.to_owned(), value.to_owned()]))?;
+            }
+            Action::List => show_settings(&client.list()?, self.json)?,
+            Action::Get { name } => show_settings(&[client.get(name)?], self.json)?,
+            Action::Set { name, value } => {
+                let like = client.get(name)?.value;
+                client.set(name, parse_value(value, like)?)?;
+            }
+            Action::Store => client.store()?,
+            Action::Map { action: MapAction::Upload { file } } => {
+                let landmarks = map_of_layout(&layout_file::load(file)?);
+                let progress = ProgressBar::new(landmarks.len() as u64);
+                client.upload_map(&landmarks, |count| progress.inc(count as u64))?;
+                progress.finish_and_clear();
+                self.print(&[["landmarks".to_owned(), landmarks.len().to_string()]])?;
+            }
+            Action::Map { action: MapAction::Download { file } } => {
+                layout_file::Format::of(file)?;
+                let landmarks = client.download_map()?;
+                layout_file::save(file, &layout_of_map(&landmarks))?;
+                self.print(&[["landmarks".to_owned(), landmarks.len().to_string()]])?;
+            }
+            Action::SetPose { x, y, theta, position_deviation, heading_deviation } => {
+                client.set_pose(Pose { x: *x, y: *y, theta: *theta }, [*position_deviation, *heading_deviation])?;
+            }
+            Action::Panic { forget } => {
+                let text = client.last_panic()?;
+                let shown = if text.is_empty() { "none" } else { text.as_str() };
+                self.print(&[["last panic".to_owned(), shown.to_owned()]])?;
+                if *forget {
+                    client.forget_panic()?;
+                }
+            }
+            Action::Reboot => client.reboot()?,
+        }
+        Ok(())
+    }
+
+    fn print(&self, rows: &[[String; 2]]) -> anyhow::Result<()> {
+        if self.json {
+            let object: serde_json::Map<_, _> =
+                rows.iter().map(|[name, value]| (name.replace(' ', "_"), json!(value))).collect();
+            println!("{}", serde_json::to_string_pretty(&object)?);
+        } else {
+            print_rows(rows);
+        }
+        Ok(())
+    }
+}
