@@ -11,7 +11,7 @@ use agv_core::landmarks::{FixedMap, Landmark, LandmarkKind, NearestNeighbour};
 use agv_core::localizer::{Event, Localizer};
 use agv_core::measurement::{Reflectors, Time};
 use agv_core::record::Record;
-use agv_core::wire::cola::{Dialect, Deframer, Deframed, Sequence};
+use agv_core::wire::cola::{Deframed, Deframer, Dialect, Sequence};
 use agv_core::wire::nav350::Answer;
 use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::log_file::LogBuffer;
