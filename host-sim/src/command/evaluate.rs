@@ -1,5 +1,6 @@
 //! `agv evaluate`.
 
+mod calibration;
 mod carpark;
 mod falko;
 mod warehouse;
@@ -13,6 +14,7 @@ pub struct Evaluate {
 
 #[derive(clap::Subcommand)]
 enum Experiment {
+    Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
     Warehouse(warehouse::Warehouse),
@@ -22,6 +24,7 @@ impl Evaluate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.experiment {
+            Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),

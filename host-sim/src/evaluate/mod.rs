@@ -1,6 +1,7 @@
 //! Experiments: how good it is, one file an experiment.
 
 pub mod accuracy;
+pub mod calibration;
 pub mod carpark;
 pub mod demonstration;
 pub mod drive;

@@ -1,0 +1,96 @@
+//! Windows of equal length from a drive with a continuous source of poses.
+
+use agv_core::geometry::{Pose, wrap};
+use agv_core::measurement::Time;
+use nalgebra::{Matrix3, Vector3};
+
+use super::counted::Counted;
+use super::window::{Steps, Window};
+
+/// Pose of S in any fixed frame, at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LaserPose {
+    /// When.
+    pub time: Time,
+    /// Where.
+    pub pose: Pose,
+}
+
+/// Length of a window, s: long enough that counters that stall and catch up do not bias it.
+pub const WINDOW_SECONDS: f64 = 2.3;
+/// Share of the way against the sense of travel that is still taken as play.
+const LARGEST_BACKLASH: f64 = 0.02;
+/// Stated deviations of a motion between two poses, m and rad; the fit estimates a factor to them.
+const POSE_DEVIATIONS: [f64; 3] = [4e-3, 4e-3, 3e-3];
+
+/// What was counted between two times: steps at one steering angle each, cut at both ends.
+#[must_use]
+pub fn steps_between(counted: &[Counted], start: Time, end: Time) -> Steps {
+    let mut steps = Steps::default();
+    let first = counted.partition_point(|sample| sample.time <= start).max(1);
+    for pair in counted[first - 1..].windows(2) {
+        let [before, after] = pair else { continue };
+        if before.time >= end {
+            break;
+        }
+        let duration = after.time.since(before.time);
+        let inside = after.time.min(end).since(before.time.max(start));
+        if inside > 0.0 {
+            let share = inside / duration;
+            steps.add((after.ticks - before.ticks) * share, 0.5 * (before.steering + after.steering));
+        }
+    }
+    steps
+}
+
+/// Cuts a drive into windows of [`WINDOW_SECONDS`] between poses; those in which the vehicle reverses or hardly moves
+/// (less than `shortest` ticks) are left out.
+#[must_use]
+pub fn windows(counted: &[Counted], poses: &[LaserPose], shortest: f64) -> Vec<Window> {
+    let mut windows = Vec::new();
+    let (Some(first), Some(last)) = (counted.first(), counted.last()) else {
+        return windows;
+    };
+    let usable: Vec<&LaserPose> = poses
+        .iter()
+        .filter(|pose| pose.pose.is_finite() && pose.time >= first.time && pose.time <= last.time)
+        .collect();
+    let mut begin = 0;
+    while let Some(start) = usable.get(begin) {
+        let end = usable.partition_point(|pose| pose.time.since(start.time) < WINDOW_SECONDS);
+        let Some(stop) = usable.get(end) else { break };
+        let steps = steps_between(counted, start.time, stop.time).finish();
+        let way: f64 = steps.iter().map(|step| step.ticks).sum();
+        let against: f64 = steps.iter().filter(|step| step.ticks * way < 0.0).map(|step| step.ticks.abs()).sum();
+        if way.abs() >= shortest && against <= LARGEST_BACKLASH * way.abs() {
+            windows.push(Window {
+                start: start.time,
+                end: stop.time,
+                steps,
+                motion: start.pose.between(&stop.pose),
+                covariance: Matrix3::from_diagonal(&Vector3::from(POSE_DEVIATIONS.map(|deviation| deviation * deviation))),
+            });
+        }
+        begin = end;
+    }
+    windows
+}
+
+/// Where the laser would be, from the pose that it had first, if the encoders said the truth.
+#[must_use]
+pub fn dead_reckoning(counted: &[Counted], model: &super::model::VehicleModel, times: &[Time]) -> Vec<Pose> {
+    let mut robot = Pose::default();
+    let mut place = 0;
+    let mut poses = Vec::with_capacity(times.len());
+    let start = times.first().copied().unwrap_or_default();
+    for time in times {
+        let from = times.get(place.max(1) - 1).copied().unwrap_or(start);
+        if *time > from {
+            let moved = model.motion(&steps_between(counted, from, *time).finish());
+            robot = robot.compose(&Pose { x: moved.x, y: moved.y, theta: wrap(moved.z) });
+        }
+        place += 1;
+        poses.push(robot.compose(&model.laser));
+    }
+    poses
+}

@@ -1,0 +1,3 @@
+//! Calibration: on a real tricycle, and in simulation.
+
+pub mod sapienza;
