@@ -77,10 +77,8 @@ pub fn count(samples: &[EncoderSample], nominal: &Tricycle, mend: bool) -> (Vec<
         let mut last = None;
         samples.iter().filter(|sample| last.replace(sample.time).is_none_or(|last| sample.time > last)).collect()
     };
-    let mut steps: Vec<f64> = ordered
-        .windows(2)
-        .map(|pair| nominal.drive_range.step(pair[0].drive, pair[1].drive) as f64)
-        .collect();
+    let mut steps: Vec<f64> =
+        ordered.windows(2).map(|pair| nominal.drive_range.step(pair[0].drive, pair[1].drive) as f64).collect();
     let mut faults = Vec::new();
     let usual: Vec<f64> = (0..steps.len()).map(|index| usual_step(&steps, index)).collect();
     let mut index = 0;
@@ -127,7 +125,8 @@ pub fn count(samples: &[EncoderSample], nominal: &Tricycle, mend: bool) -> (Vec<
 
 /// Median step around one of them.
 fn usual_step(steps: &[f64], index: usize) -> f64 {
-    let mut around: Vec<f64> = steps[index.saturating_sub(NEIGHBOURS)..(index + NEIGHBOURS + 1).min(steps.len())].to_vec();
+    let mut around: Vec<f64> =
+        steps[index.saturating_sub(NEIGHBOURS)..(index + NEIGHBOURS + 1).min(steps.len())].to_vec();
     around.sort_by(f64::total_cmp);
     around[around.len() / 2]
 }

@@ -137,8 +137,8 @@ fn linearise(windows: &[Window], model: &VehicleModel, unknowns: &[Vec<usize>], 
     let mut linearised = Linearised { residuals: Vec::new(), rows: Vec::new() };
     for (window, root) in windows.iter().zip(roots) {
         let (motion, derivative) = model.laser_motion(window);
-        let residual = motion
-            - nalgebra::Vector3::new(window.motion.x, window.motion.y, window.rotation_near(motion.z));
+        let residual =
+            motion - nalgebra::Vector3::new(window.motion.x, window.motion.y, window.rotation_near(motion.z));
         let (residual, derivative) = (root * residual, root * derivative);
         linearised.residuals.extend(residual.iter());
         for row in 0..3 {

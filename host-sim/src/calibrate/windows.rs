@@ -1,4 +1,4 @@
-//! Windows of equal length from a drive with a continuous source of poses.
+//! Windows of several lengths from a drive with a continuous source of poses.
 
 use agv_core::geometry::{Pose, wrap};
 use agv_core::measurement::Time;
@@ -16,12 +16,13 @@ pub struct LaserPose {
     pub pose: Pose,
 }
 
-/// Length of a window, s: long enough that counters that stall and catch up do not bias it.
-pub const WINDOW_SECONDS: f64 = 2.3;
+/// Lengths of windows, s. Short ones are many; long ones tell small offsets, which unsteady clocks and counters that stall
+/// and catch up would hide in short ones. The shortest is long enough not to be biased by those.
+pub const WINDOW_SECONDS: [f64; 3] = [2.3, 9.2, 36.8];
 /// Share of the way against the sense of travel that is still taken as play.
 const LARGEST_BACKLASH: f64 = 0.02;
 /// Stated deviations of a motion between two poses, m and rad; the fit estimates a factor to them.
-const POSE_DEVIATIONS: [f64; 3] = [4e-3, 4e-3, 3e-3];
+const POSE_DEVIATIONS: [f64; 3] = [16e-3, 16e-3, 4e-3];
 
 /// What was counted between two times: steps at one steering angle each, cut at both ends.
 #[must_use]
@@ -43,37 +44,41 @@ pub fn steps_between(counted: &[Counted], start: Time, end: Time) -> Steps {
     steps
 }
 
-/// Cuts a drive into windows of [`WINDOW_SECONDS`] between poses; those in which the vehicle reverses or hardly moves
-/// (less than `shortest` ticks) are left out.
+/// Cuts a drive into windows of each of [`WINDOW_SECONDS`] between poses, side by side; those in which the vehicle reverses
+/// or hardly moves (less than `shortest` ticks) are left out. Each part of the drive is in several windows, so deviations
+/// of parameters are larger than independent windows would make them by the root of [`WINDOW_SECONDS`]'s length.
 #[must_use]
 pub fn windows(counted: &[Counted], poses: &[LaserPose], shortest: f64) -> Vec<Window> {
-    let mut windows = Vec::new();
     let (Some(first), Some(last)) = (counted.first(), counted.last()) else {
-        return windows;
+        return Vec::new();
     };
-    let usable: Vec<&LaserPose> = poses
-        .iter()
-        .filter(|pose| pose.pose.is_finite() && pose.time >= first.time && pose.time <= last.time)
-        .collect();
-    let mut begin = 0;
-    while let Some(start) = usable.get(begin) {
-        let end = usable.partition_point(|pose| pose.time.since(start.time) < WINDOW_SECONDS);
-        let Some(stop) = usable.get(end) else { break };
-        let steps = steps_between(counted, start.time, stop.time).finish();
-        let way: f64 = steps.iter().map(|step| step.ticks).sum();
-        let against: f64 = steps.iter().filter(|step| step.ticks * way < 0.0).map(|step| step.ticks.abs()).sum();
-        if way.abs() >= shortest && against <= LARGEST_BACKLASH * way.abs() {
-            windows.push(Window {
-                start: start.time,
-                end: stop.time,
-                steps,
-                motion: start.pose.between(&stop.pose),
-                covariance: Matrix3::from_diagonal(&Vector3::from(POSE_DEVIATIONS.map(|deviation| deviation * deviation))),
-            });
+    let is_usable = |pose: &&LaserPose| pose.pose.is_finite() && pose.time >= first.time && pose.time <= last.time;
+    let usable: Vec<&LaserPose> = poses.iter().filter(is_usable).collect();
+    let mut windows = Vec::new();
+    for seconds in WINDOW_SECONDS {
+        let mut begin = 0;
+        while let Some(start) = usable.get(begin) {
+            let end = usable.partition_point(|pose| pose.time.since(start.time) < seconds);
+            let Some(stop) = usable.get(end) else { break };
+            windows.extend(window(counted, start, stop, shortest));
+            begin = end;
         }
-        begin = end;
     }
     windows
+}
+
+fn window(counted: &[Counted], start: &LaserPose, stop: &LaserPose, shortest: f64) -> Option<Window> {
+    let steps = steps_between(counted, start.time, stop.time).finish();
+    let way: f64 = steps.iter().map(|step| step.ticks).sum();
+    let against: f64 = steps.iter().filter(|step| step.ticks * way < 0.0).map(|step| step.ticks.abs()).sum();
+    let variances = Vector3::from(POSE_DEVIATIONS.map(|deviation| deviation * deviation));
+    (way.abs() >= shortest && against <= LARGEST_BACKLASH * way.abs()).then(|| Window {
+        start: start.time,
+        end: stop.time,
+        steps,
+        motion: start.pose.between(&stop.pose),
+        covariance: Matrix3::from_diagonal(&variances),
+    })
 }
 
 /// Where the laser would be, from the pose that it had first, if the encoders said the truth.

@@ -15,7 +15,7 @@ use crate::calibrate::joint::{self, Free};
 use crate::calibrate::model::VehicleModel;
 use crate::calibrate::noise::NoiseModel;
 use crate::calibrate::window::Window;
-use crate::calibrate::windows::{LaserPose, dead_reckoning, windows};
+use crate::calibrate::windows::{LaserPose, WINDOW_SECONDS, dead_reckoning, windows};
 use crate::import::sapienza;
 use crate::recording::RecordedEvent;
 
@@ -229,7 +229,8 @@ fn aligned_error(pairs: &[(Pose, Pose)]) -> (f64, f64) {
         return (f64::NAN, f64::NAN);
     };
     let mean = |error: &dyn Fn(&Pose, &Pose) -> f64| {
-        let squares = pairs.iter().map(|(reckoned, reference)| error(&alignment.pose.compose(reckoned), reference).powi(2));
+        let squares =
+            pairs.iter().map(|(reckoned, reference)| error(&alignment.pose.compose(reckoned), reference).powi(2));
         (squares.sum::<f64>() / pairs.len() as f64).sqrt()
     };
     (
@@ -281,9 +282,10 @@ pub fn run(folder: &Path) -> anyhow::Result<Vec<Outcome>> {
                 continue;
             }
             let free = Free { offsets_differ: true, wheelbase: true, steering_ratio: true };
-            let noise = NoiseModel { slip: 5e-3, steering: 2e-3, laser: 1.0 };
+            let noise = NoiseModel { slip: 1e-3, steering: 1e-3, laser: 1.0 };
             let fit = joint::fit(&windows, &model, free, &noise).with_context(|| format!("fitted on {fitted_on}"))?;
-            let [forward, backward, scale, wheelbase, ratio, x, y, heading] = fit.deviations;
+            let [forward, backward, scale, wheelbase, ratio, x, y, heading] =
+                fit.deviations.map(|deviation| deviation * (WINDOW_SECONDS.len() as f64).sqrt());
             let std = Deviations {
                 steer_offset_forward_rad: forward,
                 steer_offset_backward_rad: backward,
