@@ -1,5 +1,6 @@
 //! The project's own commands: `cargo xtask --help`.
 
+mod firmware;
 mod fuzz;
 mod packages;
 mod seeds;
@@ -19,6 +20,7 @@ struct Xtask {
 
 #[derive(Subcommand)]
 enum Command {
+    Firmware(firmware::Firmware),
     Fuzz(fuzz::Fuzz),
     Seeds(seeds::Seeds),
     Test(test::Test),
@@ -26,6 +28,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
+        Command::Firmware(firmware) => firmware.run(),
         Command::Fuzz(fuzz) => fuzz.run(),
         Command::Seeds(seeds) => seeds.run(),
         Command::Test(test) => test.run(),

@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 
 use crate::fuzz::Fuzz;
-use crate::{packages, repository};
+use crate::{firmware, packages, repository};
 
 /// Run all tests.
 #[derive(clap::Args)]
@@ -43,6 +43,9 @@ impl Test {
     pub fn run(self) -> anyhow::Result<()> {
         let mut missing = packages::prepare();
         missing.extend(packages::prepare_python(&repository().join("target/python")));
+        // The tests in emulation run these images.
+        firmware::build()?;
+        firmware::check_sizes()?;
         let mut summary = Vec::new();
         let mut remarks = missing;
         let mut is_ok = true;

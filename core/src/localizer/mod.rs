@@ -4,11 +4,13 @@ mod event;
 mod machine;
 mod maps;
 mod output;
+mod output_predictor;
 mod parameters;
 
 pub use event::Event;
 pub use machine::Localizer;
 pub use output::{LandmarkSource, LandmarkUse, Outputs};
+pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
 
 pub use crate::measurement::PoseFix;
