@@ -2,9 +2,17 @@
 
 pub mod closed_form;
 pub mod counted;
+pub mod drive;
 pub mod joint;
 mod least_squares;
+pub mod log_input;
 pub mod model;
 pub mod noise;
+pub mod odometry_path;
+pub mod refusal;
+pub mod standstill;
+pub mod stops;
+pub mod surveyed_map;
+pub mod tracking;
 pub mod window;
 pub mod windows;

@@ -1,6 +1,6 @@
 //! Windows of several lengths from a drive with a continuous source of poses.
 
-use agv_core::geometry::{Pose, wrap};
+use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
 use nalgebra::{Matrix3, Vector3};
 
@@ -79,23 +79,4 @@ fn window(counted: &[Counted], start: &LaserPose, stop: &LaserPose, shortest: f6
         motion: start.pose.between(&stop.pose),
         covariance: Matrix3::from_diagonal(&variances),
     })
-}
-
-/// Where the laser would be, from the pose that it had first, if the encoders said the truth.
-#[must_use]
-pub fn dead_reckoning(counted: &[Counted], model: &super::model::VehicleModel, times: &[Time]) -> Vec<Pose> {
-    let mut robot = Pose::default();
-    let mut place = 0;
-    let mut poses = Vec::with_capacity(times.len());
-    let start = times.first().copied().unwrap_or_default();
-    for time in times {
-        let from = times.get(place.max(1) - 1).copied().unwrap_or(start);
-        if *time > from {
-            let moved = model.motion(&steps_between(counted, from, *time).finish());
-            robot = robot.compose(&Pose { x: moved.x, y: moved.y, theta: wrap(moved.z) });
-        }
-        place += 1;
-        poses.push(robot.compose(&model.laser));
-    }
-    poses
 }

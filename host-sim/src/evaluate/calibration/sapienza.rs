@@ -15,7 +15,8 @@ use crate::calibrate::joint::{self, Free};
 use crate::calibrate::model::VehicleModel;
 use crate::calibrate::noise::NoiseModel;
 use crate::calibrate::window::Window;
-use crate::calibrate::windows::{LaserPose, WINDOW_SECONDS, dead_reckoning, windows};
+use crate::calibrate::odometry_path::OdometryPath;
+use crate::calibrate::windows::{LaserPose, WINDOW_SECONDS, windows};
 use crate::import::sapienza;
 use crate::recording::RecordedEvent;
 
@@ -168,7 +169,8 @@ impl Run {
     #[must_use]
     pub fn open_loop(&self, model: &VehicleModel) -> [(f64, f64); 5] {
         let times: Vec<Time> = self.poses.iter().map(|pose| pose.time).collect();
-        let reckoned = dead_reckoning(&self.counted, model, &times);
+        let path = OdometryPath::new(&self.counted, model);
+        let reckoned: Vec<Pose> = times.iter().map(|time| path.laser_at(*time)).collect();
         let quarters: Vec<usize> = times.iter().map(|time| self.quarter(*time)).collect();
         let error = |wanted: &dyn Fn(usize) -> bool| {
             let pairs: Vec<(Pose, Pose)> = reckoned
