@@ -95,7 +95,9 @@ pub fn fit(windows: &[Window], start: &VehicleModel, free: Free, noise: &NoiseMo
     finish(windows, model, &unknowns, &roots, noise_now, weights)
 }
 
-fn disturbances(window: &Window, model: &VehicleModel) -> Disturbances {
+/// What a window contributes to the noise, given a model.
+#[must_use]
+pub fn disturbances(window: &Window, model: &VehicleModel) -> Disturbances {
     let (motion, derivative) = model.laser_motion(window);
     let offset = derivative.column(usize::from(window.is_backward())).into_owned();
     let measured = nalgebra::Vector3::new(window.motion.x, window.motion.y, window.rotation_near(motion.z));

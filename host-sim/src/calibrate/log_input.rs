@@ -32,7 +32,9 @@ pub struct LogInput {
 }
 
 impl LogInput {
-    fn new(parameters: Parameters) -> Self {
+    /// A log without any record but its header.
+    #[must_use]
+    pub fn new(parameters: Parameters) -> Self {
         Self {
             parameters,
             encoders: Vec::new(),
@@ -96,7 +98,8 @@ impl LogInput {
         input
     }
 
-    fn add(&mut self, event: &Event) {
+    /// Takes an event.
+    pub fn add(&mut self, event: &Event) {
         match event {
             Event::Encoders(sample) => self.encoders.push(*sample),
             Event::Reflectors(reflectors) => {

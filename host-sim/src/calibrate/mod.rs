@@ -2,7 +2,9 @@
 
 pub mod closed_form;
 pub mod counted;
+pub mod design;
 pub mod drive;
+pub mod found;
 pub mod joint;
 mod least_squares;
 pub mod log_input;
