@@ -129,8 +129,8 @@ fn roots(
 ) -> Result<Vec<Matrix3<f64>>, FitError> {
     let root = |(window, weight): (&Window, &f64)| {
         let covariance = disturbances(window, model).covariance(noise);
-        let inverse = covariance.try_inverse()?;
-        Some(inverse.cholesky()?.l().transpose() * weight.sqrt())
+        let root = covariance.cholesky()?.l();
+        Some(root.solve_lower_triangular(&Matrix3::identity())? * weight.sqrt())
     };
     windows.iter().zip(weights).map(root).collect::<Option<_>>().ok_or(FitError::Singular)
 }

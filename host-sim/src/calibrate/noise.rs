@@ -43,10 +43,9 @@ impl Disturbances {
     /// Squared Mahalanobis distance of the residual, and logarithm of the covariance's determinant.
     #[must_use]
     pub fn distance(&self, noise: &NoiseModel) -> Option<(f64, f64)> {
-        let covariance = self.covariance(noise);
-        let inverse = covariance.try_inverse()?;
-        let determinant = covariance.determinant();
-        (determinant > 0.0).then(|| ((self.residual.transpose() * inverse * self.residual).x, determinant.ln()))
+        let root = self.covariance(noise).cholesky()?.l();
+        let white = root.solve_lower_triangular(&self.residual)?;
+        Some((white.norm_squared(), 2.0 * root.diagonal().map(f64::ln).sum()))
     }
 }
 
@@ -55,8 +54,9 @@ const PRIOR: [f64; 3] = [1.5, 1.5, 0.7];
 /// Steps of the search, in powers of e, and how often each is tried.
 const STEPS: [f64; 3] = [0.8, 0.3, 0.1];
 const ROUNDS: usize = 8;
-/// Distances beyond this count as no larger: one bad window must not make all others uncertain.
-const LARGEST_SQUARE: f64 = 16.0;
+/// Mahalanobis distance beyond which the cost of a window grows in proportion (Huber): one bad window must not make all
+/// others uncertain.
+const HUBER: f64 = 4.0;
 
 impl NoiseModel {
     /// The most probable deviations for those residuals, with a wide belief around `self`. `unknowns` of the residuals'
@@ -76,7 +76,7 @@ impl NoiseModel {
             let evidence: f64 = windows
                 .iter()
                 .map(|window| match window.distance(&noise) {
-                    Some((square, determinant)) => square.min(LARGEST_SQUARE) + freedom * determinant,
+                    Some((square, determinant)) => huber(square) + freedom * determinant,
                     None => f64::INFINITY,
                 })
                 .sum();
@@ -104,4 +104,9 @@ impl NoiseModel {
         }
         model(&powers)
     }
+}
+
+/// Cost of a squared distance.
+fn huber(square: f64) -> f64 {
+    if square <= HUBER * HUBER { square } else { HUBER * (2.0 * square.sqrt() - HUBER) }
 }

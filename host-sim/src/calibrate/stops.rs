@@ -88,8 +88,9 @@ const MOVED_DISTANCE: f64 = 0.008;
 const LARGEST_MOVED_SHARE: f64 = 0.34;
 /// Larger differences between the places of reflectors, m, are no noise.
 const LARGEST_DEVIATION: f64 = 0.02;
-/// Smallest deviation of a coordinate that a registration is trusted to have, m.
-const SMALLEST_DEVIATION: f64 = 2e-5;
+/// Smallest deviation of a coordinate that a registration is trusted to have, m: lasers report whole millimetres, and the
+/// wheel is counted in whole ticks.
+const SMALLEST_DEVIATION: f64 = 4e-4;
 /// Share of the way against the sense of travel that is still taken as play.
 const LARGEST_BACKLASH: f64 = 0.02;
 

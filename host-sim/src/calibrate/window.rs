@@ -15,16 +15,47 @@ pub struct Step {
     pub steering: f64,
 }
 
-/// Steering angles closer together than this, rad, count as one.
+/// Samples whose steering angles differ by less than this, rad, may be joined,
 const SAME_STEERING: f64 = 2e-3;
+/// up to so many of them.
+const SAMPLES_A_PIECE: usize = 12;
+/// What was joined is joined on if its mean angles differ by less than this, rad.
+const SAME_MEAN_STEERING: f64 = 1.5e-4;
 
-/// Steps of a window as they come, with equal ones joined.
+/// Ticks times sine and cosine of the steering angle.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    sine: f64,
+    cosine: f64,
+}
+
+impl Sum {
+    fn add(&mut self, other: &Self) {
+        self.sine += other.sine;
+        self.cosine += other.cosine;
+    }
+
+    fn step(&self) -> Step {
+        let sign = self.cosine.signum();
+        let steering = (sign * self.sine).atan2(sign * self.cosine);
+        Step { ticks: sign * self.sine.hypot(self.cosine), steering }
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        self.cosine * other.cosine > 0.0
+            && (self.step().steering - other.step().steering).abs() < SAME_MEAN_STEERING
+    }
+}
+
+/// Steps of a window as they come: short pieces, in which the noise of the steering angle averages, and equal pieces
+/// joined to one.
 #[derive(Clone, Debug, Default)]
 pub struct Steps {
     done: Vec<Step>,
-    /// Sums of ticks times sine and cosine of the steering angle.
-    sine: f64,
-    cosine: f64,
+    /// Pieces that are one step.
+    joined: Sum,
+    piece: Sum,
+    samples: usize,
     first: f64,
 }
 
@@ -34,28 +65,39 @@ impl Steps {
         if ticks == 0.0 {
             return;
         }
-        let is_same = self.cosine * ticks > 0.0 && (steering - self.first).abs() < SAME_STEERING;
-        if !is_same {
-            self.close();
+        let is_same = self.piece.cosine * ticks > 0.0 && (steering - self.first).abs() < SAME_STEERING;
+        if !is_same || self.samples >= SAMPLES_A_PIECE {
+            self.close_piece();
             self.first = steering;
         }
         let (sine, cosine) = steering.sin_cos();
-        self.sine += ticks * sine;
-        self.cosine += ticks * cosine;
+        self.piece.add(&Sum { sine: ticks * sine, cosine: ticks * cosine });
+        self.samples += 1;
+    }
+
+    fn close_piece(&mut self) {
+        let piece = std::mem::take(&mut self.piece);
+        self.samples = 0;
+        if piece.cosine == 0.0 {
+            return;
+        }
+        if !self.joined.is_like(&piece) {
+            self.close();
+        }
+        self.joined.add(&piece);
     }
 
     fn close(&mut self) {
-        if self.cosine != 0.0 {
-            let sign = self.cosine.signum();
-            let steering = (sign * self.sine).atan2(sign * self.cosine);
-            self.done.push(Step { ticks: sign * self.sine.hypot(self.cosine), steering });
+        let joined = std::mem::take(&mut self.joined);
+        if joined.cosine != 0.0 {
+            self.done.push(joined.step());
         }
-        (self.sine, self.cosine) = (0.0, 0.0);
     }
 
     /// The steps.
     #[must_use]
     pub fn finish(mut self) -> Vec<Step> {
+        self.close_piece();
         self.close();
         self.done
     }

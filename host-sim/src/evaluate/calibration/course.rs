@@ -14,43 +14,64 @@ use crate::simulate::random::{Random, Stream};
 use crate::simulate::scenario::{DriveOptions, OdometryOptions};
 use crate::simulate::vehicle::{Motion, drive};
 
-/// What disturbs a drive: the three models of the study in simulation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Disturbance {
-    /// Slip is a random walk of 0.05 % at a metre; the steering's noise is white.
-    Mild,
-    /// And each segment has an error of the steering angle, 0.01 degrees.
-    Mid,
-    /// And each segment has slip of 0.05 %, and reflectors are off by 3 mm that do not average.
-    Hard,
+/// What disturbs a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disturbance {
+    /// Its name.
+    pub name: &'static str,
+    /// Slip, a random walk, m for the root of a metre.
+    pub slip: f64,
+    /// Slip that lasts for a segment, as a share of the way.
+    pub segment_slip: f64,
+    /// White noise of the steering angle, degrees.
+    pub steering_noise_deg: f64,
+    /// Error of the steering angle that lasts for a segment, degrees.
+    pub segment_steering_error_deg: f64,
+    /// Noise of a reflector's distance, m.
+    pub range_noise: f64,
+    /// Noise of its direction, degrees.
+    pub bearing_noise_deg: f64,
+    /// Error of a reflector's place along each axis that lasts for a segment and its stop, m.
+    pub lasting_reflector_error: f64,
 }
 
 impl Disturbance {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Mild, Self::Mid, Self::Hard];
+    /// Nothing but the encoders' resolution.
+    pub const NONE: Self = Self {
+        name: "none",
+        slip: 0.0,
+        segment_slip: 0.0,
+        steering_noise_deg: 0.0,
+        segment_steering_error_deg: 0.0,
+        range_noise: 0.0,
+        bearing_noise_deg: 0.0,
+        lasting_reflector_error: 0.0,
+    };
+    /// Slip is a random walk of 0.05 % at a metre; the steering's noise is white.
+    pub const MILD: Self = Self {
+        name: "mild",
+        slip: 5e-4,
+        steering_noise_deg: 0.01,
+        range_noise: 8e-3,
+        bearing_noise_deg: 0.05,
+        ..Self::NONE
+    };
+    /// And each segment has an error of the steering angle.
+    pub const MID: Self = Self { name: "mid", segment_steering_error_deg: 0.01, ..Self::MILD };
+    /// And each segment has slip of 0.05 %, and reflectors are off by 3 mm that do not average.
+    pub const HARD: Self = Self { name: "hard", segment_slip: 5e-4, lasting_reflector_error: 3e-3, ..Self::MID };
+    /// The three models of the study in simulation.
+    pub const ALL: [Self; 3] = [Self::MILD, Self::MID, Self::HARD];
 
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Mild => "mild",
-            Self::Mid => "mid",
-            Self::Hard => "hard",
+    fn odometry(&self) -> OdometryOptions {
+        OdometryOptions {
+            rate: RATE,
+            slip: self.slip,
+            steering_noise_deg: self.steering_noise_deg,
+            leg_steering_error_deg: self.segment_steering_error_deg,
+            leg_slip: self.segment_slip,
+            ..OdometryOptions::perfect()
         }
-    }
-
-    fn odometry(self) -> OdometryOptions {
-        let base = OdometryOptions { rate: RATE, slip: 5e-4, steering_noise_deg: 0.01, ..OdometryOptions::perfect() };
-        match self {
-            Self::Mild => base,
-            Self::Mid => OdometryOptions { leg_steering_error_deg: 0.01, ..base },
-            Self::Hard => OdometryOptions { leg_steering_error_deg: 0.01, leg_slip: 5e-4, ..base },
-        }
-    }
-
-    /// Error of a reflector's place along each axis that stays for a segment and its stop, m.
-    fn lasting_reflector_error(self) -> f64 {
-        if self == Self::Hard { 3e-3 } else { 0.0 }
     }
 }
 
@@ -60,9 +81,6 @@ const RATE: f64 = 50.0;
 const FREQUENCY: f64 = 8.0;
 /// Revolutions at a stop; one before and one after are not whole.
 const SCANS_A_STOP: f64 = 64.0;
-/// Noise of a range (m) and of a bearing (rad).
-const RANGE_NOISE: f64 = 8e-3;
-const BEARING_NOISE: f64 = 0.05 * std::f64::consts::PI / 180.0;
 /// Reflectors stand at equal angles around the drive, and so far outside of it, m.
 const REFLECTORS: usize = 16;
 const DISTANCES: [f64; 2] = [4.0, 12.0];
@@ -165,13 +183,14 @@ impl Course {
 
     /// What the sensors say with the disturbances that `seed` draws.
     #[must_use]
-    pub fn log(&self, disturbance: Disturbance, seed: u64) -> LogInput {
+    pub fn log(&self, disturbance: &Disturbance, seed: u64) -> LogInput {
         let mut input = LogInput::new(self.vehicle.believed());
         let mut random = Random::new(seed, Stream::Odometry);
         let options = disturbance.odometry();
         input.encoders = odometer::encoders(&self.motion, &self.vehicle.tricycle, &options, START, &mut random);
         let mut random = Random::new(seed, Stream::Reflectors);
-        let lasting = disturbance.lasting_reflector_error();
+        let lasting = disturbance.lasting_reflector_error;
+        let bearing_noise = disturbance.bearing_noise_deg.to_radians();
         let mut errors = [[0.0; 2]; REFLECTORS];
         let mut of_leg = None;
         for (leg, revolution) in &self.revolutions {
@@ -182,8 +201,8 @@ impl Course {
                 let [along, across] = errors[seen.reflector];
                 ReflectorObservation {
                     time: START.offset(seen.time),
-                    range: (seen.range + along + RANGE_NOISE * random.normal()) as f32,
-                    bearing: wrap(seen.bearing + across / seen.range + BEARING_NOISE * random.normal()) as f32,
+                    range: (seen.range + along + disturbance.range_noise * random.normal()) as f32,
+                    bearing: wrap(seen.bearing + across / seen.range + bearing_noise * random.normal()) as f32,
                 }
             };
             input.revolutions.push(revolution.iter().map(observation).collect());

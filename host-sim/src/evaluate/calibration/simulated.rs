@@ -122,7 +122,7 @@ pub fn run(experiment: &Experiment, progress: impl Fn() + Sync) -> Result<Vec<Ou
         let symmetric = TrueVehicle::of_the_thesis(-0.7564, -0.7564);
         let asymmetric = TrueVehicle::of_the_thesis(-0.7270, -0.7747);
         let courses = [(symmetric, course(symmetric)), (asymmetric, course(asymmetric))];
-        for disturbance in Disturbance::ALL {
+        for disturbance in &Disturbance::ALL {
             for (offsets, (vehicle, course)) in [Offsets::Common, Offsets::ForEachSense].into_iter().zip(&courses) {
                 let contenders: Vec<_> = CONTENDERS.iter().filter(|contender| contender.offsets == offsets).collect();
                 let runs: Vec<Vec<Result<Found, Refusal>>> = (0..experiment.runs)
@@ -138,7 +138,7 @@ pub fn run(experiment: &Experiment, progress: impl Fn() + Sync) -> Result<Vec<Ou
                     let summary = summarise(vehicle, &results)?;
                     outcomes.push(Outcome {
                         design: *design,
-                        noise: disturbance.name(),
+                        noise: disturbance.name,
                         method: contender.name,
                         runs: summary.runs,
                         refused: results.len() - summary.runs,
