@@ -7,9 +7,10 @@ use super::counted::{Counted, CounterFault, count};
 use super::log_input::LogInput;
 use super::model::VehicleModel;
 use super::odometry_path::OdometryPath;
+use super::reflector_noise::ReflectorNoise;
 use super::refusal::Refusal;
 use super::standstill::standstills;
-use super::stops::{Between, Stop, between, stops};
+use super::stops::{NoMotion, Stop, between, stops, with_lasting_part};
 use super::surveyed_map::stop_poses;
 use super::tracking::{TrackedRevolution, track};
 use super::window::Window;
@@ -126,9 +127,9 @@ impl Drive {
                 .filter(is_located)
                 .map(|revolution| LaserPose { time: revolution.time, pose: revolution.pose })
                 .collect();
-            let stops = stops(&standstills(&drive.counted, tricycle.drive_scale), &tracked);
+            let (stops, noise) = stops(&standstills(&drive.counted, tricycle.drive_scale), &tracked);
             if stops.len() >= FEWEST_STOPS {
-                drive.cut_at_stops(&stops, shortest, preparation.map)?;
+                drive.cut_at_stops(&stops, &noise, shortest, preparation.map)?;
             }
             if drive.windows.is_empty() {
                 drive.cut_by_poses(MotionSource::ReflectorsWhileDriving, shortest);
@@ -155,24 +156,35 @@ impl Drive {
         self.overlap = super::windows::WINDOW_SECONDS.len();
     }
 
-    fn cut_at_stops(&mut self, stops: &[Stop], shortest: f64, map: Option<&[Landmark]>) -> Result<(), Refusal> {
+    fn cut_at_stops(
+        &mut self,
+        stops: &[Stop],
+        noise: &ReflectorNoise,
+        shortest: f64,
+        map: Option<&[Landmark]>,
+    ) -> Result<(), Refusal> {
         let (mut few, mut disagree, mut all) = (0, 0, 0);
+        let mut ways = Vec::new();
         for pair in stops.windows(2) {
             let start = pair[0].standstill.end.seconds();
-            match between(&self.counted, &pair[0], &pair[1], shortest) {
-                Between::Rest => continue,
-                Between::Window(window, moved) => {
-                    if !moved.is_empty() {
-                        self.remarks.push(format!("{} reflectors were moved after {start:.1} s", moved.len()));
-                    }
-                    self.windows.push(window);
-                }
-                Between::Reversal => self.remarks.push(format!("the segment from {start:.1} s goes forth and back")),
-                Between::FewReflectors => few += 1,
-                Between::Disagreement => disagree += 1,
-            }
             all += 1;
+            match between(&self.counted, &pair[0], &pair[1], shortest) {
+                Ok(way) => {
+                    if way.moved > 0 {
+                        self.remarks.push(format!("{} reflectors were moved after {start:.1} s", way.moved));
+                    }
+                    ways.push(way);
+                }
+                Err(NoMotion::Rest) => all -= 1,
+                Err(NoMotion::Reversal) => {
+                    self.remarks.push(format!("the segment from {start:.1} s goes forth and back"));
+                }
+                Err(NoMotion::FewReflectors) => few += 1,
+                Err(NoMotion::Disagreement) => disagree += 1,
+            }
         }
+        let noise = with_lasting_part(&ways, noise);
+        self.windows.extend(ways.iter().filter_map(|way| way.window(&noise)));
         if 4 * disagree > all {
             return Err(Refusal::ReflectorsMoved { bad: disagree, all });
         }
@@ -185,6 +197,9 @@ impl Drive {
         if let Some(map) = map {
             self.refine(stops, map);
         }
+        for index in 1..self.windows.len() {
+            self.windows[index].shares_start = self.windows[index].start == self.windows[index - 1].end;
+        }
         Ok(())
     }
 
@@ -196,7 +211,7 @@ impl Drive {
             let pose = |time| placed.iter().find(|stop| stop.time == time);
             if let (Some(start), Some(end)) = (pose(window.start), pose(window.end)) {
                 window.motion = start.pose.between(&end.pose);
-                window.covariance = start.motion_covariance(end);
+                window.pose_errors = [start.error, end.error];
                 refined += 1;
             }
         }

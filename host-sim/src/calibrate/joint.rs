@@ -6,6 +6,7 @@ use thiserror::Error;
 use super::least_squares::{Linearised, minimise};
 use super::model::{PARAMETERS, VehicleModel};
 use super::noise::{Disturbances, NoiseModel};
+use super::whitening::Whitening;
 use super::window::Window;
 
 /// Which parameters the fit may change.
@@ -79,8 +80,8 @@ pub fn fit(windows: &[Window], start: &VehicleModel, free: Free, noise: &NoiseMo
     let mut noise_now = *noise;
     let mut weights = vec![1.0; windows.len()];
     for round in 0..ROUNDS {
-        let roots = roots(windows, &model, &noise_now, &weights)?;
-        model = solve(windows, &model, &unknowns, &roots)?;
+        let white = whitening(windows, &model, &noise_now, &weights)?;
+        model = solve(windows, &model, &unknowns, &white)?;
         let disturbances: Vec<_> = windows.iter().map(|window| disturbances(window, &model)).collect();
         let counted: Vec<_> =
             disturbances.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(window, _)| *window).collect();
@@ -90,9 +91,9 @@ pub fn fit(windows: &[Window], start: &VehicleModel, free: Free, noise: &NoiseMo
             return Err(FitError::Singular);
         }
     }
-    let roots = roots(windows, &model, &noise_now, &weights)?;
-    model = solve(windows, &model, &unknowns, &roots)?;
-    finish(windows, model, &unknowns, &roots, noise_now, weights)
+    let white = whitening(windows, &model, &noise_now, &weights)?;
+    model = solve(windows, &model, &unknowns, &white)?;
+    finish(windows, model, &unknowns, &white, noise_now, weights)
 }
 
 /// What a window contributes to the noise, given a model.
@@ -100,12 +101,12 @@ pub fn fit(windows: &[Window], start: &VehicleModel, free: Free, noise: &NoiseMo
 pub fn disturbances(window: &Window, model: &VehicleModel) -> Disturbances {
     let (motion, derivative) = model.laser_motion(window);
     let offset = derivative.column(usize::from(window.is_backward())).into_owned();
-    let measured = nalgebra::Vector3::new(window.motion.x, window.motion.y, window.rotation_near(motion.z));
+    let measured = window.measured_near(motion.z);
     Disturbances {
         residual: measured - motion,
         slip: model.slip_covariance(window),
         steering: offset * offset.transpose(),
-        laser: window.covariance,
+        laser: window.covariance(),
     }
 }
 
@@ -120,28 +121,41 @@ fn reweighted(windows: &[Disturbances], noise: &NoiseModel, round: usize) -> Vec
     windows.iter().map(weight).collect()
 }
 
-/// For each window the matrix that makes its residual white, times the root of its weight.
-fn roots(
+/// A window of weight zero is taken to be so much less certain, as a factor of its variance.
+const DISMISSED: f64 = 1e6;
+
+/// What makes the residuals of all windows white; a window of less weight is less certain.
+fn whitening(
     windows: &[Window],
     model: &VehicleModel,
     noise: &NoiseModel,
     weights: &[f64],
-) -> Result<Vec<Matrix3<f64>>, FitError> {
-    let root = |(window, weight): (&Window, &f64)| {
-        let covariance = disturbances(window, model).covariance(noise);
-        let root = covariance.cholesky()?.l();
-        Some(root.solve_lower_triangular(&Matrix3::identity())? * weight.sqrt())
+) -> Result<Whitening, FitError> {
+    let covariance = |index: usize| {
+        let own = disturbances(&windows[index], model).covariance(noise) / weights[index].max(1.0 / DISMISSED);
+        let before = index.checked_sub(1).map(|before| windows[index].covariance_with(&windows[before]));
+        (own, before.unwrap_or_else(Matrix3::zeros) * noise.laser.powi(2))
     };
-    windows.iter().zip(weights).map(root).collect::<Option<_>>().ok_or(FitError::Singular)
+    Whitening::new((0..windows.len()).map(covariance)).ok_or(FitError::Singular)
 }
 
-fn linearise(windows: &[Window], model: &VehicleModel, unknowns: &[Vec<usize>], roots: &[Matrix3<f64>]) -> Linearised {
+fn linearise(
+    windows: &[Window],
+    model: &VehicleModel,
+    unknowns: &[Vec<usize>],
+    whitening: &Whitening,
+) -> Linearised {
+    let (mut residuals, mut derivatives): (Vec<_>, Vec<_>) = windows
+        .iter()
+        .map(|window| {
+            let (motion, derivative) = model.laser_motion(window);
+            (motion - window.measured_near(motion.z), derivative)
+        })
+        .unzip();
+    whitening.apply(&mut residuals);
+    whitening.apply(&mut derivatives);
     let mut linearised = Linearised { residuals: Vec::new(), rows: Vec::new() };
-    for (window, root) in windows.iter().zip(roots) {
-        let (motion, derivative) = model.laser_motion(window);
-        let residual =
-            motion - nalgebra::Vector3::new(window.motion.x, window.motion.y, window.rotation_near(motion.z));
-        let (residual, derivative) = (root * residual, root * derivative);
+    for (residual, derivative) in residuals.iter().zip(&derivatives) {
         linearised.residuals.extend(residual.iter());
         for row in 0..3 {
             let entry = |moved: &Vec<usize>| moved.iter().map(|column| derivative[(row, *column)]).sum::<f64>();
@@ -166,7 +180,7 @@ fn solve(
     windows: &[Window],
     base: &VehicleModel,
     unknowns: &[Vec<usize>],
-    roots: &[Matrix3<f64>],
+    white: &Whitening,
 ) -> Result<VehicleModel, FitError> {
     // Of one size: a tick's way is a thousand times smaller than all else.
     let units: Vec<f64> = unknowns.iter().map(|places| if places[0] == 2 { base.drive_scale } else { 1.0 }).collect();
@@ -176,7 +190,7 @@ fn solve(
         (base.offset_forward, base.offset_backward) = (mean, mean);
     }
     let evaluate = |values: &[f64]| {
-        let mut linearised = linearise(windows, &moved(&base, unknowns, &units, values), unknowns, roots);
+        let mut linearised = linearise(windows, &moved(&base, unknowns, &units, values), unknowns, white);
         for row in linearised.rows.chunks_exact_mut(units.len()) {
             row.iter_mut().zip(&units).for_each(|(entry, unit)| *entry *= unit);
         }
@@ -190,11 +204,11 @@ fn finish(
     windows: &[Window],
     model: VehicleModel,
     unknowns: &[Vec<usize>],
-    roots: &[Matrix3<f64>],
+    white: &Whitening,
     noise: NoiseModel,
     weights: Vec<f64>,
 ) -> Result<JointFit, FitError> {
-    let linearised = linearise(windows, &model, unknowns, roots);
+    let linearised = linearise(windows, &model, unknowns, white);
     let rows = || linearised.rows.chunks_exact(unknowns.len());
     let scales: Vec<f64> = (0..unknowns.len())
         .map(|column| rows().map(|row| row[column].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE))

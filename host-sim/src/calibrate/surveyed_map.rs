@@ -6,7 +6,7 @@ use agv_core::landmarks::Landmark;
 use agv_core::measurement::Time;
 use nalgebra::Matrix3;
 
-use super::stops::Stop;
+use super::stops::{Stop, pose_error};
 use super::window::Window;
 
 /// A stop that the map can place.
@@ -16,21 +16,8 @@ pub struct PlacedStop {
     pub time: Time,
     /// Pose of S in W.
     pub pose: Pose,
-    /// Its covariance in W.
-    covariance: Matrix3<f64>,
-}
-
-impl PlacedStop {
-    /// Covariance of the motion from this stop to `other`, in S here.
-    #[must_use]
-    pub fn motion_covariance(&self, other: &Self) -> Matrix3<f64> {
-        let (sine, cosine) = self.pose.theta.sin_cos();
-        let turn = Matrix3::new(cosine, sine, 0.0, -sine, cosine, 0.0, 0.0, 0.0, 1.0);
-        let moved = self.pose.between(&other.pose);
-        let by_first = Matrix3::new(-1.0, 0.0, moved.y, 0.0, -1.0, -moved.x, 0.0, 0.0, -1.0);
-        let (first, second) = (turn * self.covariance * turn.transpose(), turn * other.covariance * turn.transpose());
-        by_first * first * by_first.transpose() + second
-    }
+    /// Covariance of its error (x, y, rotation), in S there.
+    pub error: Matrix3<f64>,
 }
 
 /// A reflector of the map and one that was seen belong together within this distance, m: first, and when the pose is known.
@@ -52,7 +39,7 @@ pub fn stop_poses(stops: &[Stop], windows: &[Window], map: &[Landmark]) -> Vec<P
     let mut placed: Vec<PlacedStop> = Vec::new();
     for stop in stops {
         let time = stop.standstill.middle();
-        let points: Vec<Point> = stop.points.values().copied().collect();
+        let points: Vec<Point> = stop.points.values().map(|mean| mean.point).collect();
         let predicted = windows
             .iter()
             .find(|window| window.end == time)
@@ -62,8 +49,8 @@ pub fn stop_poses(stops: &[Stop], windows: &[Window], map: &[Landmark]) -> Vec<P
         let refined = start
             .and_then(|pose| place(&points, &map, &pose, WIDE_GATE))
             .and_then(|(pose, _)| place(&points, &map, &pose, NARROW_GATE));
-        if let Some((pose, covariance)) = refined {
-            placed.push(PlacedStop { time, pose, covariance });
+        if let Some((pose, error)) = refined {
+            placed.push(PlacedStop { time, pose, error });
         }
     }
     placed
@@ -97,7 +84,7 @@ fn place(points: &[Point], map: &[Point], pose: &Pose, gate: f64) -> Option<(Pos
     pairs.iter().for_each(|(place, point)| registration.add(place, point));
     let found = registration.solve()?;
     let centre = pairs.iter().fold(Point::zeros(), |sum, pair| sum + pair.1) / pairs.len() as f64;
-    Some((found.pose, super::stops::registered_covariance(&found, &centre)))
+    Some((found.pose, pose_error(&found, &centre)))
 }
 
 /// The pose with the most reflectors in the map, if it is clearly enough.

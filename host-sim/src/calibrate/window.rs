@@ -4,7 +4,7 @@ use agv_core::calibration::{Segment, SegmentBuilder};
 use agv_core::geometry::{Pose, wrap};
 use agv_core::measurement::Time;
 use agv_core::odometry::Tricycle;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Ticks at one steering angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,8 +114,11 @@ pub struct Window {
     pub steps: Vec<Step>,
     /// Motion of S, in S at the start; the rotation is wrapped.
     pub motion: Pose,
-    /// Covariance of that motion (x, y, rotation), from whatever measured it.
-    pub covariance: Matrix3<f64>,
+    /// Covariances of the poses of S (x, y, rotation) at the start and at the end, each in S there, from whatever measured
+    /// them.
+    pub pose_errors: [Matrix3<f64>; 2],
+    /// Whether the pose at the start, with its error, is the pose at the end of the window before.
+    pub shares_start: bool,
 }
 
 impl Window {
@@ -125,16 +128,58 @@ impl Window {
         self.steps.iter().map(|step| step.ticks).sum()
     }
 
+    /// How the motion answers to errors of the poses at its ends, each in S there.
+    fn by_poses(&self) -> [Matrix3<f64>; 2] {
+        let motion = &self.motion;
+        let (sine, cosine) = motion.theta.sin_cos();
+        [
+            Matrix3::new(-1.0, 0.0, motion.y, 0.0, -1.0, -motion.x, 0.0, 0.0, -1.0),
+            Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0),
+        ]
+    }
+
+    /// Covariance of the measured motion (x, y, rotation).
+    #[must_use]
+    pub fn covariance(&self) -> Matrix3<f64> {
+        let part = |(by, error): (Matrix3<f64>, Matrix3<f64>)| by * error * by.transpose();
+        self.by_poses().into_iter().zip(self.pose_errors).map(part).sum()
+    }
+
+    /// States the errors of both poses by what they contribute to the covariance of the motion. None if that is singular.
+    #[must_use]
+    pub fn set_covariance_parts(&mut self, parts: &[Matrix3<f64>; 2]) -> Option<()> {
+        let by_poses = self.by_poses();
+        for ((error, by), part) in self.pose_errors.iter_mut().zip(by_poses).zip(parts) {
+            let inverse = by.try_inverse()?;
+            *error = inverse * part * inverse.transpose();
+        }
+        Some(())
+    }
+
+    /// Covariance of the measured motion (rows) with that of the window before (columns).
+    #[must_use]
+    pub fn covariance_with(&self, before: &Self) -> Matrix3<f64> {
+        let roots = (self.pose_errors[0].cholesky(), before.pose_errors[1].cholesky());
+        match roots {
+            // Both windows state the error of one and the same pose; were the two equal, this would be that error.
+            (Some(here), Some(there)) if self.shares_start => {
+                self.by_poses()[0] * here.l() * there.l().transpose() * before.by_poses()[1].transpose()
+            }
+            _ => Matrix3::zeros(),
+        }
+    }
+
     /// Whether the vehicle goes backward.
     #[must_use]
     pub fn is_backward(&self) -> bool {
         self.ticks() < 0.0
     }
 
-    /// The rotation of S among those that look alike that is nearest to `expected`, rad.
+    /// The measured motion (x, y, rotation), with the rotation among those that look alike that is nearest to `expected`,
+    /// rad.
     #[must_use]
-    pub fn rotation_near(&self, expected: f64) -> f64 {
-        expected + wrap(self.motion.theta - expected)
+    pub fn measured_near(&self, expected: f64) -> Vector3<f64> {
+        Vector3::new(self.motion.x, self.motion.y, expected + wrap(self.motion.theta - expected))
     }
 
     /// The window as the core's closed forms take it, with the steering angles stretched by `steering_ratio`.

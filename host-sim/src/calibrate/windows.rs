@@ -77,6 +77,7 @@ fn window(counted: &[Counted], start: &LaserPose, stop: &LaserPose, shortest: f6
         end: stop.time,
         steps,
         motion: start.pose.between(&stop.pose),
-        covariance: Matrix3::from_diagonal(&variances),
+        pose_errors: [Matrix3::zeros(), Matrix3::from_diagonal(&variances)],
+        shares_start: false,
     })
 }
