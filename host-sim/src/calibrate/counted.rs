@@ -16,7 +16,7 @@ pub struct Counted {
     pub steering: f64,
 }
 
-/// A fault of the driving wheel's counter.
+/// A fault of a counter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CounterFault {
     /// The counter lost a multiple of its lower half's range.
@@ -33,17 +33,11 @@ pub enum CounterFault {
         /// First reading that has caught up.
         end: Time,
     },
-}
-
-impl CounterFault {
-    /// When it began.
-    #[must_use]
-    pub fn time(&self) -> Time {
-        match self {
-            Self::Alias { time, .. } => *time,
-            Self::Freeze { start, .. } => *start,
-        }
-    }
+    /// A counter counts the wrong way.
+    WrongDirection {
+        /// Whether it is the steering's; otherwise it is the driving wheel's.
+        is_steering: bool,
+    },
 }
 
 impl fmt::Display for CounterFault {
@@ -58,6 +52,8 @@ impl fmt::Display for CounterFault {
                 start.seconds(),
                 end.seconds()
             ),
+            Self::WrongDirection { is_steering: true } => formatter.write_str("the steering counter counts the wrong way"),
+            Self::WrongDirection { is_steering: false } => formatter.write_str("the drive counter counts the wrong way"),
         }
     }
 }

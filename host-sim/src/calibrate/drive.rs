@@ -3,6 +3,7 @@
 use agv_core::landmarks::Landmark;
 use agv_core::odometry::{Tricycle, Vehicle};
 
+use super::counting_direction::wrong_direction;
 use super::counted::{Counted, CounterFault, count};
 use super::log_input::LogInput;
 use super::model::VehicleModel;
@@ -43,6 +44,14 @@ impl MotionSource {
             Self::GivenPoses => "poses of the vehicle in the log",
         }
     }
+}
+
+fn located_poses(tracked: &[TrackedRevolution]) -> Vec<LaserPose> {
+    tracked
+        .iter()
+        .filter(|revolution| revolution.is_located)
+        .map(|revolution| LaserPose { time: revolution.time, pose: revolution.pose })
+        .collect()
 }
 
 /// A drive, ready for calibration.
@@ -118,15 +127,23 @@ impl Drive {
         if input.bad_observations > 0 {
             drive.remarks.push(format!("{} observations of reflectors are no numbers", input.bad_observations));
         }
-        let is_located = |revolution: &&TrackedRevolution| revolution.is_located;
-        let odometry = OdometryPath::new(&drive.counted, &nominal);
-        let tracked = track(&input.revolutions, &odometry);
-        if tracked.iter().filter(is_located).count() >= FEWEST_STOPS {
-            drive.poses = tracked
-                .iter()
-                .filter(is_located)
-                .map(|revolution| LaserPose { time: revolution.time, pose: revolution.pose })
-                .collect();
+        let direct = if input.laser_poses.len() >= 2 { &input.laser_poses } else { &input.given_poses };
+        let follow = |counted: &[Counted]| track(&input.revolutions, &OdometryPath::new(counted, &nominal));
+        let poses = |counted: &[Counted]| {
+            let located = located_poses(&follow(counted));
+            if located.len() < FEWEST_STOPS { direct.clone() } else { located }
+        };
+        if let Some((fault, turned)) = wrong_direction(&drive.counted, &nominal, poses) {
+            if !preparation.mend {
+                return Err(Refusal::WrongDirection(fault.to_string()));
+            }
+            drive.faults.push(fault);
+            drive.counted = turned;
+        }
+        let tracked = follow(&drive.counted);
+        let located = located_poses(&tracked);
+        if located.len() >= FEWEST_STOPS {
+            drive.poses = located;
             let (stops, noise) = stops(&standstills(&drive.counted, tricycle.drive_scale), &tracked);
             if stops.len() >= FEWEST_STOPS {
                 drive.cut_at_stops(&stops, &noise, shortest, preparation.map)?;
@@ -136,16 +153,16 @@ impl Drive {
             }
             return Ok(drive);
         }
-        let (source, poses) = if input.laser_poses.len() >= 2 {
-            (MotionSource::LaserPoses, &input.laser_poses)
-        } else if input.given_poses.len() >= 2 {
-            (MotionSource::GivenPoses, &input.given_poses)
-        } else if input.revolutions.is_empty() && input.bad_observations > 0 {
-            return Err(Refusal::NoNumbers(input.bad_observations));
-        } else {
-            return Err(Refusal::NoLaserMotion);
-        };
-        drive.poses.clone_from(poses);
+        if direct.len() < 2 {
+            return Err(if input.revolutions.is_empty() && input.bad_observations > 0 {
+                Refusal::NoNumbers(input.bad_observations)
+            } else {
+                Refusal::NoLaserMotion
+            });
+        }
+        drive.poses.clone_from(direct);
+        let is_measured = input.laser_poses.len() >= 2;
+        let source = if is_measured { MotionSource::LaserPoses } else { MotionSource::GivenPoses };
         drive.cut_by_poses(source, shortest);
         Ok(drive)
     }

@@ -79,21 +79,26 @@ pub fn fit(windows: &[Window], start: &VehicleModel, free: Free, noise: &NoiseMo
     let mut model = *start;
     let mut noise_now = *noise;
     let mut weights = vec![1.0; windows.len()];
+    let mut disturbed = disturbances_of(windows, &model);
     for round in 0..ROUNDS {
-        let white = whitening(windows, &model, &noise_now, &weights)?;
+        let white = whitening(windows, &disturbed, &noise_now, &weights)?;
         model = solve(windows, &model, &unknowns, &white)?;
-        let disturbances: Vec<_> = windows.iter().map(|window| disturbances(window, &model)).collect();
+        disturbed = disturbances_of(windows, &model);
         let counted: Vec<_> =
-            disturbances.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(window, _)| *window).collect();
+            disturbed.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(window, _)| *window).collect();
         noise_now = noise.estimated(&counted, unknowns.len());
-        weights = reweighted(&disturbances, &noise_now, round);
+        weights = reweighted(&disturbed, &noise_now, round);
         if weights.iter().filter(|weight| **weight > 0.0).count() < unknowns.len().max(windows.len() / 3) {
             return Err(FitError::Singular);
         }
     }
-    let white = whitening(windows, &model, &noise_now, &weights)?;
+    let white = whitening(windows, &disturbed, &noise_now, &weights)?;
     model = solve(windows, &model, &unknowns, &white)?;
     finish(windows, model, &unknowns, &white, noise_now, weights)
+}
+
+fn disturbances_of(windows: &[Window], model: &VehicleModel) -> Vec<Disturbances> {
+    windows.iter().map(|window| disturbances(window, model)).collect()
 }
 
 /// What a window contributes to the noise, given a model.
@@ -127,12 +132,12 @@ const DISMISSED: f64 = 1e6;
 /// What makes the residuals of all windows white; a window of less weight is less certain.
 fn whitening(
     windows: &[Window],
-    model: &VehicleModel,
+    disturbed: &[Disturbances],
     noise: &NoiseModel,
     weights: &[f64],
 ) -> Result<Whitening, FitError> {
     let covariance = |index: usize| {
-        let own = disturbances(&windows[index], model).covariance(noise) / weights[index].max(1.0 / DISMISSED);
+        let own = disturbed[index].covariance(noise) / weights[index].max(1.0 / DISMISSED);
         let before = index.checked_sub(1).map(|before| windows[index].covariance_with(&windows[before]));
         (own, before.unwrap_or_else(Matrix3::zeros) * noise.laser.powi(2))
     };
@@ -209,6 +214,22 @@ fn finish(
     weights: Vec<f64>,
 ) -> Result<JointFit, FitError> {
     let linearised = linearise(windows, &model, unknowns, white);
+    let full = 3.0 * weights.iter().sum::<f64>();
+    let squares: f64 = linearised.residuals.iter().map(|residual| residual * residual).sum();
+    let variance = squares / (full - unknowns.len() as f64).max(1.0);
+    let deviations = deviations(&linearised, unknowns, variance)?;
+    if !model.vector().iter().chain(&deviations).all(|value| value.is_finite()) {
+        return Err(FitError::Singular);
+    }
+    Ok(JointFit { model, deviations, noise, weights, normalised_rms: variance.sqrt() })
+}
+
+/// Deviations of the parameters from white residuals of that variance.
+fn deviations(
+    linearised: &Linearised,
+    unknowns: &[Vec<usize>],
+    variance: f64,
+) -> Result<[f64; PARAMETERS], FitError> {
     let rows = || linearised.rows.chunks_exact(unknowns.len());
     let scales: Vec<f64> = (0..unknowns.len())
         .map(|column| rows().map(|row| row[column].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE))
@@ -221,9 +242,6 @@ fn finish(
         }
     }
     let covariance = information.try_inverse().ok_or(FitError::Singular)?;
-    let full = 3.0 * weights.iter().sum::<f64>();
-    let squares: f64 = linearised.residuals.iter().map(|residual| residual * residual).sum();
-    let variance = squares / (full - unknowns.len() as f64).max(1.0);
     let mut deviations = [0.0; PARAMETERS];
     for (index, (places, scale)) in unknowns.iter().zip(&scales).enumerate() {
         let deviation = (covariance[(index, index)] * variance).sqrt() / scale;
@@ -231,8 +249,22 @@ fn finish(
             deviations[*place] = deviation;
         }
     }
-    if !model.vector().iter().chain(&deviations).all(|value| value.is_finite()) {
-        return Err(FitError::Singular);
-    }
-    Ok(JointFit { model, deviations, noise, weights, normalised_rms: variance.sqrt() })
+    Ok(deviations)
+}
+
+/// The deviations that a fit of such windows will have under that noise.
+///
+/// # Errors
+/// [`FitError::Singular`] if the windows cannot tell the unknowns apart.
+pub fn expected_deviations(
+    windows: &[Window],
+    model: &VehicleModel,
+    free: Free,
+    noise: &NoiseModel,
+) -> Result<[f64; PARAMETERS], FitError> {
+    let unknowns = free.unknowns();
+    let disturbed = disturbances_of(windows, model);
+    let white = whitening(windows, &disturbed, noise, &vec![1.0; windows.len()])?;
+    let deviations = deviations(&linearise(windows, model, &unknowns, &white), &unknowns, 1.0)?;
+    if deviations.iter().all(|deviation| deviation.is_finite()) { Ok(deviations) } else { Err(FitError::Singular) }
 }

@@ -2,6 +2,7 @@
 
 pub mod closed_form;
 pub mod counted;
+mod counting_direction;
 pub mod design;
 pub mod drive;
 pub mod found;
@@ -11,12 +12,15 @@ pub mod log_input;
 pub mod model;
 pub mod noise;
 pub mod odometry_path;
+pub mod plan;
 pub mod reflector_noise;
 pub mod refusal;
+pub mod report;
 pub mod standstill;
 pub mod stops;
 pub mod surveyed_map;
 pub mod tracking;
+pub mod vehicle_file;
 mod whitening;
 pub mod window;
 pub mod windows;

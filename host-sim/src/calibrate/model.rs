@@ -182,10 +182,12 @@ impl VehicleModel {
         let mut covariance = nalgebra::Matrix3::zeros();
         for step in &window.steps {
             // Long steps in pieces, as slip happens all along the arc.
-            const PIECES: usize = 4;
-            let piece = Step { ticks: step.ticks / PIECES as f64, ..*step };
+            const LONGEST_PIECE: f64 = 0.2;
             let (sine, cosine) = self.steering(step).sin_cos();
-            for _ in 0..PIECES {
+            let way = (self.drive_scale * step.ticks).abs();
+            let pieces = (way / self.wheelbase / LONGEST_PIECE).ceil().clamp(1.0, 100.0);
+            let piece = Step { ticks: step.ticks / pieces, ..*step };
+            for _ in 0..pieces as usize {
                 let (moved, rotation) = self.displacement(&piece);
                 let middle = position + 0.5 * turned(heading, &moved);
                 let turn = sine / self.wheelbase;
@@ -194,7 +196,7 @@ impl VehicleModel {
                     + Vector2::new(-lever.y, lever.x) * turn;
                 let place = turned(-self.laser.theta, &place);
                 let answer = Vector3::new(place.x, place.y, turn);
-                covariance += answer * answer.transpose() * (self.drive_scale * piece.ticks).abs();
+                covariance += answer * answer.transpose() * (way / pieces);
                 position += turned(heading, &moved);
                 heading += rotation;
             }

@@ -17,6 +17,9 @@ pub enum Refusal {
     /// The driving wheel has not moved.
     #[error("the driving wheel does not move in this log")]
     NoMotion,
+    /// A counter counts the wrong way.
+    #[error("{0}; it can be mended")]
+    WrongDirection(String),
     /// Nothing says how the laser moved.
     #[error("nothing in the log says how the laser moved: there are neither reflectors nor poses of it")]
     NoLaserMotion,

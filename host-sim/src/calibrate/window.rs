@@ -18,9 +18,9 @@ pub struct Step {
 /// Samples whose steering angles differ by less than this, rad, may be joined,
 const SAME_STEERING: f64 = 2e-3;
 /// up to so many of them.
-const SAMPLES_A_PIECE: usize = 12;
+const SAMPLES_A_PIECE: usize = 6;
 /// What was joined is joined on if its mean angles differ by less than this, rad.
-const SAME_MEAN_STEERING: f64 = 1.5e-4;
+const SAME_MEAN_STEERING: f64 = 1e-4;
 
 /// Ticks times sine and cosine of the steering angle.
 #[derive(Clone, Copy, Debug, Default)]
