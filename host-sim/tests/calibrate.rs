@@ -30,7 +30,9 @@ fn only_the_resolution_of_the_encoders_is_left_without_noise() {
     let found = find(&drive, &JOINT).unwrap();
     let truth = VehicleModel::nominal(&vehicle.tricycle, &vehicle.laser);
     println!("{:?}\n{truth:?}\n{:?}", found.model, found.noise);
-    for r in &found.residuals { println!("{:.2e} {:.2e} {:.2e} {}", r.motion.x, r.motion.y, r.motion.z, r.weight); }
+    for r in &found.residuals {
+        println!("{:.2e} {:.2e} {:.2e} {}", r.motion.x, r.motion.y, r.motion.z, r.weight);
+    }
     panic!();
 }
 #[test]
@@ -41,7 +43,13 @@ fn dbg() {
     let truth = VehicleModel::nominal(&vehicle.tricycle, &vehicle.laser);
     for w in drive.windows.iter().take(4) {
         let (m, _) = truth.laser_motion(w);
-        println!("{:?} {:?} steps {} {:?}", m - nalgebra::Vector3::new(w.motion.x, w.motion.y, 0.0), w.motion, w.steps.len(), w.steps.iter().take(6).collect::<Vec<_>>());
+        println!(
+            "{:?} {:?} steps {} {:?}",
+            m - nalgebra::Vector3::new(w.motion.x, w.motion.y, 0.0),
+            w.motion,
+            w.steps.len(),
+            w.steps.iter().take(6).collect::<Vec<_>>()
+        );
     }
     panic!();
 }

@@ -52,8 +52,12 @@ impl fmt::Display for CounterFault {
                 start.seconds(),
                 end.seconds()
             ),
-            Self::WrongDirection { is_steering: true } => formatter.write_str("the steering counter counts the wrong way"),
-            Self::WrongDirection { is_steering: false } => formatter.write_str("the drive counter counts the wrong way"),
+            Self::WrongDirection { is_steering: true } => {
+                formatter.write_str("the steering counter counts the wrong way")
+            }
+            Self::WrongDirection { is_steering: false } => {
+                formatter.write_str("the drive counter counts the wrong way")
+            }
         }
     }
 }

@@ -58,9 +58,7 @@ impl Design {
         match order {
             Order::Phases => {
                 let phases = senses.into_iter().flat_map(|sense| sides.map(|side| (sense, side)));
-                phases
-                    .flat_map(|(sense, side)| angles.iter().map(move |angle| segment(sense, side, *angle)))
-                    .collect()
+                phases.flat_map(|(sense, side)| angles.iter().map(move |angle| segment(sense, side, *angle))).collect()
             }
             Order::ForthAndBack => {
                 let arcs = angles.iter().flat_map(|angle| sides.map(|side| (side, *angle)));

@@ -3,8 +3,8 @@
 use agv_core::landmarks::Landmark;
 use agv_core::odometry::{Tricycle, Vehicle};
 
-use super::counting_direction::wrong_direction;
 use super::counted::{Counted, CounterFault, count};
+use super::counting_direction::wrong_direction;
 use super::log_input::LogInput;
 use super::model::VehicleModel;
 use super::odometry_path::OdometryPath;

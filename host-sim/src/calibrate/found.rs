@@ -87,7 +87,8 @@ pub fn find(drive: &Drive, question: &Question) -> Result<Found, Refusal> {
     if windows.len() < 2 {
         return Err(Refusal::TooFewSegments { found: windows.len(), needed: 2 });
     }
-    let form = ClosedForm { offsets: question.offsets, is_wheelbase_free: question.is_wheelbase_free, side: question.side };
+    let form =
+        ClosedForm { offsets: question.offsets, is_wheelbase_free: question.is_wheelbase_free, side: question.side };
     let closed = solve_closed(drive, &form, question.is_steering_ratio_free)?;
     let found = if question.method == Method::Joint {
         let free = Free {
@@ -135,7 +136,8 @@ fn solve_closed(drive: &Drive, form: &ClosedForm, is_ratio_free: bool) -> Result
     let segments = closed_form::segments(&drive.windows, &vehicle, ratio);
     let flags = outliers::<MOST_WINDOWS>(&segments, &problem).map_or_else(|_| Default::default(), |(_, flags)| flags);
     let is_outlier = |index: usize| flags.get(index).copied().unwrap_or(false);
-    let kept: Vec<Window> = (0..).zip(&drive.windows).filter(|(index, _)| !is_outlier(*index)).map(|(_, window)| window.clone()).collect();
+    let kept: Vec<Window> =
+        (0..).zip(&drive.windows).filter(|(index, _)| !is_outlier(*index)).map(|(_, window)| window.clone()).collect();
     let ratio = ratio_of(&kept)?;
     let calibration = closed_form::solve(&kept, nominal, form, ratio)?;
     let model = closed_form::model(&calibration, ratio);

@@ -144,12 +144,7 @@ fn whitening(
     Whitening::new((0..windows.len()).map(covariance)).ok_or(FitError::Singular)
 }
 
-fn linearise(
-    windows: &[Window],
-    model: &VehicleModel,
-    unknowns: &[Vec<usize>],
-    whitening: &Whitening,
-) -> Linearised {
+fn linearise(windows: &[Window], model: &VehicleModel, unknowns: &[Vec<usize>], whitening: &Whitening) -> Linearised {
     let (mut residuals, mut derivatives): (Vec<_>, Vec<_>) = windows
         .iter()
         .map(|window| {
@@ -225,11 +220,7 @@ fn finish(
 }
 
 /// Deviations of the parameters from white residuals of that variance.
-fn deviations(
-    linearised: &Linearised,
-    unknowns: &[Vec<usize>],
-    variance: f64,
-) -> Result<[f64; PARAMETERS], FitError> {
+fn deviations(linearised: &Linearised, unknowns: &[Vec<usize>], variance: f64) -> Result<[f64; PARAMETERS], FitError> {
     let rows = || linearised.rows.chunks_exact(unknowns.len());
     let scales: Vec<f64> = (0..unknowns.len())
         .map(|column| rows().map(|row| row[column].powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE))

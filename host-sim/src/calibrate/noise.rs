@@ -16,7 +16,7 @@ pub struct NoiseModel {
 impl Default for NoiseModel {
     /// A good floor and a good encoder, between those of the standard simulation.
     fn default() -> Self {
-        Self { slip: 5e-4, steering: 1e-4, laser: 1.0 }
+        Self { slip: 5e-4, steering: 1.7e-4, laser: 1.0 }
     }
 }
 
@@ -50,7 +50,7 @@ impl Disturbances {
 }
 
 /// Standard deviations, in powers of e, of what is believed of slip, steering and laser before the drive.
-const PRIOR: [f64; 3] = [1.5, 1.5, 0.7];
+const PRIOR: [f64; 3] = [1.0, 1.0, 0.5];
 /// Steps of the search, in powers of e, and how often each is tried.
 const STEPS: [f64; 3] = [0.8, 0.3, 0.1];
 const ROUNDS: usize = 8;

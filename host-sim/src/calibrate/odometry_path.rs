@@ -32,8 +32,7 @@ impl OdometryPath {
         let mut last: Option<&Counted> = None;
         for sample in counted {
             if let Some(last) = last.replace(sample) {
-                let step =
-                    Step { ticks: sample.ticks - last.ticks, steering: 0.5 * (last.steering + sample.steering) };
+                let step = Step { ticks: sample.ticks - last.ticks, steering: 0.5 * (last.steering + sample.steering) };
                 if step.ticks != 0.0 {
                     let moved = model.motion(&[step]);
                     let (sine, cosine) = heading.sin_cos();

@@ -135,17 +135,18 @@ fn candidate(means: &Means, design: Design) -> Result<Plan, PlanError> {
         return Err(PlanError::TooSmall);
     }
     let options = drive_options(means, &segments);
-    let moving = path.legs.iter().map(|leg| {
-        SpeedProfile::new(leg.length(), options.speed, options.acceleration, options.braking).duration()
-    });
+    let moving = path
+        .legs
+        .iter()
+        .map(|leg| SpeedProfile::new(leg.length(), options.speed, options.acceleration, options.braking).duration());
     let duration = moving.sum::<f64>() + STANDSTILL * (segments.len() + 1) as f64;
     if duration > means.time {
         return Err(PlanError::TooShort);
     }
     let windows = windows(means, &segments, &path, &bounds);
     let free = Free { offsets_differ: true, wheelbase: false, steering_ratio: false };
-    let deviations = expected_deviations(&windows, &means.vehicle, free, &NOISE)
-        .map_err(|_: FitError| PlanError::NotObservable)?;
+    let deviations =
+        expected_deviations(&windows, &means.vehicle, free, &NOISE).map_err(|_: FitError| PlanError::NotObservable)?;
     Ok(Plan { design, segments, bounds, duration, deviations })
 }
 
@@ -189,7 +190,8 @@ fn windows(means: &Means, segments: &[PlannedSegment], path: &Path, bounds: &[Po
             pose.compose(&Pose::exp(&Twist { x: way, y: 0.0, theta: way * arc.curvature }))
         });
         let (first, second) = (pose.compose(&vehicle.laser), end.compose(&vehicle.laser));
-        let seen = |from: &Pose, place: &Point| MeanPoint { point: from.inverse_transform(place), count: SCANS as usize };
+        let seen =
+            |from: &Pose, place: &Point| MeanPoint { point: from.inverse_transform(place), count: SCANS as usize };
         let pairs: Vec<_> = reflectors.iter().map(|place| (seen(&first, place), seen(&second, place))).collect();
         let steering = (segment.steering - offset) / vehicle.steering_ratio;
         let mut window = Window {

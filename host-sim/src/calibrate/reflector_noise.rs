@@ -57,7 +57,11 @@ const STEPS: usize = 3;
 
 /// The motion between two stops from pairs of means, each weighted by what is known of it.
 #[must_use]
-pub fn weighted_motion(pairs: &[(MeanPoint, MeanPoint)], start: &Pose, noise: &ReflectorNoise) -> Option<WeightedMotion> {
+pub fn weighted_motion(
+    pairs: &[(MeanPoint, MeanPoint)],
+    start: &Pose,
+    noise: &ReflectorNoise,
+) -> Option<WeightedMotion> {
     let mut motion = *start;
     for _ in 0..STEPS {
         let (mut information, mut right) = (Matrix3::zeros(), nalgebra::Vector3::zeros());

@@ -27,7 +27,9 @@ pub enum Refusal {
     #[error("the reflectors of the log are no numbers: {0} of them, and none that is one")]
     NoNumbers(usize),
     /// The reflectors contradict each other.
-    #[error("the reflectors do not agree on a motion in {bad} of {all} segments: they were moved, or others were taken for them")]
+    #[error(
+        "the reflectors do not agree on a motion in {bad} of {all} segments: they were moved, or others were taken for them"
+    )]
     ReflectorsMoved {
         /// Segments in which they do not agree.
         bad: usize,
@@ -57,7 +59,9 @@ pub enum Refusal {
     #[error(transparent)]
     Fit(FitError),
     /// The segments contradict each other.
-    #[error("{bad} of {all} segments contradict the others, first at {first:.1} s: the wheel slips, or the laser's motion is wrong")]
+    #[error(
+        "{bad} of {all} segments contradict the others, first at {first:.1} s: the wheel slips, or the laser's motion is wrong"
+    )]
     Contradiction {
         /// Segments that contradict.
         bad: usize,

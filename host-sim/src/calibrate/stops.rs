@@ -164,9 +164,8 @@ pub fn between(counted: &[Counted], first: &Stop, second: &Stop, shortest: f64) 
         pairs.iter().for_each(|(first, second)| registration.add(&first.point, &second.point));
         let registered = registration.solve().filter(|found| found.pairs >= FEWEST_PAIRS);
         let registered = registered.ok_or(NoMotion::FewReflectors)?;
-        let residual = |(first, second): &(MeanPoint, MeanPoint)| {
-            (registered.pose.transform(&second.point) - first.point).norm()
-        };
+        let residual =
+            |(first, second): &(MeanPoint, MeanPoint)| (registered.pose.transform(&second.point) - first.point).norm();
         let mut residuals: Vec<f64> = pairs.iter().map(residual).collect();
         let worst = (0..residuals.len()).max_by(|a, b| residuals[*a].total_cmp(&residuals[*b])).unwrap_or(0);
         let largest = residuals[worst];

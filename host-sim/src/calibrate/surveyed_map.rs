@@ -57,9 +57,7 @@ pub fn stop_poses(stops: &[Stop], windows: &[Window], map: &[Landmark]) -> Vec<P
 }
 
 fn nearest(map: &[Point], place: &Point) -> Option<(Point, f64)> {
-    map.iter()
-        .map(|point| (*point, (point - place).norm()))
-        .min_by(|first, second| first.1.total_cmp(&second.1))
+    map.iter().map(|point| (*point, (point - place).norm())).min_by(|first, second| first.1.total_cmp(&second.1))
 }
 
 fn pairs(points: &[Point], map: &[Point], pose: &Pose, gate: f64) -> Vec<(Point, Point)> {

@@ -138,7 +138,6 @@ fn register(places: &[Place], points: &[(Point, Point, Time)], matched: &[Match]
         registration.solve().filter(|found| found.pairs >= FEWEST_PAIRS).map(|found| found.pose)
     };
     let first = solve(&mut pairs.iter())?;
-    let agrees =
-        |(place, driven): &&(Point, Point)| (first.transform(driven) - place).norm() < LARGEST_RESIDUAL;
+    let agrees = |(place, driven): &&(Point, Point)| (first.transform(driven) - place).norm() < LARGEST_RESIDUAL;
     solve(&mut pairs.iter().filter(agrees))
 }

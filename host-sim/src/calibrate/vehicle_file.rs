@@ -80,10 +80,7 @@ impl VehicleFile {
     }
 
     fn problem(&self) -> Option<(&'static str, &'static str)> {
-        let positive = [
-            ("wheelbase_m", self.wheelbase_m),
-            ("drive_scale_m_per_tick", self.drive_scale_m_per_tick),
-        ];
+        let positive = [("wheelbase_m", self.wheelbase_m), ("drive_scale_m_per_tick", self.drive_scale_m_per_tick)];
         let finite = [
             ("steering_scale_rad_per_tick", self.steering_scale_rad_per_tick),
             ("steer_offset_forward_rad", self.steer_offset_forward_rad),

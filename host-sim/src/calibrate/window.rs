@@ -42,8 +42,7 @@ impl Sum {
     }
 
     fn is_like(&self, other: &Self) -> bool {
-        self.cosine * other.cosine > 0.0
-            && (self.step().steering - other.step().steering).abs() < SAME_MEAN_STEERING
+        self.cosine * other.cosine > 0.0 && (self.step().steering - other.step().steering).abs() < SAME_MEAN_STEERING
     }
 }
 

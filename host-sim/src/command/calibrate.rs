@@ -185,15 +185,15 @@ impl Calibrate {
             None => None,
         };
         let name = || log.display().to_string();
-        let mut drive =
-            Drive::new(&input, &Preparation { map: map.as_deref(), mend: self.mend }).with_context(name)?;
+        let mut drive = Drive::new(&input, &Preparation { map: map.as_deref(), mend: self.mend }).with_context(name)?;
         drive.remarks.extend(damages.iter().map(|damage| format!("the log is damaged: {damage}")));
         let found = find(&drive, &self.question()).with_context(name)?;
         if let Some(path) = &self.apply {
             VehicleFile::of(&found.model.apply(&drive.tricycle), &found.model.laser).write(path)?;
         }
         if let Some(folder) = &self.report {
-            let mut page = Page::new(&format!("Calibration from {}", log.file_name().unwrap_or_default().to_string_lossy()));
+            let mut page =
+                Page::new(&format!("Calibration from {}", log.file_name().unwrap_or_default().to_string_lossy()));
             add_calibration(&mut page, &drive, &found)?;
             let path = folder.join("index.html");
             page.write(&path).with_context(|| path.display().to_string())?;

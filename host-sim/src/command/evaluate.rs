@@ -3,6 +3,7 @@
 mod calibration;
 mod carpark;
 mod falko;
+mod halting_points;
 mod warehouse;
 
 /// Measure on recordings and in simulation how good it is.
@@ -17,6 +18,7 @@ enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    HaltingPoints(halting_points::HaltingPoints),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -27,6 +29,7 @@ impl Evaluate {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::HaltingPoints(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

@@ -128,10 +128,8 @@ impl Replay {
         let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let Contents { software, mut recording, outputs, damages } = contents;
-        let is_as_recorded = self.map.is_empty()
-            && self.landmarks.is_empty()
-            && self.start.is_none()
-            && self.vehicle.is_none();
+        let is_as_recorded =
+            self.map.is_empty() && self.landmarks.is_empty() && self.start.is_none() && self.vehicle.is_none();
         if let Some(start) = self.start {
             set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
         }

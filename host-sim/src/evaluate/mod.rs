@@ -6,5 +6,6 @@ pub mod carpark;
 pub mod demonstration;
 pub mod drive;
 pub mod falko;
+pub mod halting_points;
 pub mod repeatability;
 pub mod warehouse;

@@ -91,7 +91,7 @@ pub fn drive(
                     (leg, start, way_before, way)
                 }
             };
-            let command = steering_command(leg, start, way_after, &state, wheelbase);
+            let command = steering_command(leg, start, way_after, &state.pose, wheelbase);
             let steering = state.steering + (command - state.steering).clamp(-steering_step, steering_step);
             let mean_steering = 0.5 * (state.steering + steering);
             let moved = leg.direction.sign() * (way_after - way_before);
@@ -127,10 +127,12 @@ fn timetable<'a>(path: &'a Path, options: &DriveOptions) -> Vec<Phase<'a>> {
     phases
 }
 
-fn steering_command(leg: &Leg, start: &Pose, way: f64, state: &VehicleState, wheelbase: f64) -> f64 {
+/// The steering angle (rad) that keeps a vehicle at `pose` on the leg from `start` after `way` (m).
+#[must_use]
+pub fn steering_command(leg: &Leg, start: &Pose, way: f64, pose: &Pose, wheelbase: f64) -> f64 {
     let reference = leg.pose(start, way);
-    let lateral = reference.between(&state.pose).y;
-    let heading = difference(state.pose.theta, reference.theta);
+    let lateral = reference.between(pose).y;
+    let heading = difference(pose.theta, reference.theta);
     let curvature = leg.mean_curvature(way, CURVATURE_WINDOW)
         - lateral / (RETURN_LENGTH * RETURN_LENGTH)
         - leg.direction.sign() * 2.0 * heading / RETURN_LENGTH;

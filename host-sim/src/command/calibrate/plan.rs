@@ -7,9 +7,9 @@ use agv_core::odometry::Tricycle;
 use agv_host_sim::calibrate::model::VehicleModel;
 use agv_host_sim::calibrate::plan::{Means, Plan as Planned, plan};
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_host_sim::simulate::believed_parameters;
 use agv_host_sim::simulate::path::Direction;
 use agv_host_sim::simulate::scenario::Scenario;
-use agv_host_sim::simulate::believed_parameters;
 use anyhow::{Context, ensure};
 use serde::Serialize;
 

@@ -76,7 +76,11 @@ impl Calibration {
     fn simulated(&self) -> anyhow::Result<()> {
         let rows = thesis::TABLE.len();
         if let Some(row) = self.row {
-            ensure!((1..=rows).contains(&row), "--row: there are rows 1 to {rows}; {} is the adopted one", ADOPTED_ROW + 1);
+            ensure!(
+                (1..=rows).contains(&row),
+                "--row: there are rows 1 to {rows}; {} is the adopted one",
+                ADOPTED_ROW + 1
+            );
         }
         let experiment = Experiment { runs: self.runs, seed: self.seed, row: self.row.map(|row| row - 1) };
         let steps = Disturbance::ALL.len() * self.row.map_or(rows, |_| 1);
@@ -89,7 +93,20 @@ impl Calibration {
         }
         println!(
             "{:>4} {:>9} {:>5} {:>5} {:<5} {:<16} {:<7} {:>8} {:>8} {:>10} {:>7} {:>7} {:>8} {:>7}",
-            "nseg", "deg", "beta", "mm/s", "noise", "method", "figure", "F cdeg", "B cdeg", "1e-5mm", "x mm", "y mm", "th cdeg", "L mm"
+            "nseg",
+            "deg",
+            "beta",
+            "mm/s",
+            "noise",
+            "method",
+            "figure",
+            "F cdeg",
+            "B cdeg",
+            "1e-5mm",
+            "x mm",
+            "y mm",
+            "th cdeg",
+            "L mm"
         );
         for outcome in &outcomes {
             let design = &outcome.design;

@@ -63,7 +63,12 @@ pub const CONTENDERS: [Contender; 5] = [
     Contender { name: "joint_stc", method: Method::Joint, offsets: Offsets::Common, is_wheelbase_free: false },
     Contender { name: "atc", method: Method::ClosedForm, offsets: Offsets::ForEachSense, is_wheelbase_free: false },
     Contender { name: "joint", method: Method::Joint, offsets: Offsets::ForEachSense, is_wheelbase_free: false },
-    Contender { name: "joint_wheelbase", method: Method::Joint, offsets: Offsets::ForEachSense, is_wheelbase_free: true },
+    Contender {
+        name: "joint_wheelbase",
+        method: Method::Joint,
+        offsets: Offsets::ForEachSense,
+        is_wheelbase_free: true,
+    },
 ];
 
 /// What a method does in one row under one noise model.
@@ -130,7 +135,10 @@ pub fn run(experiment: &Experiment, progress: impl Fn() + Sync) -> Result<Vec<Ou
                     .map(|run| {
                         let seed = experiment.seed.wrapping_add(1 + u64::from(run));
                         let drive = Drive::new(&course.log(disturbance, seed), &Preparation::default());
-                        contenders.iter().map(|contender| find(drive.as_ref().map_err(Clone::clone)?, &contender.question())).collect()
+                        contenders
+                            .iter()
+                            .map(|contender| find(drive.as_ref().map_err(Clone::clone)?, &contender.question()))
+                            .collect()
                     })
                     .collect();
                 for (place, contender) in contenders.iter().enumerate() {
@@ -202,8 +210,7 @@ fn summarise(vehicle: &TrueVehicle, results: &[&Result<Found, Refusal>]) -> Resu
         let squares = found.iter().map(|found| (error(found) - mean).powi(2)).sum::<f64>();
         summary.bias[index] = mean;
         summary.std[index] = (squares / (count - 1.0).max(1.0)).sqrt();
-        summary.stated[index] =
-            (found.iter().map(|found| found.deviations[index].powi(2)).sum::<f64>() / count).sqrt();
+        summary.stated[index] = (found.iter().map(|found| found.deviations[index].powi(2)).sum::<f64>() / count).sqrt();
     }
     Ok(summary)
 }

@@ -152,7 +152,15 @@ pub struct OdometryOptions {
 
 impl Default for OdometryOptions {
     fn default() -> Self {
-        Self { rate: 100.0, slip: 3e-3, steering_noise_deg: 0.01, leg_steering_error_deg: 0.0, leg_slip: 0.0, yaw_walk_deg: 0.02, side_slip: 0.5e-3 }
+        Self {
+            rate: 100.0,
+            slip: 3e-3,
+            steering_noise_deg: 0.01,
+            leg_steering_error_deg: 0.0,
+            leg_slip: 0.0,
+            yaw_walk_deg: 0.02,
+            side_slip: 0.5e-3,
+        }
     }
 }
 
