@@ -52,23 +52,16 @@ impl Calibration {
             return Ok(());
         }
         println!(
-            "{:<14} {:<17} {:>8} {:>8} {:>7} {:>7} {:>7} {:>8} {:>8}   quarters, m",
-            "method", "fitted on", "F rad", "B rad", "L m", "x m", "y m", "ATE m", "deg"
+            "{:<14} {:<17} {:>8} {:>8} {:>7} {:>7} {:>7} {:>8} {:>8} {:>9} {:>10}",
+            "method", "fitted on", "F rad", "B rad", "L m", "x m", "y m", "ATE m", "deg", "fitted m", "checked m"
         );
         for outcome in outcomes {
-            println!(
-                "{:<14} {:<17} {:>8.4} {:>8.4} {:>7.3} {:>7.3} {:>7.3} {:>8.3} {:>8.2}   {:.3?}",
-                outcome.method,
-                outcome.fitted_on,
-                outcome.steer_offset_forward_rad,
-                outcome.steer_offset_backward_rad,
-                outcome.wheelbase_m,
-                outcome.laser_x_m,
-                outcome.laser_y_m,
-                outcome.ate_rmse_m,
-                outcome.heading_rmse_deg,
-                outcome.quarters_ate_rmse_m,
-            );
+            print_fit(outcome.method, "all", &outcome.fit);
+            println!();
+            for half in &outcome.halves {
+                print_fit("", half.fitted_on, &half.fit);
+                println!(" {:>9.3} {:>10.3}", half.fitted_ate_rmse_m, half.checked_ate_rmse_m);
+            }
         }
         Ok(())
     }
@@ -130,4 +123,17 @@ impl Calibration {
         }
         Ok(())
     }
+}
+
+fn print_fit(method: &str, fitted_on: &str, fit: &sapienza::Fit) {
+    print!(
+        "{method:<14} {fitted_on:<17} {:>8.4} {:>8.4} {:>7.3} {:>7.3} {:>7.3} {:>8.3} {:>8.2}",
+        fit.steer_offset_forward_rad,
+        fit.steer_offset_backward_rad,
+        fit.wheelbase_m,
+        fit.laser_x_m,
+        fit.laser_y_m,
+        fit.ate_rmse_m,
+        fit.heading_rmse_deg
+    );
 }

@@ -15,6 +15,7 @@ use crate::calibrate::joint::{self, Free};
 use crate::calibrate::model::VehicleModel;
 use crate::calibrate::noise::NoiseModel;
 use crate::calibrate::odometry_path::OdometryPath;
+use crate::calibrate::refusal::Refusal;
 use crate::calibrate::window::Window;
 use crate::calibrate::windows::{LaserPose, WINDOW_SECONDS, windows};
 use crate::import::sapienza;
@@ -41,13 +42,9 @@ pub struct Deviations {
     pub laser_theta_rad: f64,
 }
 
-/// What a method found, and how well the whole run is dead reckoned with it.
+/// What a method found in some windows, and how well the run is dead reckoned with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Outcome {
-    /// Name of the method.
-    pub method: &'static str,
-    /// On which windows it was fitted.
-    pub fitted_on: &'static str,
+pub struct Fit {
     /// Windows.
     pub windows: usize,
     /// rad.
@@ -76,6 +73,36 @@ pub struct Outcome {
     pub quarters_heading_rmse_deg: [f64; 4],
     /// Standard deviations.
     pub std: Deviations,
+}
+
+/// A method, fitted on half of the run and checked on the other.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HalfFit {
+    /// On which quarters of the way it was fitted.
+    pub fitted_on: &'static str,
+    /// Open loop over each of these quarters: root of the mean square, m.
+    pub fitted_ate_rmse_m: f64,
+    /// Open loop over each of the other quarters, m.
+    pub checked_ate_rmse_m: f64,
+    /// The same of the heading, degrees.
+    pub fitted_heading_rmse_deg: f64,
+    /// The same.
+    pub checked_heading_rmse_deg: f64,
+    /// What was found.
+    #[serde(flatten)]
+    pub fit: Fit,
+}
+
+/// A method.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// Its name.
+    pub method: &'static str,
+    /// Fitted on the whole run.
+    #[serde(flatten)]
+    pub fit: Fit,
+    /// Fitted on halves of it, where that half tells the parameters.
+    pub halves: Vec<HalfFit>,
 }
 
 /// The run, ready for calibration.
@@ -191,18 +218,9 @@ impl Run {
         ]
     }
 
-    fn outcome(
-        &self,
-        method: &'static str,
-        fitted_on: &'static str,
-        windows: usize,
-        model: &VehicleModel,
-        std: Deviations,
-    ) -> Outcome {
+    fn fit(&self, windows: usize, model: &VehicleModel, std: Deviations) -> Fit {
         let [whole, quarters @ ..] = self.open_loop(model);
-        Outcome {
-            method,
-            fitted_on,
+        Fit {
             windows,
             steer_offset_forward_rad: model.offset_forward,
             steer_offset_backward_rad: model.offset_backward,
@@ -217,6 +235,24 @@ impl Run {
             quarters_ate_rmse_m: quarters.map(|quarter| quarter.0),
             quarters_heading_rmse_deg: quarters.map(|quarter| quarter.1),
             std,
+        }
+    }
+}
+
+impl HalfFit {
+    fn new(fitted_on: &'static str, is_fitted: [bool; 4], fit: Fit) -> Self {
+        let mean = |values: &[f64; 4], wanted: bool| {
+            let squares =
+                values.iter().zip(is_fitted).filter(|(_, fitted)| *fitted == wanted).map(|(value, _)| value * value);
+            (squares.sum::<f64>() / 2.0).sqrt()
+        };
+        Self {
+            fitted_on,
+            fitted_ate_rmse_m: mean(&fit.quarters_ate_rmse_m, true),
+            checked_ate_rmse_m: mean(&fit.quarters_ate_rmse_m, false),
+            fitted_heading_rmse_deg: mean(&fit.quarters_heading_rmse_deg, true),
+            checked_heading_rmse_deg: mean(&fit.quarters_heading_rmse_deg, false),
+            fit,
         }
     }
 }
@@ -247,45 +283,57 @@ const RATIOS: [f64; 2] = [0.05, 20.0];
 /// All methods, each fitted on the whole run, on the first and third quarter of the way, and on the others.
 ///
 /// # Errors
-/// If the data are not there or tell too little.
+/// If the data are not there or the whole run tells too little.
 pub fn run(folder: &Path) -> anyhow::Result<Vec<Outcome>> {
     let run = read(folder)?;
-    let mut outcomes = Vec::new();
-    for (quarters, fitted_on) in [
-        (Quarters::All, "all"),
-        (Quarters::FirstAndThird, "quarters 1 and 3"),
-        (Quarters::SecondAndFourth, "quarters 2 and 4"),
-    ] {
-        let windows = run.windows(quarters);
-        for (method, offsets, is_wheelbase_free) in [
-            ("stc", Offsets::Common, false),
-            ("atc", Offsets::ForEachSense, false),
-            ("atc_wheelbase", Offsets::ForEachSense, true),
-        ] {
-            let form = ClosedForm { offsets, is_wheelbase_free, side: Some(MountingSide::Front) };
-            let found = closed_form::steering_ratio(&windows, &run.nominal, &form, RATIOS)
-                .and_then(|ratio| Ok((closed_form::solve(&windows, &run.nominal, &form, ratio)?, ratio)));
-            // Half of the run may hold one sense of travel only.
-            let Ok((calibration, ratio)) = found else { continue };
-            let (intrinsic, laser) = (calibration.intrinsic.deviations(), calibration.extrinsic.deviations());
-            let std = Deviations {
-                steer_offset_forward_rad: intrinsic.x,
-                steer_offset_backward_rad: intrinsic.y,
-                drive_scale_m: calibration.drive_scale_deviation(is_wheelbase_free),
-                wheelbase_m: is_wheelbase_free.then_some(calibration.extrinsic.wheelbase_deviation),
-                steering_ratio: None,
-                laser_x_m: laser.x,
-                laser_y_m: laser.y,
-                laser_theta_rad: laser.z,
-            };
-            let model = closed_form::model(&calibration, ratio);
-            outcomes.push(run.outcome(method, fitted_on, windows.len(), &model, std));
-            if !is_wheelbase_free {
-                continue;
-            }
+    let all = run.windows(Quarters::All);
+    let halves = [
+        ("quarters 1 and 3", [true, false, true, false], run.windows(Quarters::FirstAndThird)),
+        ("quarters 2 and 4", [false, true, false, true], run.windows(Quarters::SecondAndFourth)),
+    ];
+    let outcome = |method: &Method| {
+        let (model, std) = method.solve(&run.nominal, &all).with_context(|| method.name.to_owned())?;
+        // Half of the run may hold too little.
+        let half = |(fitted_on, is_fitted, windows): &(&'static str, [bool; 4], Vec<Window>)| {
+            let (model, std) = method.solve(&run.nominal, windows).ok()?;
+            Some(HalfFit::new(fitted_on, *is_fitted, run.fit(windows.len(), &model, std)))
+        };
+        let halves = halves.iter().filter_map(half).collect();
+        Ok(Outcome { method: method.name, fit: run.fit(all.len(), &model, std), halves })
+    };
+    METHODS.iter().map(outcome).collect()
+}
+
+struct Method {
+    name: &'static str,
+    offsets: Offsets,
+    is_wheelbase_free: bool,
+    is_joint: bool,
+}
+
+const METHODS: [Method; 4] = [
+    Method { name: "stc", offsets: Offsets::Common, is_wheelbase_free: false, is_joint: false },
+    Method { name: "atc", offsets: Offsets::ForEachSense, is_wheelbase_free: false, is_joint: false },
+    Method { name: "atc_wheelbase", offsets: Offsets::ForEachSense, is_wheelbase_free: true, is_joint: false },
+    Method { name: "joint", offsets: Offsets::ForEachSense, is_wheelbase_free: true, is_joint: true },
+];
+
+/// Where the estimate of the noise begins: a light robot with rubber wheels on a smooth floor.
+const NOISE: NoiseModel = NoiseModel { slip: 1e-3, steering: 1e-3, laser: 1.0 };
+
+impl Method {
+    fn solve(&self, nominal: &Tricycle, windows: &[Window]) -> anyhow::Result<(VehicleModel, Deviations)> {
+        let form = ClosedForm {
+            offsets: self.offsets,
+            is_wheelbase_free: self.is_wheelbase_free,
+            side: Some(MountingSide::Front),
+        };
+        let ratio = closed_form::steering_ratio(windows, nominal, &form, RATIOS).map_err(Refusal::from)?;
+        let calibration = closed_form::solve(windows, nominal, &form, ratio).map_err(Refusal::from)?;
+        let model = closed_form::model(&calibration, ratio);
+        if self.is_joint {
             let free = Free { offsets_differ: true, wheelbase: true, steering_ratio: true };
-            let noise = NoiseModel { slip: 1e-3, steering: 1e-3, laser: 1.0 };
-            let fit = joint::fit(&windows, &model, free, &noise).with_context(|| format!("fitted on {fitted_on}"))?;
+            let fit = joint::fit(windows, &model, free, &NOISE)?;
             let [forward, backward, scale, wheelbase, ratio, x, y, heading] =
                 fit.deviations.map(|deviation| deviation * (WINDOW_SECONDS.len() as f64).sqrt());
             let std = Deviations {
@@ -298,8 +346,19 @@ pub fn run(folder: &Path) -> anyhow::Result<Vec<Outcome>> {
                 laser_y_m: y,
                 laser_theta_rad: heading,
             };
-            outcomes.push(run.outcome("joint", fitted_on, windows.len(), &fit.model, std));
+            return Ok((fit.model, std));
         }
+        let (intrinsic, laser) = (calibration.intrinsic.deviations(), calibration.extrinsic.deviations());
+        let std = Deviations {
+            steer_offset_forward_rad: intrinsic.x,
+            steer_offset_backward_rad: intrinsic.y,
+            drive_scale_m: calibration.drive_scale_deviation(self.is_wheelbase_free),
+            wheelbase_m: self.is_wheelbase_free.then_some(calibration.extrinsic.wheelbase_deviation),
+            steering_ratio: None,
+            laser_x_m: laser.x,
+            laser_y_m: laser.y,
+            laser_theta_rad: laser.z,
+        };
+        Ok((model, std))
     }
-    Ok(outcomes)
 }
