@@ -2,7 +2,7 @@
 
 use agv_core::geometry::{Point, Pose, wrap};
 use agv_core::localizer::Parameters;
-use agv_core::measurement::{ReflectorObservation, Time};
+use agv_core::measurement::ReflectorObservation;
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 
 use crate::calibrate::design::{PlannedSegment, path};
@@ -134,11 +134,23 @@ struct Exact {
     reflector: usize,
 }
 
+/// A reflector that somebody moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReflectorMove {
+    /// Which, from zero to fifteen.
+    pub reflector: usize,
+    /// When, s since the start of the drive.
+    pub time: f64,
+    /// How far, m.
+    pub shift: Point,
+}
+
 /// A drive without noise, ready to be disturbed as often as one likes.
 #[derive(Clone, Debug)]
 pub struct Course {
     vehicle: TrueVehicle,
     motion: Motion,
+    reflectors: Vec<Point>,
     revolutions: Vec<(usize, Vec<Exact>)>,
 }
 
@@ -146,6 +158,18 @@ impl Course {
     /// Drives `segments` with a driving wheel of `speed` (m/s) among reflectors that `seed` places.
     #[must_use]
     pub fn new(vehicle: TrueVehicle, segments: &[PlannedSegment], speed: f64, seed: u64) -> Self {
+        Self::with_moved_reflectors(vehicle, segments, speed, seed, &[])
+    }
+
+    /// The same, with reflectors that are moved during the drive.
+    #[must_use]
+    pub fn with_moved_reflectors(
+        vehicle: TrueVehicle,
+        segments: &[PlannedSegment],
+        speed: f64,
+        seed: u64,
+        moves: &[ReflectorMove],
+    ) -> Self {
         let wheelbase = vehicle.tricycle.wheelbase;
         let path = path(segments, wheelbase, Pose::default());
         let mean = segments.iter().map(|segment| segment.steering.cos()).sum::<f64>() / segments.len().max(1) as f64;
@@ -165,14 +189,27 @@ impl Course {
         let count = (track.duration() * FREQUENCY) as usize;
         let revolution = |index: usize| {
             let start = index as f64 / FREQUENCY;
-            let mut seen: Vec<Exact> =
-                reflectors.iter().enumerate().map(|(name, place)| exact(&track, start, name, place)).collect();
+            let moved = |name: usize| {
+                let done = moves.iter().filter(|one| one.reflector == name && start >= one.time);
+                done.fold(Point::zeros(), |sum, one| sum + one.shift)
+            };
+            let mut seen: Vec<Exact> = reflectors
+                .iter()
+                .enumerate()
+                .map(|(name, place)| exact(&track, start, name, &(place + moved(name))))
+                .collect();
             seen.sort_by(|first, second| first.time.total_cmp(&second.time));
             let state = ((start + 0.5 / FREQUENCY) * RATE) as usize;
             (motion.states[state.min(motion.states.len() - 1)].leg, seen)
         };
         let revolutions = (0..count).map(revolution).collect();
-        Self { vehicle, motion, revolutions }
+        Self { vehicle, motion, reflectors, revolutions }
+    }
+
+    /// Where the reflectors stand at the beginning, in W, where R starts in the origin.
+    #[must_use]
+    pub fn reflectors(&self) -> &[Point] {
+        &self.reflectors
     }
 
     /// Duration, s.
@@ -208,12 +245,6 @@ impl Course {
             input.revolutions.push(revolution.iter().map(observation).collect());
         }
         input
-    }
-
-    /// Time at which the drive ends.
-    #[must_use]
-    pub fn end(&self) -> Time {
-        START.offset(self.duration())
     }
 }
 
