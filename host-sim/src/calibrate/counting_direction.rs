@@ -37,14 +37,14 @@ fn unexplained(counted: &[Counted], model: &VehicleModel, poses: &[LaserPose]) -
 }
 
 /// Looks whether a counter runs the wrong way. `poses` says how the laser moved if the counters are these, as following
-/// reflectors may itself rest on them. Gives the counters as they should be.
+/// reflectors rests on them; None if it cannot be told with them. Gives the counters as they should be.
 pub fn wrong_direction(
     counted: &[Counted],
     model: &VehicleModel,
-    poses: impl Fn(&[Counted]) -> Vec<LaserPose>,
+    poses: impl Fn(&[Counted]) -> Option<Vec<LaserPose>>,
 ) -> Option<(CounterFault, Vec<Counted>)> {
-    let measure = |counted: &[Counted]| unexplained(counted, model, &poses(counted)).unwrap_or(f64::INFINITY);
-    let as_it_is = measure(counted);
+    let measure = |counted: &[Counted]| unexplained(counted, model, &poses(counted)?);
+    let as_it_is = measure(counted).unwrap_or(f64::INFINITY);
     if as_it_is < POOR {
         return None;
     }
@@ -54,9 +54,8 @@ pub fn wrong_direction(
             false => Counted { ticks: -sample.ticks, ..*sample },
         };
         let turned: Vec<Counted> = counted.iter().map(turn).collect();
-        (measure(&turned), CounterFault::WrongDirection { is_steering }, turned)
+        Some((measure(&turned)?, CounterFault::WrongDirection { is_steering }, turned))
     };
-    let (drive, steering) = (reversed(false), reversed(true));
-    let (left, fault, turned) = if drive.0 <= steering.0 { drive } else { steering };
-    (left < POOR && CLEARLY_BETTER * left < as_it_is).then_some((fault, turned))
+    let best = [false, true].into_iter().filter_map(reversed).min_by(|first, second| first.0.total_cmp(&second.0));
+    best.filter(|(left, ..)| *left < POOR && CLEARLY_BETTER * left < as_it_is).map(|(_, fault, turned)| (fault, turned))
 }

@@ -54,6 +54,18 @@ fn located_poses(tracked: &[TrackedRevolution]) -> Vec<LaserPose> {
         .collect()
 }
 
+/// Share of the sightings that may be of reflectors that were not seen before; false ones are among them.
+const LARGEST_NEW_SHARE: f64 = 0.05;
+
+/// Whether the reflectors kept their names from scan to scan.
+fn is_followed(tracked: &[TrackedRevolution]) -> bool {
+    let all: usize = tracked.iter().map(|revolution| revolution.sightings.len()).sum();
+    let names = tracked.iter().flat_map(|revolution| &revolution.sightings).map(|sighting| sighting.reflector + 1);
+    let at_once = tracked.iter().map(|revolution| revolution.sightings.len()).max().unwrap_or(0);
+    let new = names.max().unwrap_or(0).saturating_sub(at_once);
+    new as f64 <= LARGEST_NEW_SHARE * all as f64
+}
+
 /// A drive, ready for calibration.
 #[derive(Clone, Debug)]
 pub struct Drive {
@@ -130,8 +142,9 @@ impl Drive {
         let direct = if input.laser_poses.len() >= 2 { &input.laser_poses } else { &input.given_poses };
         let follow = |counted: &[Counted]| track(&input.revolutions, &OdometryPath::new(counted, &nominal));
         let poses = |counted: &[Counted]| {
-            let located = located_poses(&follow(counted));
-            if located.len() < FEWEST_STOPS { direct.clone() } else { located }
+            let tracked = follow(counted);
+            let located = located_poses(&tracked);
+            if located.len() < FEWEST_STOPS { Some(direct.clone()) } else { is_followed(&tracked).then_some(located) }
         };
         if let Some((fault, turned)) = wrong_direction(&drive.counted, &nominal, poses) {
             if !preparation.mend {

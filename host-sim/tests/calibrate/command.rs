@@ -56,7 +56,7 @@ fn bad_input_is_refused_in_one_line() {
         files.write("straight.toml", b"seed = 1\n[world]\nkind = \"block_storage\"\nreflectors = \"aisle\"\n");
     assert!(agv(&["simulate", &scenario, "--output", &log]).status.success());
     let complaint = refusal(&["calibrate", &log]);
-    assert!(complaint.contains("straight.agvlog") && complaint.contains("segments"), "{complaint}");
+    assert!(complaint.contains("straight.agvlog") && complaint.contains("steering angle"), "{complaint}");
     assert!(refusal(&["calibrate", &files.path("missing.agvlog")]).contains("no such file"));
     assert!(refusal(&["calibrate", "plan", "--area", "3x3"]).contains("larger"));
     for (text, part) in [
