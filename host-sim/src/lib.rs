@@ -13,6 +13,7 @@ pub mod link;
 pub mod live;
 pub mod log;
 pub mod mapping;
+pub mod provision;
 pub mod recording;
 pub mod replay;
 pub mod report;

@@ -39,6 +39,7 @@ enum Command {
     Can(command::can::Can),
     Nav350(command::nav350::Nav350),
     Record(command::record::Record),
+    Emulate(command::emulate::Emulate),
 }
 
 fn main() -> ExitCode {
@@ -57,6 +58,7 @@ fn main() -> ExitCode {
         Some(Command::Can(command)) => command.run(),
         Some(Command::Nav350(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
+        Some(Command::Emulate(command)) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -12,7 +12,7 @@ use agv_host_sim::{data, log, replay};
 fn images(test: &str) -> Option<PathBuf> {
     let target = "../target/firmware/an500/thumbv7em-none-eabihf/firmware";
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(target);
-    if !folder.join("replay").exists() || !folder.join("measure").exists() {
+    if ["replay", "measure", "latency"].iter().any(|image| !folder.join(image).exists()) {
         data::skip(test, "the firmware is not built; cargo xtask firmware build");
         return None;
     }
@@ -94,4 +94,25 @@ fn work_costs_the_instructions_that_it_did() {
         assert!((0.9..=1.1).contains(&ratio), "kept {kept}, found {found}");
     }
     assert_eq!(kept.lines().count(), found.lines().count());
+}
+
+/// What 200 us are at 480 MHz, with an instruction in each cycle.
+const LATEST_PREDICTION: u64 = 96_000;
+
+#[test]
+fn no_prediction_waits_for_a_scan() {
+    let Some(images) = images("no_prediction_waits_for_a_scan") else { return };
+    let drives = demonstration::run(|_| ()).unwrap();
+    let drive = drives.iter().find(|drive| drive.name == "mixed").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    log::write(&folder.path().join("drive.agvlog"), &drive.recording).unwrap();
+    run(&images.join("latency"), folder.path(), &["-icount", "shift=6,sleep=off"]);
+    let found = std::fs::read_to_string(folder.path().join("latency.csv")).unwrap();
+    let row: Vec<u64> = found.lines().nth(1).unwrap().split(',').map(|word| word.parse().unwrap()).collect();
+    let [scans, samples, during_scans, latest, lost] = row[..] else { panic!("{found}") };
+    println!("{found}");
+    assert!(scans >= 50 && during_scans >= 300 && samples >= during_scans, "{found}");
+    let instructions = latest * 1000 / 64;
+    assert!(instructions <= LATEST_PREDICTION, "{instructions} instructions");
+    assert_eq!(lost, 0);
 }

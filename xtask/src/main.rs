@@ -1,5 +1,6 @@
 //! The project's own commands: `cargo xtask --help`.
 
+mod emulate;
 mod firmware;
 mod fuzz;
 mod packages;
@@ -20,6 +21,7 @@ struct Xtask {
 
 #[derive(Subcommand)]
 enum Command {
+    Emulate(emulate::Emulate),
     Firmware(firmware::Firmware),
     Fuzz(fuzz::Fuzz),
     Seeds(seeds::Seeds),
@@ -28,6 +30,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
+        Command::Emulate(emulate) => emulate.run(),
         Command::Firmware(firmware) => firmware.run(),
         Command::Fuzz(fuzz) => fuzz.run(),
         Command::Seeds(seeds) => seeds.run(),

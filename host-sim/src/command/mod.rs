@@ -6,6 +6,7 @@
 pub mod calibrate;
 pub mod can;
 pub mod demonstration;
+pub mod emulate;
 mod encoder_arguments;
 pub mod evaluate;
 pub mod export;

@@ -4,6 +4,7 @@ mod image;
 mod size;
 mod toolchain;
 
+use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context, bail};
@@ -61,6 +62,12 @@ impl Firmware {
 /// Builds the images of every board.
 pub fn build() -> anyhow::Result<()> {
     BOARDS.iter().try_for_each(|board| build_board(board))
+}
+
+/// The vehicle's image for the emulated board, built.
+pub fn emulated_vehicle() -> anyhow::Result<PathBuf> {
+    build_board(&AN500)?;
+    AN500.image("vehicle")
 }
 
 /// Fails if an image is larger than its budget.

@@ -1,0 +1,259 @@
+//! The vehicle's firmware in emulation, on the bus and the network that it will have.
+//!
+//! Everything here takes real time, so what is asserted are values, and times only where the firmware must meet them with
+//! a wide margin on a busy machine.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use agv_core::measurement::EncoderFault;
+use agv_core::state::Mode;
+use agv_core::wire::can::controller::LaserHealth;
+use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
+use agv_host_sim::link::service::{Client, ServiceError};
+use agv_host_sim::recording::Recording;
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+use agv_host_sim::{data, log, replay};
+use agv_settings::leaf::Value;
+use agv_settings::service::Refusal;
+
+const KEY: [u8; 32] = [0x42; 32];
+
+/// The image. None, and a word about it, if it is missing or there is no emulator.
+fn image(test: &str) -> Option<PathBuf> {
+    let path = "../target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle";
+    let image = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    if !image.exists() {
+        data::skip(test, "the firmware is not built; cargo xtask firmware build");
+        return None;
+    }
+    let qemu = std::process::Command::new("qemu-system-arm").arg("--version").output();
+    if !qemu.is_ok_and(|output| output.status.success()) {
+        data::skip(test, "there is no qemu-system-arm");
+        return None;
+    }
+    Some(image.canonicalize().unwrap())
+}
+
+/// The standard hall: reflectors everywhere.
+fn hall() -> Recording {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/scenarios/warehouse_hall.toml");
+    simulate(&Scenario::read(&path).unwrap()).unwrap().recording
+}
+
+struct Drive {
+    driven: Driven,
+    folder: tempfile::TempDir,
+}
+
+fn drive(image: &Path, recording: &Recording, seconds: f64, watch: impl FnOnce(&Watch) + Send) -> Drive {
+    let folder = tempfile::tempdir().unwrap();
+    let options = VehicleOptions { image, folder: folder.path(), key: Some(KEY), provision: true };
+    let driven = vehicle::drive(recording, &options, seconds, watch).unwrap();
+    Drive { driven, folder }
+}
+
+/// What the firmware said is what the host says, bit for bit.
+fn assert_replayed(drive: &Drive, least: usize) {
+    let contents = log::read_contents(&drive.driven.log, |_| ()).unwrap();
+    assert_eq!(drive.driven.stream.damages, 0);
+    assert!(contents.damages.is_empty(), "{:?}", contents.damages);
+    let again = replay::replay(&contents.recording, |_| ()).unwrap();
+    let comparison = replay::compare(&contents.outputs, &again);
+    assert_eq!(comparison.first_difference, None);
+    assert!(comparison.compared >= least, "{}", comparison.compared);
+}
+
+/// Waits until something is so, and says how long that took.
+fn until(patience: f64, what: &str, mut is_so: impl FnMut() -> bool) -> f64 {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed().as_secs_f64() < patience, "{what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    start.elapsed().as_secs_f64()
+}
+
+fn wait_for_drive(watch: &Watch, seconds: f64) {
+    until(60.0 + seconds, "the vehicle does not drive", || {
+        watch.is_over() || watch.driven().is_some_and(|driven| driven.as_secs_f64() >= seconds)
+    });
+}
+
+#[test]
+fn it_drives_through_the_hall() {
+    let Some(image) = image("it_drives_through_the_hall") else { return };
+    let recording = hall();
+    let seconds = if std::env::var_os("AGV_LONG").is_some() { f64::MAX } else { 20.0 };
+    let drive = drive(&image, &recording, seconds, |_| ());
+    let errors = vehicle::errors(&drive.driven, &recording).unwrap();
+    println!("{errors:?}");
+    assert!(errors.poses > 1500 && errors.localised_share > 0.95, "{errors:?}");
+    assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{errors:?}");
+    assert!(drive.driven.emergencies.is_empty());
+    assert_replayed(&drive, 2000);
+    // The firmware's log can be read: it begins with a frame of defmt.
+    assert!(std::fs::metadata(drive.folder.path().join("defmt.bin")).unwrap().len() > 50);
+}
+
+#[test]
+fn trouble_is_said_on_the_bus_and_survived() {
+    let Some(image) = image("trouble_is_said_on_the_bus_and_survived") else { return };
+    let recording = hall();
+    let mut delays = Vec::new();
+    let drive = drive(&image, &recording, 30.0, |watch| {
+        let laser = |health| move || watch.pose().is_some_and(|heard| heard.pose.health.laser == health);
+        wait_for_drive(watch, 2.0);
+
+        // The laser's connection breaks, and nobody answers for a while.
+        watch.is_laser_on.store(false, Ordering::Relaxed);
+        delays.push(until(5.0, "the laser's silence", laser(LaserHealth::Silent)));
+        std::thread::sleep(Duration::from_secs(1));
+        watch.is_laser_on.store(true, Ordering::Relaxed);
+        until(20.0, "the laser's return", laser(LaserHealth::Sound));
+
+        // The driving wheel's encoder is silent.
+        watch.trouble.is_drive_silent.store(true, Ordering::Relaxed);
+        let is_missing = || watch.pose().is_some_and(|heard| heard.pose.health.drive == Some(EncoderFault::Missing));
+        delays.push(until(5.0, "the encoder's silence", is_missing));
+        let mode = watch.pose().unwrap().pose.mode;
+        assert!(matches!(mode, Mode::WithoutOdometry | Mode::Lost), "{mode:?}");
+        watch.trouble.is_drive_silent.store(false, Ordering::Relaxed);
+        until(10.0, "the encoder's return", || watch.pose().is_some_and(|heard| heard.pose.health.drive.is_none()));
+
+        // Frames with wrong bits: the positions that they say are not believed.
+        watch.trouble.corrupted_in.store(7, Ordering::Relaxed);
+        std::thread::sleep(Duration::from_secs(2));
+        watch.trouble.corrupted_in.store(0, Ordering::Relaxed);
+        until(20.0, "the bus's recovery", || watch.pose().is_some_and(|heard| heard.pose.mode == Mode::Reflectors));
+
+        // The service port is flooded by two peers, and a third one opens connections without a word.
+        let start = Instant::now();
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| flood(watch.ports.service, start));
+            }
+            scope.spawn(|| {
+                let mut open = Vec::new();
+                while start.elapsed().as_secs_f64() < 4.0 {
+                    open.extend(TcpStream::connect(("127.0.0.1", watch.ports.service)));
+                    std::thread::sleep(Duration::from_millis(50));
+                }
+            });
+        });
+        let poses = watch.poses_since(start);
+        let worst = poses.windows(2).map(|pair| (pair[1].heard - pair[0].heard).as_secs_f64()).fold(0.0, f64::max);
+        assert!(poses.len() > 200 && worst < 0.5, "{} poses, {worst} s", poses.len());
+        assert_eq!(poses.last().unwrap().pose.mode, Mode::Reflectors);
+    });
+    println!("{delays:?}");
+    // 200 ms, and what a busy machine adds to the way through emulator and sockets.
+    assert!(delays.iter().all(|delay| *delay < 0.3), "{delays:?}");
+    let contents = log::read_contents(&drive.driven.log, |_| ()).unwrap();
+    assert!(contents.recording.events.len() > 2000);
+    let errors = vehicle::errors(&drive.driven, &recording).unwrap();
+    assert!(errors.longest_gap_s < 0.5, "{errors:?}");
+}
+
+fn flood(port: u16, start: Instant) {
+    let Ok(mut stream) = TcpStream::connect(("127.0.0.1", port)) else { return };
+    let _ = stream.set_write_timeout(Some(Duration::from_millis(100)));
+    let _ = stream.set_read_timeout(Some(Duration::from_millis(1)));
+    // The shortest question there is, again and again.
+    let questions = [1_u8, 0, 0].repeat(1000);
+    let mut answers = [0; 4096];
+    while start.elapsed().as_secs_f64() < 4.0 {
+        if stream.write(&questions).is_err() && stream.read(&mut answers).is_ok_and(|count| count == 0) {
+            return;
+        }
+        let _ = stream.read(&mut answers);
+    }
+}
+
+#[test]
+fn it_is_commissioned_over_the_service_port() {
+    let Some(image) = image("it_is_commissioned_over_the_service_port") else { return };
+    let recording = hall();
+    let folder = tempfile::tempdir().unwrap();
+    let options = VehicleOptions { image: &image, folder: folder.path(), key: Some(KEY), provision: true };
+    let driven = vehicle::drive(&recording, &options, 6.0, |watch| {
+        let host = format!("127.0.0.1:{}", watch.ports.service);
+        until(60.0, "poses", || watch.pose().is_some());
+        // While the vehicle stands: everything can be read, and changed by who has the key.
+        let mut reader = Client::connect(&host, None).unwrap();
+        assert!(reader.version().unwrap().software.starts_with("agv-firmware"));
+        let settings = reader.list().unwrap();
+        assert_eq!(settings.len(), agv_settings::LEAVES.len());
+        assert_eq!(reader.download_map().unwrap(), recording.landmarks);
+        assert!(matches!(reader.set("limits.fastest", Value::Number(3.0)), Err(ServiceError::NoKey)));
+        drop(reader);
+        wait_for_drive(watch, 2.0);
+        let mut writer = Client::connect(&host, Some(KEY)).unwrap();
+        let moving = writer.set("limits.fastest", Value::Number(3.0));
+        assert!(matches!(moving, Err(ServiceError::Refused(Refusal::Moving))), "{moving:?}");
+        assert_eq!(writer.get("limits.fastest").unwrap().value, Value::Number(5.0));
+        let mut stranger = Client::connect(&host, Some([1; 32])).unwrap();
+        let foreign = stranger.set("limits.fastest", Value::Number(3.0));
+        assert!(matches!(foreign, Err(ServiceError::Refused(Refusal::Tag))), "{foreign:?}");
+    })
+    .unwrap();
+    assert!(driven.emergencies.is_empty());
+
+    // A board that stands is given a map and a setting, and has them after a restart.
+    let mut standing = recording.clone();
+    standing.events.retain(|event| !matches!(event.view(), agv_core::localizer::Event::Encoders(_)));
+    let (board, bus) = agv_host_sim::emulate::board::Board::start(&image, folder.path()).unwrap();
+    drop(bus);
+    let host = format!("127.0.0.1:{}", board.ports.service);
+    let connect = |key| {
+        let mut client = None;
+        until(30.0, "the service port", || {
+            client = Client::connect(&host, key).ok();
+            client.is_some()
+        });
+        client.unwrap()
+    };
+    let mut client = connect(Some(KEY));
+    let starts = client.version().unwrap().starts;
+    client.set("limits.fastest", Value::Number(2.5)).unwrap();
+    client.store().unwrap();
+    let map = &recording.landmarks[..60];
+    client.upload_map(map, |_| ()).unwrap();
+    client.reboot().unwrap();
+    let mut client = connect(Some(KEY));
+    assert_eq!(client.version().unwrap().starts, starts + 1);
+    assert_eq!(client.get("limits.fastest").unwrap().value, Value::Number(2.5));
+    assert_eq!(client.download_map().unwrap(), map);
+    assert_eq!(client.last_panic().unwrap(), "");
+}
+
+#[test]
+fn rubbish_in_flash_is_said_and_replaced() {
+    let Some(image) = image("rubbish_in_flash_is_said_and_replaced") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let rubbish: Vec<u8> = (0..262_144_u32).map(|place| (place.wrapping_mul(2_654_435_761) >> 23) as u8).collect();
+    std::fs::write(folder.path().join("flash.bin"), &rubbish).unwrap();
+    let (_board, mut bus) = agv_host_sim::emulate::board::Board::start(&image, folder.path()).unwrap();
+    let (mut has_said_so, mut modes) = (false, Vec::new());
+    let node = agv_core::wire::can::canopen::NodeId::new(16).unwrap();
+    let mut receiver = agv_core::wire::can::controller::PoseReceiver::new(node);
+    let start = Instant::now();
+    while start.elapsed().as_secs_f64() < 20.0 && (!has_said_so || modes.len() < 20) {
+        use agv_core::wire::can::canopen::Message;
+        use agv_host_sim::bus::Bus;
+        let Some(frame) = bus.receive(Instant::now() + Duration::from_millis(100)).unwrap() else { continue };
+        let frame = frame.classic().unwrap();
+        if let Ok(Message::Emergency { emergency, .. }) = Message::decode(frame) {
+            has_said_so |= emergency.code == 0x6300;
+        }
+        modes.extend(receiver.handle(frame).map(|pose| pose.mode));
+    }
+    assert!(has_said_so && modes.len() >= 20);
+    assert!(modes.iter().all(|mode| *mode == Mode::NotLocalised), "{modes:?}");
+    let replaced = std::fs::read(folder.path().join("flash.bin")).unwrap();
+    assert!(replaced.iter().filter(|byte| **byte == 0xFF).count() > 250_000);
+}
