@@ -17,7 +17,7 @@ fn the_real_tricycle_is_calibrated() {
         assert!(fit.ate_rmse_m <= 0.080 && fit.heading_rmse_deg <= 1.2, "{method}");
         assert!((fit.laser_x_m - 1.80).abs() <= 0.02, "{method}: {}", fit.laser_x_m);
         assert!((fit.wheelbase_m - 1.55).abs() <= 0.04, "{method}: {}", fit.wheelbase_m);
-        let std = fit.std;
+        let std = &fit.std;
         let known = [std.steer_offset_forward_rad, std.steer_offset_backward_rad, std.laser_x_m, std.laser_y_m];
         assert!(known.iter().all(|deviation| *deviation > 0.0 && *deviation < 0.1), "{std:?}");
     }

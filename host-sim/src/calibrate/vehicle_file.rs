@@ -105,6 +105,21 @@ impl VehicleFile {
         std::fs::write(path, text).map_err(io)
     }
 
+    /// The same parameters as the firmware's settings call them: names of leaves, and values in their units.
+    pub fn settings(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        let named = [
+            ("vehicle.wheelbase", self.wheelbase_m),
+            ("vehicle.drive_scale", self.drive_scale_m_per_tick),
+            ("vehicle.steering_scale", self.steering_scale_rad_per_tick),
+            ("vehicle.steering_offset_forward", self.steer_offset_forward_rad),
+            ("vehicle.steering_offset_backward", self.steer_offset_backward_rad),
+            ("laser.x", self.laser_x_m),
+            ("laser.y", self.laser_y_m),
+            ("laser.theta", self.laser_theta_rad),
+        ];
+        named.into_iter().filter_map(|(name, value)| Some((name, value?)))
+    }
+
     /// Puts the parameters in place of those of a log. False if the log is not of a tricycle.
     #[must_use]
     pub fn apply(&self, parameters: &mut Parameters) -> bool {

@@ -1,6 +1,8 @@
 //! `agv calibrate` as people run it.
 
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_settings::Settings;
+use agv_settings::leaf::{Leaf, Value};
 
 use crate::support::{Files, agv, refusal, text};
 
@@ -46,6 +48,22 @@ fn vehicle_files_come_back_as_they_were_written() {
     let file = VehicleFile { wheelbase_m: Some(1.5), laser_x_m: Some(-0.125), ..VehicleFile::default() };
     file.write(path.as_ref()).unwrap();
     assert_eq!(VehicleFile::read(path.as_ref()).unwrap(), file);
+}
+
+#[test]
+fn settings_of_the_firmware_take_a_vehicle_file() {
+    let vehicle = crate::truth::vehicle();
+    let file = VehicleFile::of(&vehicle.tricycle, &vehicle.laser);
+    let mut parameters = vehicle.believed();
+    let mut settings = Settings::of(parameters);
+    for (name, value) in file.settings() {
+        Leaf::named(name).unwrap().set(&mut settings, Value::Number(value)).unwrap();
+    }
+    // What replay makes of the file is what the firmware starts with.
+    assert!(file.apply(&mut parameters));
+    assert_eq!(settings.parameters.vehicle, parameters.vehicle);
+    assert_eq!(settings.parameters.laser, parameters.laser);
+    assert_eq!(file.settings().count(), 8);
 }
 
 #[test]

@@ -184,8 +184,8 @@ impl Run {
             let quarter = self.quarter(window.start.offset(0.5 * window.end.since(window.start)));
             match quarters {
                 Quarters::All => true,
-                Quarters::FirstAndThird => quarter % 2 == 0,
-                Quarters::SecondAndFourth => quarter % 2 == 1,
+                Quarters::FirstAndThird => quarter == 0 || quarter == 2,
+                Quarters::SecondAndFourth => quarter == 1 || quarter == 3,
             }
         };
         all.into_iter().filter(is_wanted).collect()

@@ -204,13 +204,14 @@ fn summarise(vehicle: &TrueVehicle, results: &[&Result<Found, Refusal>]) -> Resu
     }
     let count = found.len() as f64;
     let mut summary = Summary { runs: found.len(), bias: [0.0; 8], std: [0.0; 8], stated: [0.0; 8] };
-    for index in 0..PARAMETERS {
-        let error = |found: &&Found| found.model.vector()[index] - truth[index];
+    for (index, truth) in truth.iter().enumerate() {
+        let error = |found: &&Found| found.model.vector()[index] - truth;
         let mean = found.iter().map(error).sum::<f64>() / count;
         let squares = found.iter().map(|found| (error(found) - mean).powi(2)).sum::<f64>();
+        let stated = found.iter().map(|found| found.deviations[index].powi(2)).sum::<f64>();
         summary.bias[index] = mean;
         summary.std[index] = (squares / (count - 1.0).max(1.0)).sqrt();
-        summary.stated[index] = (found.iter().map(|found| found.deviations[index].powi(2)).sum::<f64>() / count).sqrt();
+        summary.stated[index] = (stated / count).sqrt();
     }
     Ok(summary)
 }
