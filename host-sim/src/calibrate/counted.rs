@@ -127,6 +127,6 @@ pub fn count(samples: &[EncoderSample], nominal: &Tricycle, mend: bool) -> (Vec<
 fn usual_step(steps: &[f64], index: usize) -> f64 {
     let mut around: Vec<f64> =
         steps[index.saturating_sub(NEIGHBOURS)..(index + NEIGHBOURS + 1).min(steps.len())].to_vec();
-    around.sort_by(f64::total_cmp);
-    around[around.len() / 2]
+    let middle = around.len() / 2;
+    *around.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -36,15 +36,15 @@ fn unexplained(counted: &[Counted], model: &VehicleModel, poses: &[LaserPose]) -
     (motion > 0.1).then(|| difference / motion)
 }
 
-/// Looks whether a counter runs the wrong way. `poses` says how the laser moved if the counters are these, as following
-/// reflectors rests on them; None if it cannot be told with them. Gives the counters as they should be.
+/// Looks whether a counter runs the wrong way. `seen` says how the laser moved, and `poses` says it for other counters, as
+/// following reflectors rests on them; None if it cannot be told. Gives the counters as they should be.
 pub fn wrong_direction(
     counted: &[Counted],
     model: &VehicleModel,
+    seen: Option<&[LaserPose]>,
     poses: impl Fn(&[Counted]) -> Option<Vec<LaserPose>>,
 ) -> Option<(CounterFault, Vec<Counted>)> {
-    let measure = |counted: &[Counted]| unexplained(counted, model, &poses(counted)?);
-    let as_it_is = measure(counted).unwrap_or(f64::INFINITY);
+    let as_it_is = seen.and_then(|seen| unexplained(counted, model, seen)).unwrap_or(f64::INFINITY);
     if as_it_is < POOR {
         return None;
     }
@@ -54,7 +54,7 @@ pub fn wrong_direction(
             false => Counted { ticks: -sample.ticks, ..*sample },
         };
         let turned: Vec<Counted> = counted.iter().map(turn).collect();
-        Some((measure(&turned)?, CounterFault::WrongDirection { is_steering }, turned))
+        Some((unexplained(&turned, model, &poses(&turned)?)?, CounterFault::WrongDirection { is_steering }, turned))
     };
     let best = [false, true].into_iter().filter_map(reversed).min_by(|first, second| first.0.total_cmp(&second.0));
     best.filter(|(left, ..)| *left < POOR && CLEARLY_BETTER * left < as_it_is).map(|(_, fault, turned)| (fault, turned))

@@ -141,19 +141,21 @@ impl Drive {
         }
         let direct = if input.laser_poses.len() >= 2 { &input.laser_poses } else { &input.given_poses };
         let follow = |counted: &[Counted]| track(&input.revolutions, &OdometryPath::new(counted, &nominal));
-        let poses = |counted: &[Counted]| {
-            let tracked = follow(counted);
-            let located = located_poses(&tracked);
-            if located.len() < FEWEST_STOPS { Some(direct.clone()) } else { is_followed(&tracked).then_some(located) }
+        let poses = |tracked: &[TrackedRevolution]| {
+            let located = located_poses(tracked);
+            if located.len() < FEWEST_STOPS { Some(direct.clone()) } else { is_followed(tracked).then_some(located) }
         };
-        if let Some((fault, turned)) = wrong_direction(&drive.counted, &nominal, poses) {
+        let mut tracked = follow(&drive.counted);
+        let seen = poses(&tracked);
+        let turned = wrong_direction(&drive.counted, &nominal, seen.as_deref(), |turned| poses(&follow(turned)));
+        if let Some((fault, turned)) = turned {
             if !preparation.mend {
                 return Err(Refusal::WrongDirection(fault.to_string()));
             }
             drive.faults.push(fault);
+            tracked = follow(&turned);
             drive.counted = turned;
         }
-        let tracked = follow(&drive.counted);
         let located = located_poses(&tracked);
         if located.len() >= FEWEST_STOPS {
             drive.poses = located;

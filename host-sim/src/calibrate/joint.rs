@@ -63,6 +63,8 @@ pub struct JointFit {
 
 /// Rounds of fit, noise and weights.
 const ROUNDS: usize = 6;
+/// From this round on windows can lose all of their weight.
+const FIRST_HARD_ROUND: usize = 2;
 /// Mahalanobis distance from which on a window counts less, and from which on it does not count.
 const SOFT_LIMIT: f64 = 3.5;
 const HARD_LIMIT: f64 = 7.0;
@@ -86,10 +88,14 @@ pub fn fit(windows: &[Window], start: &VehicleModel, free: Free, noise: &NoiseMo
         disturbed = disturbances_of(windows, &model);
         let counted: Vec<_> =
             disturbed.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0).map(|(window, _)| *window).collect();
+        let before = (noise_now, weights);
         noise_now = noise.estimated(&counted, unknowns.len());
         weights = reweighted(&disturbed, &noise_now, round);
         if weights.iter().filter(|weight| **weight > 0.0).count() < unknowns.len().max(windows.len() / 3) {
             return Err(FitError::Singular);
+        }
+        if round >= FIRST_HARD_ROUND && before == (noise_now, weights.clone()) {
+            break;
         }
     }
     let white = whitening(windows, &disturbed, &noise_now, &weights)?;
@@ -117,7 +123,7 @@ pub fn disturbances(window: &Window, model: &VehicleModel) -> Disturbances {
 
 fn reweighted(windows: &[Disturbances], noise: &NoiseModel, round: usize) -> Vec<f64> {
     // The first rounds come from a poor start and must not lose good windows.
-    let limit = if round < 2 { f64::INFINITY } else { HARD_LIMIT };
+    let limit = if round < FIRST_HARD_ROUND { f64::INFINITY } else { HARD_LIMIT };
     let weight = |window: &Disturbances| match window.distance(noise) {
         Some((square, _)) if square.sqrt() <= SOFT_LIMIT => 1.0,
         Some((square, _)) if square.sqrt() <= limit => SOFT_LIMIT / square.sqrt(),

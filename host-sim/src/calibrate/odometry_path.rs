@@ -52,7 +52,9 @@ impl OdometryPath {
         self.robot_at(time).compose(&self.laser)
     }
 
-    fn robot_at(&self, time: Time) -> Pose {
+    /// Pose of R, in R's first pose, at a time; held at both ends.
+    #[must_use]
+    pub fn robot_at(&self, time: Time) -> Pose {
         let after = self.times.partition_point(|sample| *sample <= time);
         let Some(before) = after.checked_sub(1) else {
             return Pose::default();

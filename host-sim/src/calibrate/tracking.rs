@@ -59,12 +59,16 @@ pub fn track(revolutions: &[Vec<ReflectorObservation>], odometry: &OdometryPath)
     let mut tracked = Vec::with_capacity(revolutions.len());
     for revolution in revolutions {
         let Some(middle) = revolution.get(revolution.len() / 2) else { continue };
+        let ends = [revolution.first(), revolution.last()]
+            .map(|seen| odometry.robot_at(seen.map_or(middle.time, |seen| seen.time)));
+        let standing = (ends[0] == ends[1]).then(|| odometry.laser_at(middle.time));
         let points: Vec<(Point, Point, Time)> = revolution
             .iter()
             .map(|seen| {
                 let (sine, cosine) = f64::from(seen.bearing).sin_cos();
                 let point = Point::new(cosine, sine) * f64::from(seen.range);
-                (point, odometry.laser_at(seen.time).transform(&point), seen.time)
+                let sensor = standing.unwrap_or_else(|| odometry.laser_at(seen.time));
+                (point, sensor.transform(&point), seen.time)
             })
             .collect();
         let matched = names(&places, &points, &correction);
