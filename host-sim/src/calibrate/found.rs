@@ -9,6 +9,7 @@ use super::drive::Drive;
 use super::joint::{self, Free, disturbances};
 use super::model::{PARAMETERS, VehicleModel};
 use super::noise::NoiseModel;
+use super::propagation::closed_form_deviations;
 use super::refusal::Refusal;
 use super::window::Window;
 
@@ -142,18 +143,13 @@ fn solve_closed(drive: &Drive, form: &ClosedForm, is_ratio_free: bool) -> Result
     let calibration = closed_form::solve(&kept, nominal, form, ratio)?;
     let model = closed_form::model(&calibration, ratio);
     let disturbed: Vec<_> = kept.iter().map(|window| disturbances(window, &model)).collect();
-    let (intrinsic, laser) = (calibration.intrinsic.deviations(), calibration.extrinsic.deviations());
-    let wheelbase = [calibration.extrinsic.wheelbase, calibration.extrinsic.wheelbase_deviation];
-    let deviations = [
-        intrinsic.x,
-        intrinsic.y,
-        calibration.drive_scale_deviation(form.is_wheelbase_free),
-        if form.is_wheelbase_free { wheelbase[1] } else { 0.0 },
-        0.0,
-        laser.x,
-        laser.y,
-        laser.z,
-    ];
+    let noise = NoiseModel::default().estimated(&disturbed, PARAMETERS);
+    let vehicle = closed_form::model(&calibration, 1.0).apply(nominal);
+    let segments = closed_form::segments(&kept, &vehicle, ratio);
+    let [forward, backward, scale, wheelbase, x, y, heading, suggested] =
+        closed_form_deviations(&kept, &segments, &problem, &disturbed, &noise)?;
+    let wheelbase = if form.is_wheelbase_free { wheelbase } else { 0.0 };
+    let deviations = [forward, backward, scale, wheelbase, 0.0, x, y, heading];
     if !deviations.iter().chain(&model.vector()).all(|value| value.is_finite()) {
         return Err(Unobservable::NotFinite.into());
     }
@@ -161,8 +157,8 @@ fn solve_closed(drive: &Drive, form: &ClosedForm, is_ratio_free: bool) -> Result
         model,
         deviations,
         conditioning: calibration.conditioning,
-        suggested_wheelbase: wheelbase,
-        noise: NoiseModel::default().estimated(&disturbed, PARAMETERS),
+        suggested_wheelbase: [calibration.extrinsic.wheelbase, suggested],
+        noise,
         residuals: residuals(&drive.windows, &model, |index| if is_outlier(index) { 0.0 } else { 1.0 }),
     })
 }

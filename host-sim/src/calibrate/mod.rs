@@ -13,6 +13,7 @@ pub mod model;
 pub mod noise;
 pub mod odometry_path;
 pub mod plan;
+mod propagation;
 pub mod reflector_noise;
 pub mod refusal;
 pub mod report;
