@@ -97,7 +97,7 @@ pub fn find(drive: &Drive, question: &Question) -> Result<Found, Refusal> {
             wheelbase: question.is_wheelbase_free,
             steering_ratio: question.is_steering_ratio_free,
         };
-        let fit = joint::fit(windows, &closed.model, free, &NoiseModel::default())?;
+        let fit = joint::fit(windows, &closed.model, free, &expected_noise(&closed.noise))?;
         let residuals = residuals(windows, &fit.model, |index| fit.weights[index]);
         Found { model: fit.model, deviations: fit.deviations, noise: fit.noise, residuals, ..closed }
     } else {
@@ -107,6 +107,13 @@ pub fn find(drive: &Drive, question: &Question) -> Result<Found, Refusal> {
     let found = Found { deviations: found.deviations.map(|deviation| deviation * overlap), ..found };
     found.check()?;
     Ok(found)
+}
+
+/// Where the fit's estimate of the noise begins: the usual noise, unless the closed form has left much more or much less.
+fn expected_noise(left: &NoiseModel) -> NoiseModel {
+    let usual = NoiseModel::default();
+    let is_near = |left: f64, usual: f64| (left / usual).ln().abs() <= 1.5;
+    if is_near(left.slip, usual.slip) && is_near(left.steering, usual.steering) { usual } else { *left }
 }
 
 fn residuals(windows: &[Window], model: &VehicleModel, weight: impl Fn(usize) -> f64) -> Vec<Residual> {
@@ -189,8 +196,9 @@ impl Found {
     fn limits(&self) -> [[f64; 2]; PARAMETERS] {
         let (offset, share, place) = ([5e-4, 0.02], [1.5e-3, 0.03], [5e-3, 0.1]);
         let scale = share.map(|share| share * self.model.drive_scale.abs());
+        let ratio = share.map(|share| share * self.model.steering_ratio.abs());
         let base = share.map(|share| share * self.model.wheelbase.abs());
-        [offset, offset, scale, base, share, place, place, [1e-3, 0.05]]
+        [offset, offset, scale, base, ratio, place, place, [1e-3, 0.05]]
     }
 
     /// Whether the drive was good enough.
@@ -219,7 +227,7 @@ impl Found {
                 let deviation = match index {
                     0 | 1 | 7 => format!("{:.2} deg", deviation.to_degrees()),
                     2 => format!("{:.1} % of it", 100.0 * deviation / self.model.drive_scale.abs()),
-                    4 => format!("{:.1} %", 100.0 * deviation),
+                    4 => format!("{:.1} % of it", 100.0 * deviation / self.model.steering_ratio.abs()),
                     _ => format!("{:.0} mm", 1e3 * deviation),
                 };
                 return Err(Refusal::Uncertain { parameter: PARAMETER_NAMES[index], deviation });
