@@ -10,7 +10,7 @@
 //! |---|---|
 //! | 5 | [`record`] |
 //! | 4 | [`localizer`] |
-//! | 3 | [`features`], [`filter`] |
+//! | 3 | [`calibration`], [`features`], [`filter`] |
 //! | 2 | [`odometry`], [`landmarks`], [`wire`] |
 //! | 1 | [`geometry`], [`measurement`], [`state`] |
 //!
@@ -21,6 +21,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod calibration;
 pub mod features;
 pub mod filter;
 pub mod geometry;

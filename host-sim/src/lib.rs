@@ -1,6 +1,7 @@
 //! The localiser on a desktop: simulation, replay, import, evaluation and reports.
 
 pub mod bus;
+pub mod calibrate;
 pub mod data;
 pub mod emulate;
 pub mod evaluate;

@@ -3,6 +3,7 @@
 //! A subcommand is a clap `Args` structure with `run(self) -> anyhow::Result<()>`. Results go to standard output,
 //! progress to standard error.
 
+pub mod calibrate;
 pub mod can;
 pub mod ctl;
 pub mod demonstration;

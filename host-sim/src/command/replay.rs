@@ -6,6 +6,7 @@ use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{MapUse, PoseFix};
 use agv_core::record::Damage;
+use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::evaluate::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::map_file;
@@ -23,6 +24,7 @@ Examples:
   agv replay drive.agvlog
   agv replay drive.agvlog --report drive-report
   agv replay drive.agvlog --map features.csv --json
+  agv replay drive.agvlog --vehicle vehicle.toml
   agv replay intel.agvlog --start recorded --landmarks dynamic
   agv replay drive.agvlog --landmarks none --output odometry.agvlog
 
@@ -50,6 +52,9 @@ pub struct Replay {
     /// Map to use; its reflectors replace those of the log, its features the log's features.
     #[arg(long, value_name = "MAP")]
     map: Vec<PathBuf>,
+    /// Parameters of the vehicle, instead of those of the log; as `agv calibrate --apply` writes them.
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
     /// Which landmarks correct the pose, instead of what the log states.
     #[arg(long, value_name = "KIND,...", value_delimiter = ',')]
     landmarks: Vec<Landmarks>,
@@ -123,9 +128,14 @@ impl Replay {
         let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let Contents { software, mut recording, outputs, damages } = contents;
-        let is_as_recorded = self.map.is_empty() && self.landmarks.is_empty() && self.start.is_none();
+        let is_as_recorded =
+            self.map.is_empty() && self.landmarks.is_empty() && self.start.is_none() && self.vehicle.is_none();
         if let Some(start) = self.start {
             set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
+        }
+        if let Some(path) = &self.vehicle {
+            let is_tricycle = VehicleFile::read(path)?.apply(&mut recording.parameters);
+            ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
         }
         for path in &self.map {
             use_map(&mut recording, map_file::read(path)?);
@@ -189,6 +199,7 @@ impl Replay {
     fn remarks(&self, software: &str, comparison: Option<Comparison>, damages: &[Damage]) -> Vec<[String; 2]> {
         let mut rows =
             vec![["log".to_owned(), self.log.display().to_string()], ["written by".to_owned(), software.to_owned()]];
+        rows.extend(self.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
         for map in &self.map {
             rows.push(["map".to_owned(), map.display().to_string()]);
         }

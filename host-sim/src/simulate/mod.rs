@@ -133,12 +133,13 @@ fn true_tricycle(scenario: &Scenario) -> Tricycle {
     let mut random = Random::new(scenario.seed, Stream::Vehicle);
     let signs = if errors.random_signs { [random.sign(), random.sign()] } else { [1.0, 1.0] };
     let offset_error = signs[1] * errors.steering_offset_error_deg.to_radians();
+    let backward_error = errors.steering_offset_backward_error_deg.to_radians();
     let believed = believed_tricycle(scenario);
     Tricycle {
         wheelbase: believed.wheelbase + errors.wheelbase_error,
         drive_scale: believed.drive_scale * (1.0 + signs[0] * errors.drive_scale_error),
         steering_offset_forward: believed.steering_offset_forward + offset_error,
-        steering_offset_backward: believed.steering_offset_backward + offset_error,
+        steering_offset_backward: believed.steering_offset_backward + offset_error + backward_error,
         ..believed
     }
 }

@@ -10,7 +10,7 @@ use super::scenario::OdometryOptions;
 use super::vehicle::Motion;
 
 /// Counters of a tricycle with the true parameters `tricycle`, one sample a state of `motion`; `start` is the time of the
-/// first. Slip and steering noise are in the counters; the driving counter starts anywhere.
+/// first. Slip and steering errors are in the counters; the driving counter starts anywhere.
 #[must_use]
 pub fn encoders(
     motion: &Motion,
@@ -22,16 +22,20 @@ pub fn encoders(
     let steering_noise = options.steering_noise_deg.to_radians();
     let mut counted_way = tricycle.drive_scale * random.uniform() * tricycle.drive_range.values() as f64;
     let mut wheel_way = 0.0;
+    let mut leg = LegErrors::default();
     let mut samples = Vec::with_capacity(motion.states.len());
     for (index, state) in motion.states.iter().enumerate() {
         let moved = state.wheel_way - wheel_way;
         wheel_way = state.wheel_way;
-        counted_way += moved + options.slip * libm::sqrt(moved.abs()) * random.normal();
+        if leg.of != Some(state.leg) {
+            leg = LegErrors::drawn(state.leg, options, random);
+        }
+        counted_way += moved * (1.0 + leg.slip) + options.slip * libm::sqrt(moved.abs()) * random.normal();
         let offset = match state.direction {
             Direction::Forward => tricycle.steering_offset_forward,
             Direction::Backward => tricycle.steering_offset_backward,
         };
-        let steering = state.steering - offset + steering_noise * random.normal();
+        let steering = state.steering - offset + leg.steering + steering_noise * random.normal();
         samples.push(EncoderSample {
             time: start.offset(index as f64 * motion.interval),
             drive: counter(libm::floor(counted_way / tricycle.drive_scale), tricycle.drive_range),
@@ -39,6 +43,25 @@ pub fn encoders(
         });
     }
     samples
+}
+
+/// Errors that last for a leg.
+#[derive(Default)]
+struct LegErrors {
+    of: Option<usize>,
+    /// Share of the way.
+    slip: f64,
+    /// rad.
+    steering: f64,
+}
+
+impl LegErrors {
+    /// Those of a new leg. Errors that a scenario does not have take no random numbers.
+    fn drawn(leg: usize, options: &OdometryOptions, random: &mut Random) -> Self {
+        let mut error = |deviation: f64| if deviation > 0.0 { deviation * random.normal() } else { 0.0 };
+        let slip = error(options.leg_slip);
+        Self { of: Some(leg), slip, steering: error(options.leg_steering_error_deg.to_radians()) }
+    }
 }
 
 /// Speed of the rear wheel and steering angle of a car whose virtual front wheel is the tricycle's wheel. A sample tells

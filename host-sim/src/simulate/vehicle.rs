@@ -18,6 +18,8 @@ pub struct VehicleState {
     pub wheel_way: f64,
     /// Sense of the present leg; at rest, of the one just driven.
     pub direction: Direction,
+    /// Index of that leg.
+    pub leg: usize,
 }
 
 /// The true vehicle at equal intervals.
@@ -31,7 +33,7 @@ pub struct Motion {
 
 /// A part of the timetable.
 enum Phase<'a> {
-    Drive { leg: &'a Leg, start: Pose, profile: SpeedProfile },
+    Drive { leg: &'a Leg, index: usize, start: Pose, profile: SpeedProfile },
     Rest { leg: &'a Leg, way: f64, start: Pose, duration: f64 },
 }
 
@@ -44,8 +46,6 @@ impl Phase<'_> {
     }
 }
 
-/// Stop between two legs, s, in which the wheel turns to its new angle.
-const STOP_BETWEEN_LEGS: f64 = 1.0;
 /// Length over which the steering law takes a change of curvature, m.
 const CURVATURE_WINDOW: f64 = 0.5;
 /// Length within which the steering law takes away an offset from the path, m.
@@ -74,6 +74,7 @@ pub fn drive(
         steering: libm::atan(wheelbase * first_curvature),
         wheel_way: 0.0,
         direction: path.legs.first().map_or(Direction::Forward, |leg| leg.direction),
+        leg: 0,
     };
     let steering_step = options.steering_rate_deg.to_radians() * interval;
     let yaw_walk = disturbance.yaw_walk_deg.to_radians();
@@ -84,13 +85,13 @@ pub fn drive(
         for step in 1..=steps {
             let (leg, start, way_before, way_after) = match phase {
                 Phase::Rest { leg, way, start, .. } => (leg, start, *way, *way),
-                Phase::Drive { leg, start, profile } => {
+                Phase::Drive { leg, index, start, profile } => {
                     let way_before = std::mem::replace(&mut way, profile.way(step as f64 * interval));
-                    state.direction = leg.direction;
+                    (state.direction, state.leg) = (leg.direction, *index);
                     (leg, start, way_before, way)
                 }
             };
-            let command = steering_command(leg, start, way_after, &state, wheelbase);
+            let command = steering_command(leg, start, way_after, &state.pose, wheelbase);
             let steering = state.steering + (command - state.steering).clamp(-steering_step, steering_step);
             let mean_steering = 0.5 * (state.steering + steering);
             let moved = leg.direction.sign() * (way_after - way_before);
@@ -102,7 +103,7 @@ pub fn drive(
                 pose: state.pose.compose(&Pose::exp(&arc)).compose(&Pose::new(0.0, side_slip, yaw)),
                 steering,
                 wheel_way: state.wheel_way + moved / libm::cos(mean_steering),
-                direction: state.direction,
+                ..state
             };
             states.push(state);
         }
@@ -114,10 +115,10 @@ fn timetable<'a>(path: &'a Path, options: &DriveOptions) -> Vec<Phase<'a>> {
     let mut phases = Vec::new();
     let mut start = path.start;
     for (index, leg) in path.legs.iter().enumerate() {
-        let duration = if index == 0 { options.start_standstill } else { STOP_BETWEEN_LEGS };
+        let duration = if index == 0 { options.start_standstill } else { options.stop_between_legs };
         phases.push(Phase::Rest { leg, way: 0.0, start, duration });
         let profile = SpeedProfile::new(leg.length(), options.speed, options.acceleration, options.braking);
-        phases.push(Phase::Drive { leg, start, profile });
+        phases.push(Phase::Drive { leg, index, start, profile });
         if index + 1 == path.legs.len() {
             phases.push(Phase::Rest { leg, way: leg.length(), start, duration: options.end_standstill });
         }
@@ -126,10 +127,12 @@ fn timetable<'a>(path: &'a Path, options: &DriveOptions) -> Vec<Phase<'a>> {
     phases
 }
 
-fn steering_command(leg: &Leg, start: &Pose, way: f64, state: &VehicleState, wheelbase: f64) -> f64 {
+/// The steering angle (rad) that keeps a vehicle at `pose` on the leg from `start` after `way` (m).
+#[must_use]
+pub fn steering_command(leg: &Leg, start: &Pose, way: f64, pose: &Pose, wheelbase: f64) -> f64 {
     let reference = leg.pose(start, way);
-    let lateral = reference.between(&state.pose).y;
-    let heading = difference(state.pose.theta, reference.theta);
+    let lateral = reference.between(pose).y;
+    let heading = difference(pose.theta, reference.theta);
     let curvature = leg.mean_curvature(way, CURVATURE_WINDOW)
         - lateral / (RETURN_LENGTH * RETURN_LENGTH)
         - leg.direction.sign() * 2.0 * heading / RETURN_LENGTH;

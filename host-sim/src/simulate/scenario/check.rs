@@ -27,8 +27,11 @@ impl Scenario {
         let not_negative = [
             ("drive.start_standstill", drive.start_standstill),
             ("drive.end_standstill", drive.end_standstill),
+            ("drive.stop_between_legs", drive.stop_between_legs),
             ("odometry.slip", self.odometry.slip),
             ("odometry.steering_noise_deg", self.odometry.steering_noise_deg),
+            ("odometry.leg_steering_error_deg", self.odometry.leg_steering_error_deg),
+            ("odometry.leg_slip", self.odometry.leg_slip),
             ("odometry.yaw_walk_deg", self.odometry.yaw_walk_deg),
             ("odometry.side_slip", self.odometry.side_slip),
             ("laser.range_noise", laser.range_noise),

@@ -18,6 +18,8 @@ pub struct DriveOptions {
     pub start_standstill: f64,
     /// Standstill at the end, s.
     pub end_standstill: f64,
+    /// Standstill between two legs, s, in which the wheel turns to its new angle.
+    pub stop_between_legs: f64,
     /// Fastest turn of the driving wheel, degrees a second.
     pub steering_rate_deg: f64,
 }
@@ -30,6 +32,7 @@ impl Default for DriveOptions {
             braking: 0.3,
             start_standstill: 1.0,
             end_standstill: 0.5,
+            stop_between_legs: 1.0,
             steering_rate_deg: 60.0,
         }
     }
@@ -104,6 +107,8 @@ pub struct VehicleErrors {
     pub drive_scale_error: f64,
     /// True steering offset minus the believed one, in both senses of travel.
     pub steering_offset_error_deg: f64,
+    /// What is added to that backward.
+    pub steering_offset_backward_error_deg: f64,
     /// Whether the seed chooses the signs of the two errors above.
     pub random_signs: bool,
     /// True wheelbase minus the believed one, m.
@@ -117,6 +122,7 @@ impl Default for VehicleErrors {
         Self {
             drive_scale_error: 0.002,
             steering_offset_error_deg: 0.05,
+            steering_offset_backward_error_deg: 0.0,
             random_signs: true,
             wheelbase_error: 0.0,
             laser_error: PoseOptions::default(),
@@ -134,6 +140,10 @@ pub struct OdometryOptions {
     pub slip: f64,
     /// Standard deviation of a reading of the steering angle.
     pub steering_noise_deg: f64,
+    /// Standard deviation of an error of the steering angle that lasts for a leg of the way.
+    pub leg_steering_error_deg: f64,
+    /// Standard deviation of slip that lasts for a leg of the way, as a share of the way.
+    pub leg_slip: f64,
     /// Standard deviation of the heading's walk, degrees for the root of a metre.
     pub yaw_walk_deg: f64,
     /// Standard deviation of the shift to the side, m for the root of a metre.
@@ -142,7 +152,15 @@ pub struct OdometryOptions {
 
 impl Default for OdometryOptions {
     fn default() -> Self {
-        Self { rate: 100.0, slip: 3e-3, steering_noise_deg: 0.01, yaw_walk_deg: 0.02, side_slip: 0.5e-3 }
+        Self {
+            rate: 100.0,
+            slip: 3e-3,
+            steering_noise_deg: 0.01,
+            leg_steering_error_deg: 0.0,
+            leg_slip: 0.0,
+            yaw_walk_deg: 0.02,
+            side_slip: 0.5e-3,
+        }
     }
 }
 

@@ -1,0 +1,6 @@
+//! Calibration: on a real tricycle, and in simulation.
+
+pub mod course;
+pub mod sapienza;
+pub mod simulated;
+pub mod thesis;

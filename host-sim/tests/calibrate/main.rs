@@ -1,0 +1,11 @@
+//! Calibration from logs: simulated drives whose truth is known, and logs that are not good enough.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod bad_logs;
+mod command;
+mod counters;
+mod drives;
+mod model;
+mod truth;
