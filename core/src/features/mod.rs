@@ -1,11 +1,16 @@
 //! Points that can be recognised in a scan.
 
+mod binary_shape_context;
+mod cumulative_gaussian_histogram;
 pub mod falko;
 mod keypoint;
 mod motion_correction;
+mod neighbourhood;
 mod point_scan;
 mod reflector_detection;
 
+pub use binary_shape_context::BinaryShapeContext;
+pub use cumulative_gaussian_histogram::{CumulativeGaussianHistogram, Kernel};
 pub use keypoint::{Keypoint, KeypointKind};
 pub use motion_correction::SensorPath;
 pub use point_scan::PointScan;
