@@ -10,7 +10,7 @@
 //! |---|---|
 //! | 5 | [`record`] |
 //! | 4 | [`localizer`] |
-//! | 3 | [`features`], [`filter`] |
+//! | 3 | [`features`], [`filter`], [`places`] |
 //! | 2 | [`odometry`], [`landmarks`], [`wire`] |
 //! | 1 | [`geometry`], [`measurement`], [`state`] |
 //!
@@ -28,6 +28,7 @@ pub mod landmarks;
 pub mod localizer;
 pub mod measurement;
 pub mod odometry;
+pub mod places;
 pub mod record;
 pub mod state;
 pub mod wire;
