@@ -27,6 +27,11 @@ impl Transform {
         Self { sine: sine as f32, cosine: cosine as f32, shift: ScanPoint::new(pose.x as f32, pose.y as f32) }
     }
 
+    /// Position of the source frame in the target frame, m.
+    pub(super) fn shift(&self) -> ScanPoint {
+        self.shift
+    }
+
     #[inline]
     pub(super) fn apply(&self, point: &ScanPoint) -> ScanPoint {
         ScanPoint::new(

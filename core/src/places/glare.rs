@@ -30,7 +30,7 @@ pub struct GlareParameters {
 
 impl Default for GlareParameters {
     fn default() -> Self {
-        Self { length_step: 0.25, length_deviation: 0.15, direction_deviation: 0.15 }
+        Self { length_step: 0.25, length_deviation: 0.1, direction_deviation: 0.2 }
     }
 }
 

@@ -30,29 +30,33 @@ impl<const WORDS: usize> Set<WORDS> {
         }
     }
 
-    fn first(&self) -> Option<usize> {
-        let (index, word) = self.0.iter().enumerate().find(|(_, word)| **word != 0)?;
+    /// The first vertex; only the first `words` words are looked at, as below.
+    fn first(&self, words: usize) -> Option<usize> {
+        let (index, word) = self.0.iter().take(words).enumerate().find(|(_, word)| **word != 0)?;
         Some(index * WORD + word.trailing_zeros() as usize)
     }
 
-    fn intersection(&self, other: &Self) -> Self {
-        let mut both = *self;
-        for (word, mask) in both.0.iter_mut().zip(&other.0) {
-            *word &= mask;
+    fn intersection(&self, other: &Self, words: usize) -> Self {
+        let mut both = Self::EMPTY;
+        for ((word, one), other) in both.0.iter_mut().zip(&self.0).zip(&other.0).take(words) {
+            *word = one & other;
         }
         both
     }
 
-    fn subtract(&mut self, other: &Self) {
-        for (word, mask) in self.0.iter_mut().zip(&other.0) {
+    fn subtract(&mut self, other: &Self, words: usize) {
+        for (word, mask) in self.0.iter_mut().zip(&other.0).take(words) {
             *word &= !mask;
         }
     }
 
-    fn len(&self) -> usize {
-        self.0.iter().map(|word| word.count_ones() as usize).sum()
+    fn len(&self, words: usize) -> usize {
+        self.0.iter().take(words).map(|word| word.count_ones() as usize).sum()
     }
 }
+
+/// Passes over the vertices that drop those with too few neighbours.
+const PRUNING_PASSES: usize = 2;
 
 /// Largest clique that is looked for.
 const DEPTH: usize = 64;
@@ -91,77 +95,114 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
     /// Finds a largest clique by branch and bound: the number of colours that a greedy colouring needs bounds what a set
     /// can add. Gives up after `most_steps` branches and then returns the largest clique seen.
     pub(super) fn maximum_clique(&self, most_steps: u32) -> Clique {
-        let mut best = Clique { vertices: Vec::new(), is_maximum: true };
-        let mut all = Set::EMPTY;
-        for vertex in 0..self.neighbours.len() {
-            all.insert(vertex);
-        }
+        let mut best = Clique { vertices: self.greedy_clique(), is_maximum: true };
         let mut chosen = Vec::<u16, DEPTH>::new();
         let mut sets = Vec::<Set<WORDS>, DEPTH>::new();
-        let _ = sets.push(all);
+        let _ = sets.push(self.vertices_with_neighbours(best.vertices.len()));
         let mut steps = 0;
         // The stack of candidate sets is the recursion; a set loses the vertex that was tried in it.
         while let Some(candidates) = sets.last().copied() {
-            let bound = chosen.len() + self.colours(&candidates, best.vertices.len().saturating_sub(chosen.len()));
-            let next = candidates.first();
-            let (Some(_), true, true) = (next, bound > best.vertices.len(), steps < most_steps) else {
-                if steps >= most_steps && next.is_some() && bound > best.vertices.len() {
-                    best.is_maximum = false;
-                }
+            let enough = best.vertices.len().saturating_sub(chosen.len());
+            let Some(vertex) = self.colour_beyond(candidates, enough) else {
                 let _ = sets.pop();
                 let _ = chosen.pop();
                 continue;
             };
+            if steps >= most_steps {
+                best.is_maximum = false;
+                break;
+            }
             steps += 1;
-            // The vertex with most neighbours among the candidates leads to large cliques first.
-            let Some((vertex, remaining)) = self.busiest(&candidates) else { break };
             if let Some(set) = sets.last_mut() {
                 set.remove(vertex);
             }
+            let remaining = self.neighbours_among(vertex, &candidates);
             if chosen.push(vertex as u16).is_err() {
+                best.is_maximum = false;
                 break;
             }
             if chosen.len() > best.vertices.len() {
                 best.vertices.clone_from(&chosen);
             }
-            if remaining.len() == 0 || sets.push(remaining).is_err() {
+            if remaining == Set::EMPTY || sets.push(remaining).is_err() {
                 let _ = chosen.pop();
             }
         }
         best
     }
 
-    /// The candidate with most neighbours among the candidates, and those neighbours.
-    fn busiest(&self, candidates: &Set<WORDS>) -> Option<(usize, Set<WORDS>)> {
-        let mut best: Option<(usize, Set<WORDS>, usize)> = None;
-        let mut rest = *candidates;
-        while let Some(vertex) = rest.first() {
-            rest.remove(vertex);
-            let set = self.neighbours.get(vertex)?.intersection(candidates);
-            let count = set.len();
-            if best.as_ref().is_none_or(|(_, _, most)| count > *most) {
-                best = Some((vertex, set, count));
-            }
-        }
-        best.map(|(vertex, set, _)| (vertex, set))
+    fn words(&self) -> usize {
+        self.neighbours.len().div_ceil(WORD)
     }
 
-    /// Number of colours of a greedy colouring, none of whose classes holds neighbours; counts no further than one above
-    /// `enough`.
-    fn colours(&self, candidates: &Set<WORDS>, enough: usize) -> usize {
+    fn neighbours_among(&self, vertex: usize, candidates: &Set<WORDS>) -> Set<WORDS> {
+        self.neighbours.get(vertex).map_or(Set::EMPTY, |set| set.intersection(candidates, self.words()))
+    }
+
+    /// A clique by always adding the vertex with most neighbours among what is left.
+    fn greedy_clique(&self) -> Vec<u16, DEPTH> {
+        let mut clique = Vec::new();
+        let mut candidates = self.vertices_with_neighbours(0);
+        while let Some(vertex) = self.busiest(&candidates) {
+            if clique.push(vertex as u16).is_err() {
+                break;
+            }
+            candidates = self.neighbours_among(vertex, &candidates);
+        }
+        clique
+    }
+
+    /// The candidate with most neighbours among the candidates.
+    fn busiest(&self, candidates: &Set<WORDS>) -> Option<usize> {
+        let words = self.words();
+        let mut best = None;
         let mut rest = *candidates;
-        let mut colours = 0;
-        while rest != Set::EMPTY && colours <= enough {
-            colours += 1;
-            let mut class = rest;
-            while let Some(vertex) = class.first() {
-                class.remove(vertex);
-                rest.remove(vertex);
-                if let Some(neighbours) = self.neighbours.get(vertex) {
-                    class.subtract(neighbours);
+        while let Some(vertex) = rest.first(words) {
+            rest.remove(vertex);
+            let count = self.neighbours.get(vertex)?.intersection(candidates, words).len(words);
+            if best.is_none_or(|(_, most)| count > most) {
+                best = Some((vertex, count));
+            }
+        }
+        best.map(|(vertex, _)| vertex)
+    }
+
+    /// Vertices with at least that many neighbours of their own kind: no others can be in a larger clique.
+    fn vertices_with_neighbours(&self, least: usize) -> Set<WORDS> {
+        let words = self.words();
+        let mut kept = Set::EMPTY;
+        for vertex in 0..self.neighbours.len() {
+            kept.insert(vertex);
+        }
+        for _ in 0..PRUNING_PASSES {
+            for (vertex, neighbours) in self.neighbours.iter().enumerate() {
+                if neighbours.intersection(&kept, words).len(words) < least {
+                    kept.remove(vertex);
                 }
             }
         }
-        colours
+        kept
+    }
+
+    /// Colours the candidates greedily so that no neighbours have the same colour, and returns the first vertex that
+    /// needs more than `enough` colours. None if no clique among the candidates has more than `enough` vertices.
+    fn colour_beyond(&self, mut rest: Set<WORDS>, enough: usize) -> Option<usize> {
+        let words = self.words();
+        for _ in 0..enough {
+            let mut class = rest;
+            let mut is_empty = true;
+            while let Some(vertex) = class.first(words) {
+                is_empty = false;
+                class.remove(vertex);
+                rest.remove(vertex);
+                if let Some(neighbours) = self.neighbours.get(vertex) {
+                    class.subtract(neighbours, words);
+                }
+            }
+            if is_empty {
+                return None;
+            }
+        }
+        rest.first(words)
     }
 }

@@ -4,6 +4,7 @@
 //! each (K 4.1.2, 4.1.3), and the scan itself decides. Reflectors, which look alike, are found by their distances.
 
 mod alignment;
+mod beam_lookup;
 mod correspondence;
 mod correspondence_graph;
 mod glare;
@@ -11,6 +12,8 @@ mod hough;
 mod maximum_clique;
 mod place_index;
 mod random_sample;
+mod recognition;
+mod scan_alignment;
 mod scan_overlap;
 mod surface_relations;
 
@@ -22,5 +25,7 @@ pub use hough::{AffineHough, HoughParameters};
 pub use maximum_clique::Clique;
 pub use place_index::{Candidate, PlaceIndex};
 pub use random_sample::{RandomSample, RandomSampleParameters};
+pub use recognition::{PlaceView, Recognition, RecognitionParameters, Recognizer};
+pub use scan_alignment::{ScanAlignment, ScanAlignmentParameters, align_scans};
 pub use scan_overlap::{Overlap, OverlapParameters, overlap};
 pub use surface_relations::surface_normal;

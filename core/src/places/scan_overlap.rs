@@ -1,5 +1,6 @@
 //! Whether two scans can both be true if one was taken at a given pose in the frame of the other.
 
+use super::beam_lookup::BeamLookup;
 use super::correspondence::Transform;
 use crate::features::PointScan;
 use crate::geometry::{Pose, ScanPoint};
@@ -17,7 +18,7 @@ pub struct OverlapParameters {
 
 impl Default for OverlapParameters {
     fn default() -> Self {
-        Self { near: 0.15, beyond: 0.3, every: 2 }
+        Self { near: 0.1, beyond: 0.2, every: 2 }
     }
 }
 
@@ -78,12 +79,11 @@ fn one_way<const BEAMS: usize>(
     parameters: &OverlapParameters,
 ) -> Overlap {
     let transform = Transform::of(pose);
+    let lookup = BeamLookup::new(target);
     let mut overlap = Overlap::default();
-    let per_radian = 1.0 / target.bearing_step.max(1e-6);
     let returns = source.points.iter().zip(&source.ranges).step_by(usize::from(parameters.every.max(1)));
     for (point, _) in returns.filter(|(_, range)| **range > 0.0) {
-        let point = transform.apply(point);
-        match judge(&point, target, per_radian, parameters) {
+        match judge(&transform.apply(point), &lookup, parameters) {
             Some(Judgement::Agrees) => overlap.agreeing += 1,
             Some(Judgement::Contradicts) => overlap.contradicting += 1,
             Some(Judgement::IsHidden) => overlap.hidden += 1,
@@ -102,33 +102,19 @@ enum Judgement {
 /// Beams to each side of a return's direction that may have met the same surface.
 const BESIDE: isize = 2;
 
-fn judge<const BEAMS: usize>(
-    point: &ScanPoint,
-    target: &PointScan<BEAMS>,
-    per_radian: f32,
-    parameters: &OverlapParameters,
-) -> Option<Judgement> {
-    let bearing = libm::atan2f(point.y, point.x) - target.first_bearing;
-    let bearing = if bearing < 0.0 { bearing + core::f32::consts::TAU } else { bearing };
-    let beam = (bearing * per_radian + 0.5) as isize;
-    let count = target.ranges.len() as isize;
-    let at = |beam: isize| {
-        let beam = if target.is_full_circle { beam.rem_euclid(count.max(1)) } else { beam };
-        let index = usize::try_from(beam).ok()?;
-        let range = *target.ranges.get(index)?;
-        (range > 0.0).then(|| target.points.get(index).map(|point| (range, point))).flatten()
-    };
+fn judge(point: &ScanPoint, target: &BeamLookup<'_>, parameters: &OverlapParameters) -> Option<Judgement> {
+    let beam = target.towards(point);
     let limit = parameters.near * parameters.near;
     let distance = point.norm();
     let (mut nearest, mut farthest) = (f32::MAX, 0.0_f32);
     for beside in -BESIDE..=BESIDE {
-        let Some((range, other)) = at(beam + beside) else { continue };
-        if (other - point).norm_squared() <= limit {
+        let Some(other) = target.beam(beam + beside) else { continue };
+        if (other.point - point).norm_squared() <= limit {
             return Some(Judgement::Agrees);
         }
         if beside.abs() <= 1 {
-            nearest = nearest.min(range);
-            farthest = farthest.max(range);
+            nearest = nearest.min(other.range);
+            farthest = farthest.max(other.range);
         }
     }
     if farthest <= 0.0 {

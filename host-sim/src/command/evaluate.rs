@@ -2,7 +2,24 @@
 
 mod carpark;
 mod falko;
+mod places;
 mod warehouse;
+
+/// A log of the thesis.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Set {
+    Fr079,
+    Intel,
+}
+
+impl From<Set> for agv_host_sim::evaluate::falko::Set {
+    fn from(set: Set) -> Self {
+        match set {
+            Set::Fr079 => Self::Fr079,
+            Set::Intel => Self::Intel,
+        }
+    }
+}
 
 /// Measure on recordings and in simulation how good it is.
 #[derive(clap::Args)]
@@ -15,6 +32,7 @@ pub struct Evaluate {
 enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    Places(places::Places),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -24,6 +42,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::Places(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

@@ -1,10 +1,11 @@
 //! A scan with all that is computed of it once.
 
 use agv_core::features::falko::{Detector, Parameters};
-use agv_core::features::{Keypoint, PointScan};
+use agv_core::features::{CumulativeGaussianHistogram, Keypoint, PointScan};
 use agv_core::geometry::{Pose, ScanPoint};
 use agv_core::measurement::Time;
 
+use super::chain::histograms;
 use crate::evaluate::falko::{BEAMS, KEYPOINTS, RANGES};
 use crate::import::PosedScan;
 
@@ -15,6 +16,8 @@ pub struct DescribedScan {
     pub points: Box<PointScan<BEAMS>>,
     /// Keypoints.
     pub keypoints: Vec<Keypoint>,
+    /// Descriptors of the keypoints.
+    pub histograms: Vec<CumulativeGaussianHistogram>,
     /// When it was taken.
     pub time: Time,
     /// Pose of the laser, corrected; not for the method's eyes.
@@ -22,16 +25,24 @@ pub struct DescribedScan {
 }
 
 impl DescribedScan {
-    /// Describes scans with one set of parameters.
+    /// Describes scans with the keypoints of all these detectors.
     #[must_use]
-    pub fn all(scans: &[PosedScan], parameters: Parameters) -> Vec<Self> {
-        let mut detector = Box::new(Detector::<BEAMS>::new(parameters));
+    pub fn all(scans: &[PosedScan], parameters: &[Parameters]) -> Vec<Self> {
+        let mut detectors: Vec<_> =
+            parameters.iter().map(|parameters| Box::new(Detector::<BEAMS>::new(*parameters))).collect();
         let described = scans.iter().map(|scan| {
             let mut points = Box::new(PointScan::<BEAMS>::new());
             points.set(&scan.scan.view(), RANGES.0, RANGES.1);
-            let mut keypoints = heapless::Vec::<Keypoint, KEYPOINTS>::new();
-            detector.detect(&points, &mut keypoints);
-            Self { points, keypoints: keypoints.to_vec(), time: scan.scan.start, laser: scan.laser }
+            let mut keypoints = Vec::new();
+            let mut found = heapless::Vec::<Keypoint, KEYPOINTS>::new();
+            for detector in &mut detectors {
+                detector.detect(&points, &mut found);
+                keypoints.extend_from_slice(&found);
+            }
+            let time = scan.scan.start;
+            let mut described = Self { points, keypoints, histograms: Vec::new(), time, laser: scan.laser };
+            described.histograms = histograms(&described);
+            described
         });
         described.collect()
     }

@@ -54,8 +54,7 @@ pub fn figures(answers: &[Judged], questions: usize, is_accepted: impl Fn(&Judge
     };
     let accepted: Vec<_> = answers.iter().filter(|answer| is_accepted(answer)).collect();
     let right = accepted.iter().filter(|answer| answer.is_right);
-    let (precision, recall) =
-        rate(accepted.len(), right.clone().count(), right.filter(|answer| answer.counts).count());
+    let (precision, recall) = rate(accepted.len(), right.clone().count(), right.filter(|answer| answer.counts).count());
 
     let mut sorted: Vec<_> = answers.to_vec();
     sorted.sort_by(|a, b| b.score.total_cmp(&a.score));

@@ -48,13 +48,10 @@ impl Protocol {
             (Self::Thesis, Mode::Offline) => true,
             (Self::Thesis, Mode::Online) => {
                 let (a, b) = (&asked.laser, &offered.laser);
-                (a.x - b.x).abs() > AWAY.0
-                    || (a.y - b.y).abs() > AWAY.0
-                    || difference(a.theta, b.theta).abs() > AWAY.1
+                (a.x - b.x).abs() > AWAY.0 || (a.y - b.y).abs() > AWAY.0 || difference(a.theta, b.theta).abs() > AWAY.1
             }
             (Self::Honest, _) => {
-                query.abs_diff(candidate) > SCANS_BETWEEN
-                    && asked.time.since(offered.time).abs() > SECONDS_BETWEEN
+                query.abs_diff(candidate) > SCANS_BETWEEN && asked.time.since(offered.time).abs() > SECONDS_BETWEEN
             }
         }
     }
