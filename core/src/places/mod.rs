@@ -13,6 +13,7 @@ mod maximum_clique;
 mod place_index;
 mod random_sample;
 mod recognition;
+mod reflectors;
 mod scan_alignment;
 mod scan_overlap;
 mod surface_relations;
@@ -26,6 +27,10 @@ pub use maximum_clique::Clique;
 pub use place_index::{Candidate, PlaceIndex};
 pub use random_sample::{RandomSample, RandomSampleParameters};
 pub use recognition::{PlaceView, Recognition, RecognitionParameters, Recognizer};
+pub use reflectors::{
+    PairIndex, ReflectorAnswer, ReflectorFix, ReflectorIndex, ReflectorIndexError, ReflectorNoise,
+    ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters, RelocalizationProgress, SeenReflector,
+};
 pub use scan_alignment::{ScanAlignment, ScanAlignmentParameters, align_scans};
 pub use scan_overlap::{Overlap, OverlapParameters, overlap};
 pub use surface_relations::surface_normal;

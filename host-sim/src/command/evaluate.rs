@@ -2,6 +2,7 @@
 
 mod carpark;
 mod falko;
+mod kidnapping;
 mod places;
 mod warehouse;
 
@@ -32,6 +33,7 @@ pub struct Evaluate {
 enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
     Warehouse(warehouse::Warehouse),
 }
@@ -42,6 +44,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }

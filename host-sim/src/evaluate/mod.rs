@@ -5,6 +5,7 @@ pub mod carpark;
 pub mod demonstration;
 pub mod drive;
 pub mod falko;
+pub mod kidnapping;
 pub mod places;
 pub mod repeatability;
 pub mod warehouse;

@@ -68,6 +68,18 @@ impl WarehouseHall {
         world
     }
 
+    /// Outlines of the double racks, filled or not.
+    #[must_use]
+    pub fn racks() -> Vec<Rectangle> {
+        let length = BAYS as f64 * BAY;
+        let outline = |axis| Rectangle {
+            pose: Pose::new(RACK_START + 0.5 * length, axis, 0.0),
+            length,
+            width: 2.0 * RACK_HALF_DEPTH,
+        };
+        RACK_AXES.into_iter().map(outline).collect()
+    }
+
     fn add_rack_side(&self, world: &mut World, axis: f64, side: f64, random: &mut Random) {
         let face = axis + side * RACK_HALF_DEPTH;
         for bay in 0..=BAYS {
