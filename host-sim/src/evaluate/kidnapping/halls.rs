@@ -10,7 +10,7 @@ use crate::simulate::world::{Circle, Rectangle, Reflector, World};
 /// A hall and where a vehicle may stand in it.
 pub(super) struct Hall {
     pub world: World,
-    racks: Vec<Rectangle>,
+    keep_outs: Vec<Rectangle>,
     size: Point,
 }
 
@@ -27,7 +27,7 @@ impl Hall {
     pub(super) fn new(layout: Layout, seed: u64) -> Self {
         let mut random = Random::new(seed, Stream::World);
         match layout {
-            Layout::Warehouse | Layout::OtherHall => warehouse(seed, &mut random),
+            Layout::Warehouse | Layout::TwinHall => warehouse(seed, &mut random),
             Layout::Symmetric => symmetric(&mut random),
             Layout::Regular(deviation) => regular(deviation, &mut random),
         }
@@ -44,7 +44,7 @@ impl Hall {
             let x = random.between(CLEARANCE, self.size.x - CLEARANCE);
             let y = random.between(CLEARANCE, self.size.y - CLEARANCE);
             let heading = random.between(-std::f64::consts::PI, std::f64::consts::PI);
-            let is_free = self.racks.iter().all(|rack| {
+            let is_free = self.keep_outs.iter().all(|rack| {
                 (x - rack.pose.x).abs() > 0.5 * rack.length + CLEARANCE
                     || (y - rack.pose.y).abs() > 0.5 * rack.width + CLEARANCE
             });
@@ -70,7 +70,7 @@ fn thin_out<T>(items: &mut Vec<T>, count: usize, random: &mut Random) {
 fn warehouse(seed: u64, random: &mut Random) -> Hall {
     let mut world = WarehouseHall { seed: Some(seed), ..WarehouseHall::default() }.world(seed);
     thin_out(&mut world.reflectors, REFLECTORS, random);
-    Hall { world, racks: WarehouseHall::racks(), size: SIZE }
+    Hall { world, keep_outs: WarehouseHall::keep_outs(), size: SIZE }
 }
 
 /// A hall of closed racks along its first axis, with the sites of reflectors on rack faces, ends and walls.
@@ -121,7 +121,7 @@ fn symmetric(random: &mut Random) -> Hall {
         world.reflectors.push(reflector(moved));
         world.reflectors.push(reflector(SIZE - moved));
     }
-    Hall { world, racks, size: SIZE }
+    Hall { world, keep_outs: racks, size: SIZE }
 }
 
 fn regular(deviation: f64, random: &mut Random) -> Hall {
@@ -134,5 +134,5 @@ fn regular(deviation: f64, random: &mut Random) -> Hall {
         let moved = Point::new(moved.x.clamp(inside, LARGE_SIZE.x - inside), moved.y);
         world.reflectors.push(reflector(moved));
     }
-    Hall { world, racks, size: LARGE_SIZE }
+    Hall { world, keep_outs: racks, size: LARGE_SIZE }
 }
