@@ -4,7 +4,7 @@
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason};
-use agv_core::measurement::{EncoderSample, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use proptest::prelude::*;
 
@@ -205,6 +205,39 @@ fn an_impossible_motion_is_said_and_not_believed() {
 }
 
 #[test]
+fn an_encoder_fault_is_a_mode_whose_uncertainty_covers_what_the_vehicle_does() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    let before = drive.revolutions(4, |_| true);
+    let last_step = drive.step;
+    let mut output = before;
+    // The true vehicle brakes to a standstill with 2 m/s^2 when its encoder fails.
+    let mut way = 0.0;
+    for step in 1..=40 {
+        drive.step += 1;
+        let elapsed = f64::from(step) * 0.01;
+        way = elapsed - elapsed * elapsed;
+        let faults = EncoderFaults { time: drive.time(), drive: Some(EncoderFault::Missing), steering: None };
+        output = drive.localizer.handle(&Event::EncoderFaults(faults)).pose;
+        assert_eq!((output.mode, output.reason), (Mode::WithoutOdometry, Reason::DriveEncoder));
+        assert_eq!(output.time, drive.time());
+        let error = (output.pose.x - before.pose.x - way).abs();
+        assert!(error <= 3.0 * output.covariance[0].sqrt(), "{step}: {error}");
+    }
+    assert!(output.covariance[0].sqrt() < 0.2);
+    // Sound samples again, the counter having stood still or not: no way is invented.
+    let base = (last_step as f64 * 0.01 / TICK).round() as u32 + 77_777;
+    for _ in 0..2 {
+        drive.step += 1;
+        let sample = EncoderSample { time: drive.time(), drive: base, steering: 0 };
+        output = drive.localizer.handle(&Event::Encoders(sample)).pose;
+    }
+    assert_eq!((output.mode, output.reason), (Mode::Reflectors, Reason::None));
+    assert!((output.pose.x - before.pose.x - way).abs() <= 3.0 * output.covariance[0].sqrt());
+    assert!(output.pose.x - before.pose.x < 0.42);
+}
+
+#[test]
 fn the_same_events_give_the_same_bits() {
     let outputs = || {
         let mut drive = Drive::start();
@@ -230,6 +263,7 @@ fn any_number() -> impl Strategy<Value = f64> {
 #[derive(Clone, Debug)]
 enum Anything {
     Encoders(u64, u32, u32),
+    EncoderFaults(u64, bool, bool),
     Reflectors(Vec<(u64, f32, f32)>),
     Scan(u64, f64, f64, f64, Vec<f32>),
     SetPose(u64, f64, f64, f64, f64, f64),
@@ -244,6 +278,7 @@ fn anything() -> impl Strategy<Value = Anything> {
     prop_oneof![
         6 => (any_time(), any::<u32>(), any::<u32>()).prop_map(|(t, d, s)| Anything::Encoders(t, d, s)),
         4 => (0u64..3_000_000, 0u32..3_000, 0u32..600).prop_map(|(t, d, s)| Anything::Encoders(t, d, s)),
+        2 => (any_time(), any::<bool>(), any::<bool>()).prop_map(|(t, d, s)| Anything::EncoderFaults(t, d, s)),
         3 => proptest::collection::vec((any_time(), single(), single()), 0..20)
             .prop_map(Anything::Reflectors),
         2 => (any_time(), any_number(), any_number(), -0.1f64..0.1, proptest::collection::vec(single(), 0..400))
@@ -269,6 +304,11 @@ proptest! {
             let event = match event {
                 Anything::Encoders(time, drive, steering) => Event::Encoders(EncoderSample {
                     time: Time::from_micros(*time), drive: *drive, steering: *steering,
+                }),
+                Anything::EncoderFaults(time, drive, steering) => Event::EncoderFaults(EncoderFaults {
+                    time: Time::from_micros(*time),
+                    drive: drive.then_some(EncoderFault::Missing),
+                    steering: steering.then_some(EncoderFault::Frozen),
                 }),
                 Anything::Reflectors(seen) => {
                     observations = seen.iter().map(|&(time, range, bearing)| ReflectorObservation {

@@ -218,7 +218,8 @@ fn samples_that_cannot_be_are_refused() {
 #[test]
 fn the_stated_covariance_is_the_spread_of_noisy_controls() {
     // 20,000 draws of the controls, propagated through the integration itself.
-    let noise = OdometryNoise { speed: 0.1, steering: 0.02, slip: 0.0, side_slip: 0.0, yaw: 0.0 };
+    let noise =
+        OdometryNoise { speed: 0.1, steering: 0.02, slip: 0.0, side_slip: 0.0, yaw: 0.0, ..OdometryNoise::default() };
     let control = Control { distance: 0.3, steering_start: 0.4, steering_end: 0.45 };
     let stated = noise.of_control(&control, WHEELBASE, 0.1);
     let mut state = 0x1234_5678_9ABC_DEF0u64;

@@ -4,7 +4,10 @@
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{Event, LandmarkSource, LandmarkUse, Mode, Parameters, PoseFix, PoseOutput, Reason};
-use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
+use agv_core::measurement::{
+    EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample,
+    Time,
+};
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
     Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Raw, RawSource, Record,
@@ -22,6 +25,7 @@ enum Owned {
     Increment(PoseIncrement),
     Reflectors(Vec<ReflectorObservation>),
     Scan(Time, [f64; 3], Vec<f32>, Vec<u16>),
+    EncoderFaults(EncoderFaults),
     SetPose(PoseFix),
     Output(PoseOutput, Vec<LandmarkUse>),
     Truth(Truth),
@@ -39,6 +43,7 @@ impl Owned {
             }
             Self::Landmarks(landmarks) => Record::Landmarks(landmarks),
             Self::Encoders(sample) => Record::Event(Event::Encoders(*sample)),
+            Self::EncoderFaults(faults) => Record::Event(Event::EncoderFaults(*faults)),
             Self::Speed(sample) => Record::Event(Event::Speed(*sample)),
             Self::Increment(increment) => Record::Event(Event::Increment(*increment)),
             Self::Reflectors(observations) => Record::Event(Event::Reflectors(Reflectors { observations })),
@@ -123,8 +128,8 @@ fn landmark_kind() -> impl Strategy<Value = LandmarkKind> {
 }
 
 fn pose_output() -> impl Strategy<Value = PoseOutput> {
-    let mode = prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::Lost)];
-    let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible)];
+    let mode = prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Lost)];
+    let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible), Just(Reason::SteeringEncoder)];
     let numbers = prop::array::uniform9(number());
     (time(), pose(), mode, reason, numbers).prop_map(|(time, pose, mode, reason, [a, b, c, d, e, f, g, h, i])| {
         PoseOutput {
@@ -177,6 +182,11 @@ fn record() -> impl Strategy<Value = Owned> {
             drive,
             steering
         })),
+        (time(), any::<bool>()).prop_map(|(time, is_driving)| {
+            let (jumped, out_of_range) = (Some(EncoderFault::Jumped), Some(EncoderFault::OutOfRange));
+            let (drive, steering) = if is_driving { (jumped, None) } else { (None, out_of_range) };
+            Owned::EncoderFaults(EncoderFaults { time, drive, steering })
+        }),
         (time(), number(), number()).prop_map(|(time, speed, steering)| Owned::Speed(SpeedSample {
             time,
             speed,
@@ -206,7 +216,7 @@ fn record() -> impl Strategy<Value = Owned> {
             .prop_map(|(time, x, y, heading)| Owned::Reference(Reference { time, x, y, heading })),
         ".{0,100}".prop_map(Owned::Note),
         (any::<bool>(), time(), prop::collection::vec(any::<u8>(), 0..300)).prop_map(|(is_received, time, bytes)| {
-            Owned::Raw(if is_received { RawSource::FromNav350 } else { RawSource::ToNav350 }, time, bytes)
+            Owned::Raw(if is_received { RawSource::FromNav350 } else { RawSource::ToCan }, time, bytes)
         }),
         Just(Owned::End),
     ]
@@ -447,7 +457,7 @@ fn another_version_is_told_apart_from_damage() {
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 2, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 3, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }

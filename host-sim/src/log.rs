@@ -5,6 +5,8 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use agv_core::landmarks::Landmark;
+use agv_core::localizer::Parameters;
 use agv_core::record::{
     self, Capacities, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
     LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Output, Record, Scratch,
@@ -228,6 +230,19 @@ impl Writer {
         Ok(writer)
     }
 
+    /// Begins the log of a vehicle with a map; an older file of that name is replaced.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn begin(path: &Path, parameters: &Parameters, landmarks: &[Landmark]) -> Result<Self, LogError> {
+        let mut writer =
+            Self::create(path, &Header { software: SOFTWARE, parameters, capacities: Capacities::default() })?;
+        for piece in landmarks.chunks(LANDMARKS_A_RECORD) {
+            writer.write(&Record::Landmarks(piece))?;
+        }
+        Ok(writer)
+    }
+
     /// Goes on with a log behind its last good record. What stands behind that, and an end record, is cut off; all
     /// damage found on the way is returned.
     ///
@@ -320,11 +335,7 @@ pub fn write_with_outputs<'a>(
     recording: &Recording,
     output: impl Fn(usize) -> Option<Output<'a>>,
 ) -> Result<(), LogError> {
-    let header = Header { software: SOFTWARE, parameters: &recording.parameters, capacities: Capacities::default() };
-    let mut writer = Writer::create(path, &header)?;
-    for piece in recording.landmarks.chunks(LANDMARKS_A_RECORD) {
-        writer.write(&Record::Landmarks(piece))?;
-    }
+    let mut writer = Writer::begin(path, &recording.parameters, &recording.landmarks)?;
     let mut truth = recording.truth.iter().peekable();
     let mut references = recording.references.iter().peekable();
     for (index, event) in recording.events.iter().enumerate() {

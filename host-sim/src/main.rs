@@ -29,6 +29,7 @@ Examples:
 #[derive(Subcommand)]
 enum Command {
     Import(command::import::Import),
+    Export(command::export::Export),
     Simulate(command::simulate::Simulate),
     Replay(command::replay::Replay),
     Map(command::map::Map),
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
     let outcome = match arguments.command {
         None => arguments.demonstration.run(),
         Some(Command::Import(command)) => command.run(),
+        Some(Command::Export(command)) => command.run(),
         Some(Command::Simulate(command)) => command.run(),
         Some(Command::Replay(command)) => command.run(),
         Some(Command::Map(command)) => command.run(),

@@ -3,7 +3,9 @@
 use agv_core::geometry::Pose;
 use agv_core::landmarks::Landmark;
 use agv_core::localizer::{Event, LandmarkUse, Parameters, PoseFix, PoseOutput};
-use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time};
+use agv_core::measurement::{
+    EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
+};
 use agv_core::record::Output;
 pub use agv_core::record::{Reference, Truth};
 
@@ -44,6 +46,8 @@ impl RecordedScan {
 pub enum RecordedEvent {
     /// Counters of a tricycle's encoders.
     Encoders(EncoderSample),
+    /// What is wrong with a tricycle's encoders.
+    EncoderFaults(EncoderFaults),
     /// Speed and steering angle.
     Speed(SpeedSample),
     /// Motion that the vehicle has integrated itself.
@@ -62,6 +66,7 @@ impl RecordedEvent {
     pub fn view(&self) -> Event<'_> {
         match self {
             Self::Encoders(sample) => Event::Encoders(*sample),
+            Self::EncoderFaults(faults) => Event::EncoderFaults(*faults),
             Self::Speed(sample) => Event::Speed(*sample),
             Self::Increment(increment) => Event::Increment(*increment),
             Self::Reflectors(observations) => Event::Reflectors(Reflectors { observations }),
@@ -77,6 +82,7 @@ impl RecordedEvent {
     pub fn time(&self) -> Option<Time> {
         match self {
             Self::Encoders(sample) => Some(sample.time),
+            Self::EncoderFaults(faults) => Some(faults.time),
             Self::Speed(sample) => Some(sample.time),
             Self::Increment(increment) => Some(increment.time),
             Self::Reflectors(observations) => observations.first().map(|observation| observation.time),
@@ -90,6 +96,7 @@ impl From<Event<'_>> for RecordedEvent {
     fn from(event: Event<'_>) -> Self {
         match event {
             Event::Encoders(sample) => Self::Encoders(sample),
+            Event::EncoderFaults(faults) => Self::EncoderFaults(faults),
             Event::Speed(sample) => Self::Speed(sample),
             Event::Increment(increment) => Self::Increment(increment),
             Event::Reflectors(reflectors) => Self::Reflectors(reflectors.observations.to_vec()),

@@ -1,9 +1,12 @@
 //! The project's own commands: `cargo xtask --help`.
 
+mod firmware;
+mod fuzz;
 mod packages;
 mod seeds;
 mod test;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -17,12 +20,16 @@ struct Xtask {
 
 #[derive(Subcommand)]
 enum Command {
+    Firmware(firmware::Firmware),
+    Fuzz(fuzz::Fuzz),
     Seeds(seeds::Seeds),
     Test(test::Test),
 }
 
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
+        Command::Firmware(firmware) => firmware.run(),
+        Command::Fuzz(fuzz) => fuzz.run(),
         Command::Seeds(seeds) => seeds.run(),
         Command::Test(test) => test.run(),
     };
@@ -33,4 +40,10 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The top of the repository.
+fn repository() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
 }

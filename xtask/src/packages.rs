@@ -13,7 +13,12 @@ struct Requirement {
     packages: &'static [&'static str],
 }
 
-const REQUIREMENTS: [Requirement; 2] = [
+const REQUIREMENTS: [Requirement; 3] = [
+    Requirement {
+        purpose: "the firmware in emulation",
+        probe: &["qemu-system-arm", "--version"],
+        packages: &["qemu-system-arm"],
+    },
     Requirement {
         purpose: "the script that scores keypoints apart from this program",
         probe: &["python3", "-c", "import numpy, scipy, shapely"],
@@ -75,17 +80,7 @@ pub fn prepare() -> Vec<String> {
         return Vec::new();
     }
     let packages: Vec<&str> = missing.iter().flat_map(|requirement| requirement.packages).copied().collect();
-    if is_root() && succeeds(Command::new("apt-get").arg("--version")) {
-        eprintln!("installing {}", packages.join(" "));
-        let install = |arguments: &[&str]| {
-            succeeds(Command::new("apt-get").args(arguments).env("DEBIAN_FRONTEND", "noninteractive"))
-        };
-        let options = ["install", "--yes", "--no-install-recommends"];
-        if !install(&[&options[..], &packages].concat()) {
-            install(&["update"]);
-            install(&[&options[..], &packages].concat());
-        }
-    }
+    install(&packages);
     let still_missing = missing.iter().filter(|requirement| !requirement.is_met());
     still_missing
         .map(|requirement| {
@@ -93,6 +88,21 @@ pub fn prepare() -> Vec<String> {
             format!("missing: {}; install the Debian packages {packages}", requirement.purpose)
         })
         .collect()
+}
+
+/// Installs Debian packages, if this is Debian and this user may.
+pub fn install(packages: &[&str]) {
+    if !(is_root() && succeeds(Command::new("apt-get").arg("--version"))) {
+        return;
+    }
+    eprintln!("installing {}", packages.join(" "));
+    let install =
+        |arguments: &[&str]| succeeds(Command::new("apt-get").args(arguments).env("DEBIAN_FRONTEND", "noninteractive"));
+    let options = ["install", "--yes", "--no-install-recommends"];
+    if !install(&[&options[..], packages].concat()) {
+        install(&["update"]);
+        install(&[&options[..], packages].concat());
+    }
 }
 
 fn is_root() -> bool {

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
+use crate::repository;
+
 /// Make the seeds of the fuzz targets from recorded telegrams
 #[derive(clap::Args)]
 pub struct Seeds {}
@@ -14,7 +16,7 @@ const TARGETS: [&str; 2] = ["cola_a", "cola_b"];
 impl Seeds {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let repository = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("there is no repository")?;
+        let repository = repository();
         let data = match std::env::var_os("AGV_DATA") {
             Some(stated) => PathBuf::from(stated),
             None => repository.join("../shared/data"),
@@ -50,9 +52,46 @@ impl Seeds {
                 count += 1;
             }
         }
+        let frames = write_frames(&data, &corpus)?;
         println!("telegrams  {count}");
+        println!("frames     {frames}");
         Ok(())
     }
+}
+
+/// The recorded talk with a CANopen drive, for the targets that read frames. Returns how many frames there are.
+fn write_frames(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
+    let file = data.join("can/candump_ros_canopen_380.log");
+    let text = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+    let frames: Vec<_> = text.lines().filter_map(frame).collect();
+    for target in ["canopen", "slcan"] {
+        std::fs::create_dir_all(corpus.join(target))?;
+    }
+    // A talk is more than its frames: pieces of growing length.
+    for (number, talk) in frames.chunks(1).chain(frames.chunks(8)).chain(frames.chunks(64)).enumerate() {
+        let mut packed = Vec::new();
+        let mut lines = Vec::new();
+        for (id, bytes) in talk {
+            packed.extend([200, 0]);
+            packed.extend(id.to_le_bytes());
+            packed.push(bytes.len() as u8);
+            packed.extend(bytes.iter().chain(&[0; 8]).take(8));
+            lines.extend(format!("t{id:03X}{}", bytes.len()).into_bytes());
+            lines.extend(bytes.iter().flat_map(|byte| format!("{byte:02X}").into_bytes()));
+            lines.push(b'\r');
+        }
+        std::fs::write(corpus.join("canopen").join(format!("talk{number}")), packed)?;
+        std::fs::write(corpus.join("slcan").join(format!("talk{number}")), lines)?;
+    }
+    Ok(frames.len())
+}
+
+/// Identifier and data of a line `can0 589 [8] 4B 77 ...`.
+fn frame(line: &str) -> Option<(u16, Vec<u8>)> {
+    let mut words = line.split_ascii_whitespace().skip(1);
+    let id = u16::from_str_radix(words.next()?, 16).ok()?;
+    let bytes: Option<Vec<u8>> = words.skip(1).map(|word| u8::from_str_radix(word, 16).ok()).collect();
+    Some((id, bytes.filter(|bytes| bytes.len() <= 8)?))
 }
 
 /// The bytes of a line `... DIR HEX ...`.

@@ -1,18 +1,19 @@
 //! `cargo xtask test`.
 
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
 
-use crate::packages;
+use crate::fuzz::Fuzz;
+use crate::{firmware, packages, repository};
 
 /// Run all tests.
 #[derive(clap::Args)]
 pub struct Test {
-    /// More seeds and longer drives: sets `AGV_LONG` for the tests.
+    /// More seeds and longer drives: sets `AGV_LONG` for the tests. Runs every fuzz target for a minute.
     #[arg(long)]
     long: bool,
 }
@@ -42,6 +43,9 @@ impl Test {
     pub fn run(self) -> anyhow::Result<()> {
         let mut missing = packages::prepare();
         missing.extend(packages::prepare_python(&repository().join("target/python")));
+        // The tests in emulation run these images.
+        firmware::build()?;
+        firmware::check_sizes()?;
         let mut summary = Vec::new();
         let mut remarks = missing;
         let mut is_ok = true;
@@ -68,7 +72,7 @@ impl Test {
             bail!("the tests failed");
         }
         println!("all tests passed");
-        Ok(())
+        if self.long { Fuzz::all(60).run() } else { Ok(()) }
     }
 
     fn run_part(&self, part: &Part) -> anyhow::Result<Outcome> {
@@ -110,12 +114,6 @@ impl Outcome {
             self.failed.push(name.to_owned());
         }
     }
-}
-
-/// The top of the repository.
-fn repository() -> &'static Path {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here)
 }
 
 #[cfg(test)]

@@ -35,14 +35,26 @@ impl Ekf {
         Self { pose, covariance: Matrix3::from_diagonal(&nalgebra::Vector3::new(position, position, heading)) }
     }
 
-    /// Prediction, K 5.3 and 5.4.
+    /// Prediction, K 5.3 and 5.4: `F P F' + G Q G'`, written out, as `F` differs from identity in two places and `G`
+    /// turns by the heading.
     pub fn predict(&mut self, motion: &Motion) {
-        let by_pose = self.pose.compose_jacobian_first(&motion.displacement);
-        let by_motion = self.pose.compose_jacobian_second();
-        self.covariance =
-            by_pose * self.covariance * by_pose.transpose() + by_motion * motion.covariance * by_motion.transpose();
-        self.symmetrise();
-        self.pose = self.pose.compose(&motion.displacement);
+        let (sine, cosine) = libm::sincos(self.pose.theta);
+        let step = motion.displacement;
+        let (x, y) = (cosine * step.x - sine * step.y, sine * step.x + cosine * step.y);
+        let (p, q) = (&self.covariance, &motion.covariance);
+        // The heading's error moves the end of the step sideways.
+        let (x_heading, y_heading) = (p.m13 - y * p.m33, p.m23 + x * p.m33);
+        let xx = p.m11 - y * (p.m13 + x_heading);
+        let xy = p.m12 - y * p.m23 + x * x_heading;
+        let yy = p.m22 + x * (p.m23 + y_heading);
+        let (cross_x, cross_y) = (cosine * q.m13 - sine * q.m23, sine * q.m13 + cosine * q.m23);
+        let (along, across, both) = (cosine * cosine, sine * sine, sine * cosine);
+        let xx = xx + along * q.m11 - 2.0 * both * q.m12 + across * q.m22;
+        let xy = xy + both * (q.m11 - q.m22) + (along - across) * q.m12;
+        let yy = yy + across * q.m11 + 2.0 * both * q.m12 + along * q.m22;
+        let (x_heading, y_heading) = (x_heading + cross_x, y_heading + cross_y);
+        self.covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, p.m33 + q.m33);
+        self.pose = Pose::new(self.pose.x + x, self.pose.y + y, self.pose.theta + step.theta);
     }
 
     /// The innovation of an observation that was linearised at this pose. None if its covariance is singular or not

@@ -133,12 +133,10 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.append(rest);
     }
 
-    /// Goes on to `time` with the velocity of the last motion, where the odometry has said nothing that can be believed.
-    pub fn hold(&mut self, time: Time) {
-        if time > self.last_motion.end {
-            let motion = self.last_motion.extrapolate(time);
-            self.advance(&motion);
-        }
+    /// The last motion that the odometry reported.
+    #[must_use]
+    pub fn last_motion(&self) -> &Motion {
+        &self.last_motion
     }
 
     /// The state at `time`, from the entry before it and the odometry.

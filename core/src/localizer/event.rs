@@ -1,12 +1,15 @@
 //! What the localiser is told.
 
-use crate::measurement::{EncoderSample, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample};
+use crate::measurement::{EncoderFaults, EncoderSample, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample};
 
 /// One thing that a sensor or an operator said, with the time at which it was true.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event<'a> {
     /// Counters of a tricycle's encoders.
     Encoders(EncoderSample),
+    /// What is wrong with a tricycle's encoders: when it changes, and again and again while there is a fault, as
+    /// nothing else tells the time then.
+    EncoderFaults(EncoderFaults),
     /// Speed and steering angle.
     Speed(SpeedSample),
     /// Motion that the vehicle has integrated itself.

@@ -10,8 +10,8 @@ use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, detect_refl
 use crate::filter::{Cartesian, Consistency, Ekf, Observation, RangeBearing, Timeline};
 use crate::geometry::{Point, Pose, difference};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
-use crate::measurement::{ReflectorObservation, Scan, Time};
-use crate::odometry::{Motion, Odometer, OdometryError};
+use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
+use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const ENTRIES: usize = 160;
@@ -33,7 +33,7 @@ pub struct Localizer<
     timeline: Option<Timeline<ENTRIES>>,
     consistency: Consistency,
     lost: Option<Reason>,
-    is_odometry_implausible: bool,
+    blindness: Option<Blindness>,
     distance: DistanceSince,
     workspace: Workspace<BEAMS>,
     outputs: Outputs,
@@ -59,6 +59,13 @@ struct Sighting {
     /// What is left to do for the dynamic map: the landmark that it belongs to, or none if it is new.
     matched: Option<u16>,
     verdict: Verdict,
+}
+
+/// The odometry is not believed.
+#[derive(Clone, Copy, Debug)]
+struct Blindness {
+    reason: Reason,
+    coasting: Coasting,
 }
 
 /// Way since something last happened, m.
@@ -114,7 +121,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             timeline: None,
             consistency: Consistency::new(parameters.consistency),
             lost: None,
-            is_odometry_implausible: false,
+            blindness: None,
             distance: DistanceSince::NEVER,
             workspace: Workspace {
                 points: PointScan::new(),
@@ -173,6 +180,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 let motion = self.odometer.encoders(sample);
                 self.move_by(sample.time, motion);
             }
+            Event::EncoderFaults(faults) => self.doubt_encoders(faults),
             Event::Speed(sample) => {
                 let motion = self.odometer.speed(sample);
                 self.move_by(sample.time, motion);
@@ -203,7 +211,8 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
         self.timeline = Some(Timeline::new(fix.time, state, self.parameters.laser, limits.longest_extrapolation));
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
-        self.is_odometry_implausible = false;
+        self.blindness =
+            self.blindness.map(|blindness| Blindness { coasting: Coasting::new(Motion::none(fix.time)), ..blindness });
         self.distance = DistanceSince { fix: 0.0, ..DistanceSince::NEVER };
         self.maps.dynamic.clear();
     }
@@ -216,16 +225,45 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             // A pose may be given for a time between two samples; only what follows it counts.
             Ok(motion) if motion.end > timeline.start() => {
                 let motion = if motion.start < timeline.start() { motion.split(timeline.start()).1 } else { motion };
-                self.is_odometry_implausible = false;
+                self.blindness = None;
                 self.distance.advance(motion.distance);
                 timeline.advance(&motion);
             }
-            Err(OdometryError::Implausible) => {
-                self.is_odometry_implausible = true;
-                timeline.hold(time);
+            Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
+            // The first sample behind a fault: the next one says how the vehicle moves.
+            Err(OdometryError::First) => {
+                if let Some(blindness) = self.blindness {
+                    self.coast(time, blindness.reason);
+                }
             }
             _ => {}
         }
+    }
+
+    fn doubt_encoders(&mut self, faults: &EncoderFaults) {
+        let reason = match (faults.drive, faults.steering) {
+            (Some(_), _) => Reason::DriveEncoder,
+            (None, Some(_)) => Reason::SteeringEncoder,
+            // Samples follow, and end the blindness.
+            (None, None) => return,
+        };
+        // What the counters did meanwhile is not to be taken for a motion.
+        self.odometer.restart();
+        self.coast(faults.time, reason);
+    }
+
+    /// Goes on to `time` without the odometry.
+    fn coast(&mut self, time: Time, reason: Reason) {
+        let Some(timeline) = &mut self.timeline else {
+            return;
+        };
+        let mut coasting =
+            self.blindness.map_or_else(|| Coasting::new(*timeline.last_motion()), |blindness| blindness.coasting);
+        if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
+            self.distance.advance(motion.distance);
+            timeline.advance(&motion);
+        }
+        self.blindness = Some(Blindness { reason, coasting });
     }
 
     fn scan(&mut self, scan: &Scan) {
@@ -359,15 +397,14 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
         }
         let by_reflectors = distance.reflector <= limits.dead_reckoning_from;
         let by_features = distance.feature <= limits.dead_reckoning_from;
-        let (mode, reason) = match (self.lost, by_reflectors, by_features) {
-            (Some(reason), _, _) => (Mode::Lost, reason),
-            (None, true, true) => (Mode::Mixed, Reason::None),
-            (None, true, false) => (Mode::Reflectors, Reason::None),
-            (None, false, true) => (Mode::Features, Reason::None),
-            (None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
+        let (mode, reason) = match (self.lost, self.blindness, by_reflectors, by_features) {
+            (Some(reason), ..) => (Mode::Lost, reason),
+            (None, Some(blindness), ..) => (Mode::WithoutOdometry, blindness.reason),
+            (None, None, true, true) => (Mode::Mixed, Reason::None),
+            (None, None, true, false) => (Mode::Reflectors, Reason::None),
+            (None, None, false, true) => (Mode::Features, Reason::None),
+            (None, None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
         };
-        let reason =
-            if self.is_odometry_implausible && self.lost.is_none() { Reason::OdometryImplausible } else { reason };
         let covariance = &state.covariance;
         self.outputs.pose = PoseOutput {
             time: timeline.now(),

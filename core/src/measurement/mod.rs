@@ -1,12 +1,14 @@
 //! What a sensor said, and when it was true.
 
 mod encoder;
+mod encoder_fault;
 mod pose_fix;
 mod reflectors;
 mod scan;
 mod time;
 
 pub use encoder::{EncoderSample, PoseIncrement, SpeedSample};
+pub use encoder_fault::{EncoderFault, EncoderFaults};
 pub use pose_fix::PoseFix;
 pub use reflectors::{ReflectorObservation, Reflectors};
 pub use scan::Scan;

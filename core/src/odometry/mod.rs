@@ -1,5 +1,6 @@
 //! The vehicle's own account of its motion.
 
+mod coasting;
 mod counter;
 mod integration;
 mod motion;
@@ -7,6 +8,7 @@ mod noise;
 mod odometer;
 mod vehicle;
 
+pub use coasting::Coasting;
 pub use counter::CounterRange;
 pub use integration::{Control, Integration};
 pub use motion::Motion;

@@ -20,12 +20,24 @@ pub struct OdometryNoise {
     pub side_slip: f64,
     /// Random walk of the heading, rad for a square root of a metre.
     pub yaw: f64,
+    /// Standard deviation of the acceleration of a vehicle whose odometry is not believed, m/s^2.
+    pub unknown_acceleration: f64,
+    /// Standard deviation of the angular acceleration of such a vehicle, rad/s^2.
+    pub unknown_turn: f64,
 }
 
 impl Default for OdometryNoise {
     /// A vehicle that was calibrated with some care.
     fn default() -> Self {
-        Self { speed: 0.0, steering: 2e-4, slip: 6e-3, side_slip: 1e-3, yaw: 1.5e-3 }
+        Self {
+            speed: 0.0,
+            steering: 2e-4,
+            slip: 6e-3,
+            side_slip: 1e-3,
+            yaw: 1.5e-3,
+            unknown_acceleration: 1.0,
+            unknown_turn: 0.5,
+        }
     }
 }
 

@@ -55,6 +55,11 @@ impl Odometer {
         Self { vehicle, noise, integration, fastest, last: None }
     }
 
+    /// Forgets the last sample: what comes next cannot be compared with it.
+    pub fn restart(&mut self) {
+        self.last = None;
+    }
+
     /// The motion since the last sample of the two counters.
     ///
     /// # Errors

@@ -75,10 +75,14 @@ pub enum Record<'a> {
 /// Where raw bytes come from or go to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RawSource {
-    /// From a NAV350 to the host.
+    /// From a NAV350 to the host; nothing where a connection begins.
     FromNav350,
     /// From the host to a NAV350.
     ToNav350,
+    /// From others on a CAN bus: one frame as a line of SLCAN, or nothing where the bus was only looked after.
+    FromCan,
+    /// From the host to a CAN bus: one frame as a line of SLCAN.
+    ToCan,
 }
 
 /// Greatest number of bytes in one raw record; more are written in pieces.
@@ -146,6 +150,7 @@ mod kind {
     pub const NOTE: u8 = 11;
     pub const END: u8 = 12;
     pub const RAW: u8 = 13;
+    pub const ENCODER_FAULTS: u8 = 14;
 }
 
 /// What stands before the beams of a scan.
@@ -177,6 +182,7 @@ impl Record<'_> {
             Self::Header(_) => kind::HEADER,
             Self::Landmarks(_) => kind::LANDMARKS,
             Self::Event(Event::Encoders(_)) => kind::ENCODERS,
+            Self::Event(Event::EncoderFaults(_)) => kind::ENCODER_FAULTS,
             Self::Event(Event::Speed(_)) => kind::SPEED,
             Self::Event(Event::Increment(_)) => kind::INCREMENT,
             Self::Event(Event::Reflectors(_)) => kind::REFLECTORS,
@@ -202,6 +208,7 @@ impl Record<'_> {
             Self::Landmarks(landmarks) if landmarks.len() > LANDMARKS_A_RECORD => return Err(EncodeError::TooLong),
             Self::Landmarks(landmarks) => put_all(landmarks, room),
             Self::Event(Event::Encoders(sample)) => put(sample, room),
+            Self::Event(Event::EncoderFaults(faults)) => put(faults, room),
             Self::Event(Event::Speed(sample)) => put(sample, room),
             Self::Event(Event::Increment(increment)) => put(increment, room),
             Self::Event(Event::Reflectors(reflectors)) => put_all(reflectors.observations, room),
@@ -236,6 +243,7 @@ impl Record<'_> {
                 Record::Landmarks(&scratch.landmarks)
             }
             kind::ENCODERS => Record::Event(Event::Encoders(take(payload)?)),
+            kind::ENCODER_FAULTS => Record::Event(Event::EncoderFaults(take(payload)?)),
             kind::SPEED => Record::Event(Event::Speed(take(payload)?)),
             kind::INCREMENT => Record::Event(Event::Increment(take(payload)?)),
             kind::REFLECTORS => {

@@ -16,6 +16,9 @@ pub enum Mode {
     Mixed,
     /// Odometry alone, since more than the tolerated distance.
     DeadReckoning,
+    /// Landmarks alone: the odometry is not believed. Between landmarks the vehicle is assumed to go on as it did,
+    /// with an uncertainty that soon makes the pose useless; the vehicle should stop.
+    WithoutOdometry,
     /// The pose is wrong or too uncertain; it must be given again.
     Lost,
 }
@@ -38,4 +41,8 @@ pub enum Reason {
     Uncertain,
     /// The odometry reported a motion that is not possible.
     OdometryImplausible,
+    /// The encoder of the driving wheel has a fault.
+    DriveEncoder,
+    /// The encoder of the steering has a fault.
+    SteeringEncoder,
 }

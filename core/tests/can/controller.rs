@@ -2,6 +2,7 @@
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Mode, PoseFix, PoseOutput, Reason};
+use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{
@@ -9,7 +10,6 @@ use agv_core::wire::can::controller::{
     contents,
 };
 use agv_core::wire::can::frame::{Frame, standard_id};
-use agv_core::wire::can::supervision::EncoderFault;
 use proptest::prelude::*;
 
 use crate::frames::{any_classic, frame};

@@ -3,6 +3,7 @@
 
 mod canopen;
 mod controller;
+mod controller_node;
 mod drive_unit;
 mod encoder;
 mod frames;

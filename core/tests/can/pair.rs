@@ -1,11 +1,14 @@
 //! Two encoders as one measurement.
 
-use agv_core::measurement::{EncoderSample, Time};
+use agv_core::geometry::Pose;
+use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, Reason};
+use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
+use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderFaults, EncoderPair};
+use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair, FAULT_PERIOD};
 use agv_core::wire::can::frame::Frame;
-use agv_core::wire::can::supervision::{EncoderFault, SupervisionLimits};
+use agv_core::wire::can::supervision::SupervisionLimits;
 
 use crate::frames::frame;
 use crate::node::Node;
@@ -111,7 +114,7 @@ fn no_sample_while_an_encoder_is_faulty_and_no_false_way_after_a_jump() {
         bench.report(millisecond, raw, 0, 0);
         let faults = bench.pair.faults(at(millisecond));
         let expected = (40..=60).contains(&step).then_some(EncoderFault::Jumped);
-        assert_eq!(faults, EncoderFaults { drive: expected, steering: None }, "{step}");
+        assert_eq!((faults.drive, faults.steering), (expected, None), "{step}");
         millisecond += 10;
     }
     assert_eq!(bench.samples.len(), 40 + 39);
@@ -136,9 +139,13 @@ fn one_missing_encoder_is_told_from_the_other() {
     }
     let count = bench.samples.len();
     // The steering spoke last at 120 ms.
-    assert_eq!(bench.pair.faults(at(145)), EncoderFaults::default());
-    assert_eq!(bench.pair.faults(at(146)), EncoderFaults { drive: None, steering: Some(EncoderFault::Late) });
-    assert_eq!(bench.pair.faults(at(166)), EncoderFaults { drive: None, steering: Some(EncoderFault::Missing) });
+    assert!(!bench.pair.faults(at(145)).any());
+    let steering_fault = |faults: EncoderFaults| {
+        assert_eq!(faults.drive, None);
+        faults.steering
+    };
+    assert_eq!(steering_fault(bench.pair.faults(at(146))), Some(EncoderFault::Late));
+    assert_eq!(steering_fault(bench.pair.faults(at(166))), Some(EncoderFault::Missing));
     assert_eq!(count, 10);
 }
 
@@ -155,5 +162,108 @@ fn an_emergency_holds_until_it_is_over() {
         bench.report(millisecond, 0, 0, 0);
         let expected = (50..=139).contains(&step).then_some(EncoderFault::Reported);
         assert_eq!(bench.pair.faults(at(millisecond)).steering, expected, "{step}");
+    }
+}
+
+#[test]
+fn faults_are_told_when_they_change_and_while_they_last() {
+    let mut bench = Bench::start(Reporting::Timer { period: 10 });
+    let mut told = Vec::new();
+    for millisecond in 30..600 {
+        let is_silent = (100..200).contains(&millisecond);
+        if millisecond % 10 == 0 && !is_silent {
+            bench.report(millisecond, 0, 0, 0);
+        }
+        told.extend(bench.pair.poll_faults(at(millisecond)));
+    }
+    let reported: Vec<_> = told.iter().map(|faults| (faults.time, faults.drive)).collect();
+    // The last reading was at 90 ms.
+    assert_eq!(reported[0], (at(116), Some(EncoderFault::Late)));
+    assert!(reported.contains(&(at(136), Some(EncoderFault::Missing))));
+    assert!(told.windows(2).all(|pair| pair[1].time.since(pair[0].time) <= FAULT_PERIOD + 1e-9), "{reported:?}");
+    // The reading at 200 ms ended it; then the recovery time of 200 ms goes by.
+    let last = told.last().unwrap();
+    assert!(!last.any());
+    assert_eq!(last.time, at(400));
+}
+
+fn localizer() -> Box<Localizer<16, 16, 16, 16>> {
+    let vehicle = Vehicle::Tricycle(Tricycle {
+        wheelbase: 1.5,
+        drive_scale: 1e-4,
+        drive_range: CounterRange::BITS_24,
+        steering_scale: 1e-3,
+        steering_range: CounterRange::BITS_24,
+        steering_offset_forward: 0.0,
+        steering_offset_backward: 0.0,
+    });
+    let mut localizer = Box::new(Localizer::new(Parameters::new(vehicle, Pose::new(0.9, 0.0, 0.0))));
+    let fix = PoseFix { time: at(25), pose: Pose::default(), position_deviation: 0.01, heading_deviation: 0.001 };
+    localizer.handle(&Event::SetPose(fix));
+    localizer
+}
+
+/// What befalls the encoders of a vehicle that drives 1 m/s, from 1 s on.
+#[derive(Clone, Copy, Debug)]
+enum Trouble {
+    DriveSilent,
+    SteeringSilent,
+    DriveFrozen,
+    DriveJump,
+    SteeringOutOfRange,
+    DriveEmergency,
+}
+
+#[test]
+fn every_trouble_is_a_mode_with_its_reason_within_50_ms() {
+    use Trouble::{DriveEmergency, DriveFrozen, DriveJump, DriveSilent, SteeringOutOfRange, SteeringSilent};
+    for (trouble, reason) in [
+        (DriveSilent, Reason::DriveEncoder),
+        (SteeringSilent, Reason::SteeringEncoder),
+        (DriveFrozen, Reason::DriveEncoder),
+        (DriveJump, Reason::DriveEncoder),
+        (SteeringOutOfRange, Reason::SteeringEncoder),
+        (DriveEmergency, Reason::DriveEncoder),
+    ] {
+        let mut bench = Bench::start(Reporting::Timer { period: 10 });
+        let mut localizer = localizer();
+        let mut changed = None;
+        for millisecond in 30..1200u64 {
+            let is_troubled = millisecond >= 1000;
+            let now = at(millisecond);
+            if millisecond % 10 == 0 {
+                let ticks = (10 * (millisecond - 30)) as u32;
+                let drive = match trouble {
+                    DriveFrozen if is_troubled => 9_600,
+                    DriveJump if is_troubled => ticks + 1_000_000,
+                    _ => ticks,
+                };
+                // The other encoder's range is 24 bits.
+                let steering = if matches!(trouble, SteeringOutOfRange) && is_troubled { u32::MAX } else { 0 };
+                if !(matches!(trouble, DriveSilent) && is_troubled) {
+                    bench.hear(&bench.nodes[0].position(drive), now);
+                }
+                if !(matches!(trouble, SteeringSilent) && is_troubled) {
+                    bench.hear(&bench.nodes[1].position(steering), now);
+                }
+            }
+            if matches!(trouble, DriveEmergency) && millisecond == 1000 {
+                bench.hear(&frame("081#1050050000000000"), now);
+            }
+            for sample in bench.samples.drain(..) {
+                localizer.handle(&Event::Encoders(sample));
+            }
+            if let Some(faults) = bench.pair.poll_faults(now) {
+                localizer.handle(&Event::EncoderFaults(faults));
+            }
+            let output = localizer.outputs().pose;
+            if output.mode == Mode::WithoutOdometry && changed.is_none() {
+                changed = Some((millisecond, output.reason));
+            }
+            assert!(is_troubled || output.mode == Mode::DeadReckoning, "{trouble:?} {millisecond} {output:?}");
+        }
+        let (millisecond, told) = changed.unwrap_or_else(|| panic!("{trouble:?} was not told"));
+        assert_eq!(told, reason, "{trouble:?}");
+        assert!(millisecond <= 1050, "{trouble:?}: {millisecond}");
     }
 }

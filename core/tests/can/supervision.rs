@@ -1,8 +1,9 @@
 //! Faults are found in time, and only faults.
 
+use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
 use agv_core::odometry::CounterRange;
-use agv_core::wire::can::supervision::{EncoderFault, SupervisionLimits, Supervisor};
+use agv_core::wire::can::supervision::{SupervisionLimits, Supervisor};
 use proptest::prelude::*;
 
 /// Ticks of a metre: a tick is a tenth of a millimetre.

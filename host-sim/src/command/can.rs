@@ -3,29 +3,43 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use agv_core::localizer::Event;
 use agv_core::measurement::{EncoderSample, Time};
-use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_core::wire::can::canopen::{Message, NodeId};
-use agv_core::wire::can::controller::{Content, PoseReceiver};
+use agv_core::wire::can::controller::{Content, PoseReceiver, PublishedPose};
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
 use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_core::wire::can::frame::{AnyFrame, Frame};
 use agv_core::wire::can::sdo::{Object, Request, Response};
 use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::bus::{self, Bus};
-use agv_host_sim::emulate::encoder::EmulatedEncoder;
+use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::import::candump;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use anyhow::Context;
+use serde_json::json;
+
+use super::encoder_arguments::node;
+
+const HELP: &str = "\
+A bus is an interface of SocketCAN, or an adapter that speaks SLCAN.
+
+Examples:
+  agv can monitor can0
+  agv can encoders slcan:/dev/ttyACM0@500000 --drive 1 --steering 2
+  agv can pose slcan-tcp:localhost:3333 --json
+  agv can serve-encoders vcan0 --scenario host-sim/scenarios/block_storage_p1.toml";
 
 /// Take part in a CAN bus: can0, slcan:/dev/ttyACM0@500000, slcan-tcp:HOST:PORT
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct Can {
     #[command(subcommand)]
     action: Action,
+    /// Print one JSON object a line.
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(clap::Subcommand)]
@@ -109,17 +123,13 @@ struct ServeEncoders {
     seconds: Option<f64>,
 }
 
-fn node(text: &str) -> Result<NodeId, String> {
-    text.parse().ok().and_then(NodeId::new).ok_or_else(|| "a node is a number from 1 to 127".to_owned())
-}
-
 impl Can {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.action {
-            Action::Monitor(command) => command.run(),
-            Action::Encoders(command) => command.run(),
-            Action::Pose(command) => command.run(),
+            Action::Monitor(command) => command.run(self.json),
+            Action::Encoders(command) => command.run(self.json),
+            Action::Pose(command) => command.run(self.json),
             Action::ServeEncoders(command) => command.run(),
         }
     }
@@ -159,13 +169,19 @@ const LISTENING: Duration = Duration::from_millis(500);
 const STEP: Duration = Duration::from_millis(1);
 
 impl Monitor {
-    fn run(self) -> anyhow::Result<()> {
+    fn run(self, as_json: bool) -> anyhow::Result<()> {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         while !clock.is_over() {
             let Some(frame) = clock.receive(&mut *bus, LISTENING)? else { continue };
             let meaning = frame.classic().and_then(|frame| meaning(frame, self.controller)).unwrap_or_default();
             let line = candump::screen_line(&self.bus, &frame);
+            if as_json {
+                let time = Some(clock.now());
+                let seen = candump::SeenFrame { time, interface: self.bus.clone(), frame };
+                println!("{}", json!({ "frame": candump::log_line(&seen), "meaning": meaning }));
+                continue;
+            }
             println!("{}", format!("{line:<56}  {meaning}").trim_end());
         }
         Ok(())
@@ -216,7 +232,7 @@ fn response(bytes: [u8; 8]) -> String {
 }
 
 impl Encoders {
-    fn run(self) -> anyhow::Result<()> {
+    fn run(self, as_json: bool) -> anyhow::Result<()> {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         let reporting = if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
@@ -233,13 +249,25 @@ impl Encoders {
             if let Some(frame) = clock.receive(&mut *bus, STEP)?
                 && let Some(sample) = frame.classic().and_then(|frame| pair.handle(frame, clock.now()))
             {
-                println!("{:12.6}  drive {:10}  steering {:10}", sample.time.seconds(), sample.drive, sample.steering);
+                if as_json {
+                    let EncoderSample { time, drive, steering } = sample;
+                    println!("{}", json!({ "time_s": time.seconds(), "drive": drive, "steering": steering }));
+                } else {
+                    let time = sample.time.seconds();
+                    println!("{time:12.6}  drive {:10}  steering {:10}", sample.drive, sample.steering);
+                }
             }
             let now = clock.now();
-            let state = (pair.states(), pair.faults(now));
+            let faults = pair.faults(now);
+            let state = (pair.states(), [faults.drive, faults.steering]);
             if known.replace(state) != Some(state) {
                 let (states, faults) = state;
-                println!("{:12.6}  states {states:?}, faults {:?} {:?}", now.seconds(), faults.drive, faults.steering);
+                if as_json {
+                    let states = states.map(|state| format!("{state:?}"));
+                    println!("{}", json!({ "time_s": now.seconds(), "states": states, "faults": faults }));
+                } else {
+                    println!("{:12.6}  states {states:?}, faults {:?} {:?}", now.seconds(), faults[0], faults[1]);
+                }
             }
         }
         Ok(())
@@ -247,13 +275,17 @@ impl Encoders {
 }
 
 impl Pose {
-    fn run(self) -> anyhow::Result<()> {
+    fn run(self, as_json: bool) -> anyhow::Result<()> {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         let mut receiver = PoseReceiver::new(self.controller);
         while !clock.is_over() {
             let Some(frame) = clock.receive(&mut *bus, LISTENING)? else { continue };
             let Some(pose) = frame.classic().and_then(|frame| receiver.handle(frame)) else { continue };
+            if as_json {
+                println!("{}", pose_json(&pose));
+                continue;
+            }
             println!(
                 "x {:10.4} m  y {:10.4} m  heading {:9.4} deg  +- {:.4} {:.4} m {:.3} deg  {:?} ({:?})  {:.2} m without correction",
                 pose.pose.x,
@@ -271,47 +303,44 @@ impl Pose {
     }
 }
 
+fn pose_json(pose: &PublishedPose) -> serde_json::Value {
+    json!({
+        "x_m": pose.pose.x,
+        "y_m": pose.pose.y,
+        "heading_rad": pose.pose.theta,
+        "deviations": pose.deviations,
+        "correlations": pose.correlations,
+        "mode": pose.mode,
+        "reason": pose.reason,
+        "dead_reckoning_distance_m": pose.dead_reckoning_distance,
+        "drive_fault": pose.health.drive,
+        "steering_fault": pose.health.steering,
+        "laser": format!("{:?}", pose.health.laser),
+        "layer": pose.health.layer,
+        "counter": pose.counter,
+        "time_ms": pose.time,
+    })
+}
+
 impl ServeEncoders {
     fn run(self) -> anyhow::Result<()> {
         let recording = self.recording()?;
-        let samples: Vec<EncoderSample> = recording
-            .events
-            .iter()
-            .filter_map(|event| if let Event::Encoders(sample) = event.view() { Some(sample) } else { None })
-            .collect();
-        let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
-            anyhow::bail!("the drive has no encoders");
-        };
-        let (drive_range, steering_range) = match recording.parameters.vehicle {
-            Vehicle::Tricycle(Tricycle { drive_range, steering_range, .. }) => (drive_range, steering_range),
-            _ => (CounterRange::BITS_32, CounterRange::BITS_32),
-        };
-        let mut nodes =
-            [EmulatedEncoder::new(self.drive, drive_range), EmulatedEncoder::new(self.steering, steering_range)];
+        let mut pair = EmulatedPair::new(&recording, self.drive, self.steering)?;
         let mut bus = bus::open(&self.bus)?;
-        let clock = Clock::new(self.seconds.or(Some(last.time.since(first.time))))?;
-        // The drive begins when the encoders are started.
-        let mut start = None;
+        let clock = Clock::new(self.seconds)?;
         while !clock.is_over() {
             let now = clock.now();
-            if start.is_none() && nodes.iter().all(EmulatedEncoder::is_operational) {
-                start = Some(now);
+            // Without a stated time the program ends with the drive.
+            let is_done = pair.start().is_some_and(|start| now.since(start) > pair.duration());
+            if self.seconds.is_none() && is_done {
+                break;
             }
-            let elapsed = start.map_or(0.0, |start| now.since(start));
-            let reached = samples.partition_point(|sample| sample.time.since(first.time) <= elapsed).max(1);
-            let sample = &samples[reached - 1];
-            nodes[0].set_position(sample.drive);
-            nodes[1].set_position(sample.steering);
-            for node in &mut nodes {
-                while let Some(frame) = node.poll(now) {
-                    bus.send(&frame.into())?;
-                }
+            for frame in pair.poll(now) {
+                bus.send(&frame.into())?;
             }
             let Some(frame) = clock.receive(&mut *bus, STEP)? else { continue };
-            for node in &mut nodes {
-                if let Some(answer) = frame.classic().and_then(|frame| node.handle(frame)) {
-                    bus.send(&answer.into())?;
-                }
+            for answer in frame.classic().map(|frame| pair.handle(frame)).unwrap_or_default() {
+                bus.send(&answer.into())?;
             }
         }
         Ok(())

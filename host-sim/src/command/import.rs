@@ -4,7 +4,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use agv_host_sim::import::{self, ScanLog, carmen, carpark, graph_log, sapienza};
+use agv_host_sim::import::raw::{self, RawBytes};
+use agv_host_sim::import::{self, ScanLog, candump, capture, carmen, carpark, graph_log, sapienza};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
@@ -12,12 +13,17 @@ use clap::ValueEnum;
 use flate2::read::MultiGzDecoder;
 use indicatif::ProgressBar;
 
+use super::encoder_arguments::EncoderArguments;
+use super::like;
 use super::summary::Summary;
 
 const HELP: &str = "\
 Examples:
   agv import auto fr079.log --output fr079.agvlog
-  agv import carpark shared/data/carpark --output carpark.agvlog";
+  agv import carpark shared/data/carpark --output carpark.agvlog
+  agv import candump candump-2026-05-04.log --like hall.agvlog --output encoders.agvlog
+  agv import capture nav350.pcapng --like hall.agvlog --output laser.agvlog
+  agv import raw drive.agvlog --output again.agvlog";
 
 /// Turn the recordings of others into logs.
 #[derive(clap::Args)]
@@ -30,6 +36,14 @@ pub struct Import {
     /// Where the log goes; an older one is replaced.
     #[arg(short, long, value_name = "LOG")]
     output: PathBuf,
+    /// Log whose vehicle and map are those of the new one; for candump and capture.
+    #[arg(long, value_name = "LOG")]
+    like: Option<PathBuf>,
+    /// Port of the sensor in a capture; 2111 and 2112 if absent.
+    #[arg(long)]
+    port: Option<u16>,
+    #[command(flatten)]
+    encoders: EncoderArguments,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -45,6 +59,12 @@ enum Format {
     Sapienza,
     /// CARMEN log, plain or compressed (.gz): FLASER or ROBOTLASER1, and ODOM.
     Carmen,
+    /// Log of candump -l: what two encoders said on a CAN bus.
+    Candump,
+    /// Network capture, pcap or pcapng: what a NAV350 and its host said over TCP.
+    Capture,
+    /// Log of this program: its events are made anew of the raw bytes in it.
+    Raw,
     /// Pose graph with scans: VERTEX2, ROBOTLASER1, EDGE2. Its corrected poses serve as odometry.
     Graph,
 }
@@ -60,6 +80,9 @@ impl Import {
         let progress = ProgressBar::new_spinner().with_message(format!("reading {}", self.input.display()));
         progress.enable_steady_tick(Duration::from_millis(100));
         let recording = match format {
+            Format::Candump => return self.import_raw(&progress, candump_bytes(&self.input)?),
+            Format::Capture => return self.import_raw(&progress, self.capture()?),
+            Format::Raw => self.raw_drive()?,
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
             Format::Carmen => drive(&self.input, "CARMEN", &carmen::read(&self.input)?.front)?,
@@ -71,6 +94,54 @@ impl Import {
         progress.finish_and_clear();
         Summary::of(&recording).print(self.json)
     }
+}
+
+impl Import {
+    /// Writes raw bytes and what they mean.
+    fn import_raw(&self, progress: &ProgressBar, bytes: Vec<RawBytes>) -> anyhow::Result<()> {
+        progress.set_message(format!("writing {}", self.output.display()));
+        let mut drive = like::drive_like(self.like.as_deref())?;
+        raw::write(&self.output, &mut drive, &bytes, &self.encoders.nodes())?;
+        progress.finish_and_clear();
+        Summary::of(&drive).print(self.json)
+    }
+
+    fn capture(&self) -> anyhow::Result<Vec<RawBytes>> {
+        let ports = self.port.map_or(capture::PORTS.to_vec(), |port| vec![port]);
+        let found = capture::read(&self.input, &ports)?;
+        let input = self.input.display();
+        if found.lost > 0 {
+            eprintln!("agv: {input}: {} bytes of the connection were not captured", found.lost);
+        }
+        if found.left_out > 0 {
+            eprintln!("agv: {input}: {} connections beside the main one are left out", found.left_out);
+        }
+        if found.is_cut {
+            eprintln!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets);
+        }
+        Ok(found.raw)
+    }
+
+    fn raw_drive(&self) -> anyhow::Result<Recording> {
+        let (recording, damages) = raw::read_drive(&self.input, &self.encoders.nodes())?;
+        for damage in &damages {
+            eprintln!("agv: {}: {damage}", self.input.display());
+        }
+        if recording.events.is_empty() {
+            bail!("{}: there are no raw bytes in the log that mean anything", self.input.display());
+        }
+        Ok(recording)
+    }
+}
+
+/// The frames of a log of candump.
+fn candump_bytes(input: &Path) -> anyhow::Result<Vec<RawBytes>> {
+    let frames = candump::read(input)?;
+    let bytes: Vec<_> = frames.iter().filter_map(|seen| Some(RawBytes::of_can(seen.time?, &seen.frame))).collect();
+    if bytes.is_empty() {
+        bail!("{}: no frame in it has a time", input.display());
+    }
+    Ok(bytes)
 }
 
 /// What the input looks like.
@@ -91,6 +162,9 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
     if beginning.is_empty() {
         bail!("{}: the file is empty", input.display());
     }
+    if file_kind::describe(&beginning).starts_with("a network capture") {
+        return Ok(Format::Capture);
+    }
     let mut unpacked = Vec::new();
     // What is not compressed, or cut, is looked at as far as it goes.
     let _ = MultiGzDecoder::new(&beginning[..]).read_to_end(&mut unpacked);
@@ -102,9 +176,16 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
         Ok(Format::Graph)
     } else if ["PARAM ", "FLASER ", "ROBOTLASER1 ", "ODOM "].into_iter().any(begins_line) {
         Ok(Format::Carmen)
+    } else if first_line(text).is_some_and(|line| candump::parse_line(line).is_some()) {
+        Ok(Format::Candump)
     } else {
         bail!("{}: this is no known recording but {}", input.display(), file_kind::describe(&beginning))
     }
+}
+
+fn first_line(text: &[u8]) -> Option<&str> {
+    text.split(|byte| *byte == b'\n')
+        .find_map(|line| std::str::from_utf8(line).ok().filter(|line| !line.trim().is_empty()))
 }
 
 /// The drive in a log of scans.

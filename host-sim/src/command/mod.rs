@@ -5,9 +5,12 @@
 
 pub mod can;
 pub mod demonstration;
+mod encoder_arguments;
 pub mod evaluate;
+pub mod export;
 pub mod features;
 pub mod import;
+mod like;
 pub mod map;
 pub mod nav350;
 mod output;
@@ -16,4 +19,5 @@ mod progress;
 pub mod record;
 pub mod replay;
 pub mod simulate;
+mod stop;
 mod summary;

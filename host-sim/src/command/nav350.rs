@@ -4,10 +4,10 @@ use std::net::TcpListener;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-use agv_core::wire::cola::Sequence;
+use agv_core::wire::cola::{Dialect, Sequence};
 use agv_core::wire::nav350::{
     Answer, Configuration, ErrorCode, IdentifiedLandmark, LANDMARKS_A_TELEGRAM, Method, MethodResult, OperatingMode,
-    Request, SensorFrame, UserLevel, Value, Variable,
+    Request, Revolution, SensorFrame, UserLevel, Value, Variable,
 };
 use agv_host_sim::layout_file;
 use agv_host_sim::link::clock::Clock;
@@ -19,11 +19,25 @@ use agv_host_sim::simulate::simulate;
 use anyhow::{Context, bail};
 use clap::Subcommand;
 
+use super::output::print_rows;
+
+const HELP: &str = "\
+Examples:
+  agv nav350 probe 192.168.1.10
+  agv nav350 layout download 192.168.1.10 hall.imk
+  agv nav350 layout convert hall.imk hall.csv
+  agv nav350 serve --scenario host-sim/scenarios/warehouse_hall.toml --port 2112
+  agv nav350 serve --log drive.agvlog --dialect cola-a";
+
 /// Talk to a NAV350, or be one
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct Nav350 {
     #[command(subcommand)]
     command: Command,
+    /// Print the result as JSON.
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(Subcommand)]
@@ -56,6 +70,31 @@ struct Serve {
     /// How much faster than real time the drive goes.
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
+    /// The only dialect that is understood; both if absent.
+    #[arg(long)]
+    dialect: Option<DialectChoice>,
+    /// What the sensor's clock shows at its start, ms; near 4294967295 it wraps soon.
+    #[arg(long, value_name = "MS", default_value_t = 0)]
+    clock: u32,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum DialectChoice {
+    /// CoLa-A: ASCII.
+    #[value(name = "cola-a")]
+    Ascii,
+    /// CoLa-B: binary.
+    #[value(name = "cola-b")]
+    Binary,
+}
+
+impl From<DialectChoice> for Dialect {
+    fn from(choice: DialectChoice) -> Self {
+        match choice {
+            DialectChoice::Ascii => Self::Ascii,
+            DialectChoice::Binary => Self::Binary,
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -88,25 +127,22 @@ impl Nav350 {
     pub fn run(self) -> anyhow::Result<()> {
         match self.command {
             Command::Serve(serve) => serve.run(),
-            Command::Probe { host } => probe(&host),
+            Command::Probe { host } => print(&probe(&host)?, self.json),
             Command::Layout { command: LayoutCommand::Download { host, file } } => {
                 layout_file::Format::of(&file)?;
                 let landmarks = download(&mut Client::connect(&address(&host))?)?;
                 layout_file::save(&file, &landmarks)?;
-                println!("landmarks  {}", landmarks.len());
-                Ok(())
+                print(&[row("landmarks", landmarks.len())], self.json)
             }
             Command::Layout { command: LayoutCommand::Upload { host, file } } => {
                 let landmarks = layout_file::load(&file)?;
                 upload(&mut Client::connect(&address(&host))?, &landmarks)?;
-                println!("landmarks  {}", landmarks.len());
-                Ok(())
+                print(&[row("landmarks", landmarks.len())], self.json)
             }
             Command::Layout { command: LayoutCommand::Convert { input, output } } => {
                 let landmarks = layout_file::load(&input)?;
                 layout_file::save(&output, &landmarks)?;
-                println!("landmarks  {}", landmarks.len());
-                Ok(())
+                print(&[row("landmarks", landmarks.len())], self.json)
             }
         }
     }
@@ -126,15 +162,18 @@ impl Serve {
         let listener = TcpListener::bind(("0.0.0.0", self.port)).with_context(|| format!("port {}", self.port))?;
         let port = listener.local_addr()?.port();
         eprintln!("serving {} revolutions on port {port}", drive.turns().len());
-        let sensor = Sensor::new(drive, Options { speed: self.speed, ..Options::default() });
+        let sensor = Sensor::new(
+            drive,
+            Options { speed: self.speed, clock_start: self.clock, dialect: self.dialect.map(Into::into) },
+        );
         Ok(sensor.serve(&listener, &AtomicBool::new(false))?)
     }
 }
 
-fn probe(host: &str) -> anyhow::Result<()> {
+fn probe(host: &str) -> anyhow::Result<Vec<[String; 2]>> {
     let address = address(host);
     let mut client = Client::connect(&address)?;
-    println!("dialect          {:?}", client.dialect());
+    let mut rows = vec![row("dialect", format!("{:?}", client.dialect()))];
     for variable in [
         Variable::DeviceIdent,
         Variable::SerialNumber,
@@ -151,7 +190,7 @@ fn probe(host: &str) -> anyhow::Result<()> {
             Answer::Fault(fault) => fault.to_string(),
             other => format!("{other:?}"),
         })?;
-        println!("{:<16} {value}", variable.name());
+        rows.push(row(variable.name(), value));
     }
     drop(client);
     let clock = Clock::new(1.0);
@@ -159,24 +198,7 @@ fn probe(host: &str) -> anyhow::Result<()> {
     let mut trouble = None;
     // The first revolution ends the session.
     let outcome = link.run(clock.now().offset(30.0), |_, happening| match happening {
-        Happening::Revolution(revolution) => {
-            println!("mode             {}", OperatingMode::Navigation);
-            println!("answer           {}", revolution.error());
-            if let Some(pose) = revolution.pose() {
-                println!("pose             {:.3} m {:.3} m {:.3} rad", pose.pose.x, pose.pose.y, pose.pose.theta);
-            }
-            if let Some(scan) = revolution.scan() {
-                let returns = scan.ranges.iter().filter(|range| **range > 0.0);
-                println!("beams            {}", scan.ranges.len());
-                println!("returns          {}", returns.clone().count());
-                println!("nearest          {:.3} m", returns.clone().copied().fold(f32::INFINITY, f32::min));
-                println!("farthest         {:.3} m", returns.copied().fold(0.0, f32::max));
-            }
-            if let Some(reflectors) = revolution.reflectors() {
-                println!("reflectors       {}", reflectors.observations.len());
-            }
-            Err(())
-        }
+        Happening::Revolution(revolution) => Err(revolution_rows(revolution)),
         Happening::Lost(reason) => {
             trouble = Some(reason);
             Ok(())
@@ -184,10 +206,47 @@ fn probe(host: &str) -> anyhow::Result<()> {
         _ => Ok(()),
     });
     match (outcome, trouble) {
-        (Err(()), _) => Ok(()),
+        (Err(found), _) => {
+            rows.extend(found);
+            Ok(rows)
+        }
         (Ok(()), Some(reason)) => bail!("{address}: no revolution came: {reason}"),
         (Ok(()), None) => bail!("{address}: no revolution came"),
     }
+}
+
+/// Prints a result in two columns, or as one JSON object.
+fn print(rows: &[[String; 2]], as_json: bool) -> anyhow::Result<()> {
+    if as_json {
+        let object: serde_json::Map<_, _> =
+            rows.iter().map(|[name, value]| (name.clone(), value.clone().into())).collect();
+        println!("{}", serde_json::to_string_pretty(&object)?);
+    } else {
+        print_rows(rows);
+    }
+    Ok(())
+}
+
+fn row(name: &str, value: impl ToString) -> [String; 2] {
+    [name.to_owned(), value.to_string()]
+}
+
+fn revolution_rows(revolution: &Revolution) -> Vec<[String; 2]> {
+    let mut rows = vec![row("mode", OperatingMode::Navigation), row("answer", revolution.error())];
+    if let Some(pose) = revolution.pose() {
+        rows.push(row("pose", format!("{:.3} m {:.3} m {:.3} rad", pose.pose.x, pose.pose.y, pose.pose.theta)));
+    }
+    if let Some(scan) = revolution.scan() {
+        let returns: Vec<f32> = scan.ranges.iter().copied().filter(|range| *range > 0.0).collect();
+        rows.push(row("beams", scan.ranges.len()));
+        rows.push(row("returns", returns.len()));
+        rows.push(row("nearest", format!("{:.3} m", returns.iter().copied().fold(f32::INFINITY, f32::min))));
+        rows.push(row("farthest", format!("{:.3} m", returns.iter().copied().fold(0.0, f32::max))));
+    }
+    if let Some(reflectors) = revolution.reflectors() {
+        rows.push(row("reflectors", reflectors.observations.len()));
+    }
+    rows
 }
 
 fn download(client: &mut Client) -> anyhow::Result<Vec<IdentifiedLandmark>> {

@@ -84,7 +84,8 @@ pub fn parameters(imported: &Parameters, noise: Noise) -> Parameters {
         Noise::Nominal => (0.3, 4.0_f64.to_radians()),
         Noise::Tight => (0.1, 1.0_f64.to_radians()),
     };
-    parameters.odometry_noise = OdometryNoise { speed, steering, slip: 0.0, side_slip: 0.0, yaw: 0.0 };
+    parameters.odometry_noise =
+        OdometryNoise { speed, steering, slip: 0.0, side_slip: 0.0, yaw: 0.0, ..OdometryNoise::default() };
     parameters.maps = MapUse { reflectors: true, features: false, dynamic: false };
     parameters.reflectors.range_deviation = 0.02;
     parameters.reflectors.bearing_deviation = 0.3_f64.to_radians();

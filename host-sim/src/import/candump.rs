@@ -10,12 +10,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use agv_core::measurement::{EncoderSample, Time};
-use agv_core::wire::can::canopen::Message;
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_core::measurement::Time;
 use agv_core::wire::can::frame::{AnyFrame, FdFrame, Frame, Id, extended_id, standard_id};
-use agv_core::wire::can::nmt::NmtState;
-use agv_core::wire::can::sdo::{AbortCode, Request, Response};
 
 use crate::text_file::{self, TextFileError};
 
@@ -176,39 +172,4 @@ pub fn screen_line(interface: &str, frame: &AnyFrame) -> String {
         line += " remote request";
     }
     line
-}
-
-/// What two encoders said in a log that knows nothing of how they were set up: the profile's default PDO, and the ranges
-/// in the settings. Frames without a time are left out.
-#[must_use]
-pub fn encoder_samples(
-    frames: &[SeenFrame],
-    drive: &ChannelSettings,
-    steering: &ChannelSettings,
-) -> Vec<EncoderSample> {
-    let Some(start) = frames.iter().find_map(|seen| seen.time) else { return Vec::new() };
-    let mut pair = EncoderPair::new(drive, steering, 1.0, start);
-    for settings in [drive, steering] {
-        let boot_up = Message::Heartbeat { node: settings.encoder.node, state: NmtState::BootUp };
-        pair.handle(&boot_up.encode(), start);
-    }
-    // The pair asks for what nobody can tell any more, and takes the defaults.
-    for _ in 0..100 {
-        let Some(asked) = pair.poll(start) else { continue };
-        if let Ok(Message::SdoRequest { node, bytes }) = Message::decode(&asked)
-            && let Ok(Request::Read(object) | Request::Write(object, _)) = Request::decode(bytes)
-        {
-            let refusal = Response::Abort(object, AbortCode::NoSuchObject).encode();
-            pair.handle(&Message::SdoResponse { node, bytes: refusal }.encode(), start);
-        }
-    }
-    let mut samples = Vec::new();
-    for seen in frames {
-        if let (Some(time), Some(frame)) = (seen.time, seen.frame.classic()) {
-            // Nobody is told to do anything.
-            while pair.poll(time).is_some() {}
-            samples.extend(pair.handle(frame, time));
-        }
-    }
-    samples
 }

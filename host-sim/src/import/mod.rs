@@ -1,14 +1,17 @@
 //! Recordings of others.
 
 pub mod candump;
+pub mod capture;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;
 mod posed_scan;
+pub mod raw;
 pub mod sapienza;
 mod scan_drive;
 mod scan_record;
 mod table;
+pub mod tcp_stream;
 
 pub use posed_scan::{PosedScan, ScanLog};
 pub use scan_drive::drive;

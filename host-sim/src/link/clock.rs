@@ -27,6 +27,12 @@ impl Clock {
         START.offset(self.start.elapsed().as_secs_f64() * self.speed)
     }
 
+    /// How much faster than real time it runs.
+    #[must_use]
+    pub const fn speed(&self) -> f64 {
+        self.speed
+    }
+
     /// How long to wait for `time`; zero if it has passed.
     #[must_use]
     pub fn until(&self, time: Time) -> Duration {

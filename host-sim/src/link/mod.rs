@@ -1,4 +1,7 @@
 //! Connections to sensors.
 
 pub mod clock;
+pub mod encoder_listener;
+pub mod encoders;
 pub mod nav350;
+pub mod nav350_listener;

@@ -92,10 +92,9 @@ impl Link {
     pub fn run<E>(&mut self, until: Time, mut see: impl FnMut(Time, Happening) -> Result<(), E>) -> Result<(), E> {
         loop {
             let now = self.clock.now();
-            if now >= until {
-                return Ok(());
-            }
+            // What has arrived is looked at to the end.
             match self.session.poll(now, &mut self.revolution) {
+                Step::Wait(_) if now >= until => return Ok(()),
                 Step::Connect => {
                     self.stream = connect(&self.address, self.connect_timeout).ok();
                     let now = self.clock.now();

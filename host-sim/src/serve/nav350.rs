@@ -554,12 +554,15 @@ impl Nav350 {
         let mut pose_details = false;
         let mut landmarks =
             LandmarkDataFormat { coordinates: CoordinateFormat::Cartesian, has_details: false, filter: 0 };
-        let mut has_remission = false;
+        let (mut has_remission, mut has_angles) = (false, false);
         for setting in &state.settings {
             match setting {
                 Setting::PoseDataFormat(format) => pose_details = format.has_details,
                 Setting::LandmarkDataFormat(format) => landmarks = *format,
-                Setting::ScanDataFormat(format) => has_remission = format.has_remission,
+                // One mode has distances only, another one directions too; its number is not documented.
+                Setting::ScanDataFormat(format) => {
+                    (has_remission, has_angles) = (format.has_remission, format.channels != 1);
+                }
                 _ => {}
             }
         }
@@ -618,6 +621,11 @@ impl Nav350 {
             start: time(turn.start),
             samples: Sequence::Values(&turn.ranges),
         };
+        let directions: Vec<u32> = (0..turn.ranges.len() as i64)
+            .filter(|_| has_angles)
+            .map(|beam| 10 * (i64::from(turn.first.0) + beam * i64::from(turn.resolution)).rem_euclid(360_000) as u32)
+            .collect();
+        let angles = Channel { name: ChannelName::ANGLE, samples: Sequence::Values(&directions), ..distances };
         let remission = Channel {
             name: ChannelName::REMISSION,
             scale: 1.0,
@@ -647,7 +655,10 @@ impl Nav350 {
             error,
             pose,
             wants_reflectors.then_some(list),
-            wants_scan.then_some(distances).into_iter().collect(),
+            [(wants_scan, distances), (wants_scan && has_angles, angles)]
+                .into_iter()
+                .filter_map(|(is_wanted, channel)| is_wanted.then_some(channel))
+                .collect(),
             wants_remission.then_some(remission),
         )
     }

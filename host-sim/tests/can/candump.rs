@@ -8,7 +8,8 @@ use agv_core::wire::can::frame::{FdFrame, Frame, extended_id, standard_id};
 use agv_core::wire::can::sdo::{Object, Response, Value};
 use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::data;
-use agv_host_sim::import::candump::{Line, SeenFrame, encoder_samples, log_line, parse_line, read, screen_line};
+use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line, read, screen_line};
+use agv_host_sim::link::encoder_listener::EncoderListener;
 
 fn seen(micros: u64, frame: impl Into<agv_core::wire::can::frame::AnyFrame>) -> SeenFrame {
     SeenFrame { time: Some(Time::from_micros(micros)), interface: "vcan0".to_owned(), frame: frame.into() }
@@ -108,7 +109,15 @@ fn encoders_are_read_from_a_log_without_their_setup() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("candump.log");
     std::fs::write(&path, text.join("\n")).unwrap();
-    let samples = encoder_samples(&read(&path).unwrap(), &channel(1), &channel(2));
+    let mut listener = EncoderListener::new(&channel(1), &channel(2), Time::from_seconds(5.0));
+    let frames = read(&path).unwrap();
+    let heard = frames.iter().map(|seen| listener.hear(seen.frame.classic().unwrap(), seen.time.unwrap()));
+    let samples: Vec<_> = heard
+        .filter_map(|(faults, sample)| {
+            assert_eq!(faults, None);
+            sample
+        })
+        .collect();
     assert_eq!(samples.len(), 50);
     for (step, sample) in (0..).zip(samples) {
         assert_eq!((sample.drive, sample.steering), (1000 * step, 9 + step));

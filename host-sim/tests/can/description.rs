@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use agv_core::localizer::{Mode, Reason};
+use agv_core::measurement::EncoderFault;
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{Content, Health, LaserHealth, WantedMode};
 use agv_core::wire::can::frame::{Frame, Id};
-use agv_core::wire::can::supervision::EncoderFault;
 use agv_host_sim::data;
 use serde_json::Value;
 
@@ -84,7 +84,15 @@ fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
 /// Every value that a status can name.
 fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
     use EncoderFault::{Frozen, HeartbeatLost, Jumped, Late, Missing, OutOfRange, Reported};
-    let modes = [Mode::NotLocalised, Mode::Reflectors, Mode::Features, Mode::Mixed, Mode::DeadReckoning, Mode::Lost];
+    let modes = [
+        Mode::NotLocalised,
+        Mode::Reflectors,
+        Mode::Features,
+        Mode::Mixed,
+        Mode::DeadReckoning,
+        Mode::Lost,
+        Mode::WithoutOdometry,
+    ];
     let reasons = [
         Reason::None,
         Reason::NoPose,
@@ -93,6 +101,8 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Reason::InnovationsTooLarge,
         Reason::Uncertain,
         Reason::OdometryImplausible,
+        Reason::DriveEncoder,
+        Reason::SteeringEncoder,
     ];
     let faults = [
         None,
@@ -105,10 +115,10 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Some(HeartbeatLost),
     ];
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
-    (0..8)
+    (0..9)
         .map(|index| {
-            let (mode, reason) = (modes[index % 6], reasons[index % 7]);
-            let (drive, steering, laser) = (faults[index], faults[7 - index], lasers[index % 4]);
+            let (mode, reason) = (modes[index % 7], reasons[index]);
+            let (drive, steering, laser) = (faults[index % 8], faults[(15 - index) % 8], lasers[index % 4]);
             let fault = |fault: Option<EncoderFault>| fault.map_or("None".to_owned(), |fault| format!("{fault:?}"));
             let status = Content::Status {
                 mode,

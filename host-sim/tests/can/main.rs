@@ -4,4 +4,5 @@
 mod candump;
 mod description;
 mod encoders;
+mod record;
 mod slcan;

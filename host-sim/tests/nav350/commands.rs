@@ -10,13 +10,13 @@ use agv_host_sim::log;
 use crate::support::{Files, agv, refusal, text};
 
 /// A running `agv nav350 serve`.
-struct Server {
+pub struct Server {
     child: Child,
-    host: String,
+    pub host: String,
 }
 
 impl Server {
-    fn start(arguments: &[&str]) -> Self {
+    pub fn start(arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_agv"))
             .args(["nav350", "serve", "--port", "0"])
             .args(arguments)

@@ -1,23 +1,40 @@
 //! The emulated sensor and the recording of it, over a real network of one machine.
 
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::capture;
 
 use agv_core::localizer::{Event, Localizer};
-use agv_core::record::{Capacities, Header, Item, RawSource, Record};
+use agv_core::record::{Item, RawSource, Record};
+use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::cola::{Deframed, Deframer, Dialect};
 use agv_core::wire::nav350::{Answer, Configuration, MethodResult, NavigationData, SensorFrame};
+use agv_host_sim::import::raw::{self, Bus, EventMaker};
 use agv_host_sim::link::clock::Clock;
+use agv_host_sim::link::encoders::EncoderNodes;
 use agv_host_sim::link::nav350::Link;
-use agv_host_sim::live::{self, Summary};
+use agv_host_sim::live::{self, Recorder, Summary};
 use agv_host_sim::log::{self, Reader, Writer};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options, Turn};
 use agv_host_sim::simulate::block_storage::{BlockStorage, ReflectorPlacement};
 use agv_host_sim::simulate::scenario::{Scenario, WorldOptions};
 use agv_host_sim::simulate::simulate;
+
+const NODES: EncoderNodes = match (NodeId::new(1), NodeId::new(2), NodeId::new(16)) {
+    (Some(drive), Some(steering), Some(controller)) => {
+        EncoderNodes { drive, steering, is_synchronous: false, controller }
+    }
+    _ => panic!(),
+};
+
+/// Two seconds of the fast clock.
+const STALL: Duration = Duration::from_millis(250);
 
 /// How much faster than real time the tests go.
 const SPEED: f64 = 8.0;
@@ -46,11 +63,7 @@ impl Drop for StopOnDrop<'_> {
 
 fn record(address: SocketAddr, recording: &Recording, seconds: f64, first: Dialect, path: &Path) -> Summary {
     let parameters = &recording.parameters;
-    let header = Header { software: log::SOFTWARE, parameters, capacities: Capacities::default() };
-    let mut writer = Writer::create(path, &header).unwrap();
-    for piece in recording.landmarks.chunks(50) {
-        writer.write(&Record::Landmarks(piece)).unwrap();
-    }
+    let recorder = Recorder::new(Writer::begin(path, parameters, &recording.landmarks).unwrap());
     let clock = Clock::new(SPEED);
     let configuration = Configuration {
         first_dialect: first,
@@ -60,8 +73,9 @@ fn record(address: SocketAddr, recording: &Recording, seconds: f64, first: Diale
         ..Configuration::default()
     };
     let mut link = Link::new(&address.to_string(), configuration, clock);
-    let summary = live::record_nav350(&mut link, clock.now().offset(seconds), &mut writer).unwrap();
-    writer.finish().unwrap();
+    let is_stopped = AtomicBool::new(false);
+    let summary = live::record_nav350(&mut link, clock.now().offset(seconds), &is_stopped, &recorder).unwrap();
+    recorder.finish().unwrap();
     summary
 }
 
@@ -74,7 +88,7 @@ fn turn<'a>(turns: &'a [Turn], ranges: &[f32]) -> Option<(usize, &'a Turn)> {
 }
 
 /// Every recorded event is one that was served. Returns the numbers of the turns, and how many reflectors they have.
-fn check_events(turns: &[Turn], recorded: &[RecordedEvent]) -> (Vec<usize>, usize) {
+pub fn check_events(turns: &[Turn], recorded: &[RecordedEvent]) -> (Vec<usize>, usize) {
     let mut numbers = Vec::new();
     let mut reflector_count = 0;
     for pair in recorded.chunks(2) {
@@ -130,6 +144,15 @@ fn what_is_recorded_is_what_was_served() {
         assert!(numbers.len() > 10, "{summary:?}");
         assert!(numbers.windows(2).all(|pair| pair[0] < pair[1]), "{numbers:?}");
         check_raw(&path, summary.scans);
+        // The raw bytes mean the same again, and so does a network capture of them.
+        let (from_raw, _) = raw::read_drive(&path, &NODES).unwrap();
+        assert!(from_raw == again, "{} {}", from_raw.events.len(), again.events.len());
+        let packets = folder.path().join("live.pcap");
+        capture::write(&packets, &raw::read(&path).unwrap());
+        let captured = agv_host_sim::import::capture::read(&packets, &agv_host_sim::import::capture::PORTS).unwrap();
+        let mut maker = EventMaker::new(&NODES, &recording.parameters, Bus::Overheard);
+        let events: Vec<_> = captured.raw.iter().flat_map(|one| maker.events(one)).collect();
+        assert!(events == again.events, "{} {}", events.len(), again.events.len());
         localises(&recording, &again, &numbers, &turns);
     }
 }
@@ -158,7 +181,7 @@ fn check_raw(path: &Path, scans: usize) {
 }
 
 /// The recorded turns, at the times of the drive, localise as the simulated ones do.
-fn localises(simulated: &Recording, recorded: &Recording, numbers: &[usize], turns: &[Turn]) {
+pub fn localises(simulated: &Recording, recorded: &Recording, numbers: &[usize], turns: &[Turn]) {
     let run = |recording: &Recording, is_live: bool| {
         let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
         localizer.add_landmarks(&recording.landmarks).unwrap();
@@ -205,6 +228,19 @@ enum Harm {
     Rubbish,
     /// Swallows everything from the sensor.
     Silence,
+    /// Holds everything back for 2 s once, by the clock of the sensor; cuts it later.
+    Stall,
+}
+
+/// Writes to a socket that does not wait.
+fn write(socket: &mut TcpStream, mut rest: &[u8], is_stopped: &AtomicBool) {
+    while !rest.is_empty() && !is_stopped.load(Ordering::Relaxed) {
+        match socket.write(rest) {
+            Ok(count) => rest = &rest[count..],
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => std::thread::yield_now(),
+            Err(_) => break,
+        }
+    }
 }
 
 /// Passes bytes between host and sensor, and does harm.
@@ -220,6 +256,8 @@ fn harm(listener: &TcpListener, sensor: SocketAddr, harms: &[Harm], count: &Atom
         let mut sensor = TcpStream::connect(sensor).unwrap();
         sensor.set_nonblocking(true).unwrap();
         let mut passed = 0;
+        let mut late: VecDeque<Vec<u8>> = VecDeque::new();
+        let mut stalled_until: Option<Instant> = None;
         let mut buffer = [0; 4096];
         while !is_stopped.load(Ordering::Relaxed) {
             match host.read(&mut buffer) {
@@ -231,28 +269,35 @@ fn harm(listener: &TcpListener, sensor: SocketAddr, harms: &[Harm], count: &Atom
                 Ok(0) => break,
                 Ok(count) => {
                     passed += count;
-                    let is_cut = matches!(harm, Harm::Cut(limit) if passed > limit);
+                    let is_cut = match harm {
+                        Harm::Cut(limit) => passed > limit,
+                        Harm::Stall => passed > 100_000,
+                        Harm::Rubbish | Harm::Silence => false,
+                    };
                     if is_cut {
                         break;
                     }
                     let is_whole = buffer.first() == Some(&2);
                     let bytes = match harm {
                         Harm::Silence => &[],
+                        Harm::Stall if passed > 20_000 => {
+                            stalled_until.get_or_insert_with(|| Instant::now() + STALL);
+                            late.push_back(buffer[..count].to_vec());
+                            &[]
+                        }
                         Harm::Rubbish if is_whole && passed < 60_000 => {
                             &[&b"rubbish\0"[..], &buffer[..count]].concat()[..]
                         }
                         _ => &buffer[..count],
                     };
-                    let mut rest = bytes;
-                    while !rest.is_empty() && !is_stopped.load(Ordering::Relaxed) {
-                        match host.write(rest) {
-                            Ok(count) => rest = &rest[count..],
-                            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => std::thread::yield_now(),
-                            Err(_) => break,
-                        }
-                    }
+                    write(&mut host, bytes, is_stopped);
                 }
                 Err(_) => std::thread::yield_now(),
+            }
+            if stalled_until.is_some_and(|until| Instant::now() >= until) {
+                for bytes in late.drain(..) {
+                    write(&mut host, &bytes, is_stopped);
+                }
             }
         }
     }
@@ -269,17 +314,18 @@ fn a_bad_line_is_survived_and_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("live.agvlog");
     let (is_stopped, connections) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let harms = [Harm::Cut(30), Harm::Cut(40_000), Harm::Silence, Harm::Rubbish];
+    let harms = [Harm::Cut(30), Harm::Cut(40_000), Harm::Silence, Harm::Stall, Harm::Rubbish];
     let summary = std::thread::scope(|scope| {
         let _stop = StopOnDrop(&is_stopped);
         scope.spawn(|| sensor.serve(&listener, &is_stopped).unwrap());
         scope.spawn(|| harm(&line, address, &harms, &connections, &is_stopped));
-        record(line_address, &recording, 40.0, Dialect::Binary, &path)
+        record(line_address, &recording, 60.0, Dialect::Binary, &path)
     });
     assert!(connections.load(Ordering::Relaxed) >= harms.len());
-    assert!(summary.lost >= 3, "{summary:?}");
+    assert!(summary.lost >= 4, "{summary:?}");
     let (again, damages) = log::read(&path).unwrap();
     assert!(damages.is_empty());
+    assert!(raw::read_drive(&path, &NODES).unwrap().0 == again);
     // The drive may be over before the line is good; what comes then is its last turn.
     let (numbers, _) = check_events(&turns, &again.events);
     assert!(numbers.len() > 10);

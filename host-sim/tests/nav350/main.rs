@@ -3,7 +3,9 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod capture;
 mod commands;
 mod layout;
 mod live;
+mod minute;
 mod recorded;

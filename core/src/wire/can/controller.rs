@@ -19,9 +19,8 @@
 
 use super::canopen::{NodeId, receive_pdo_id, transmit_pdo_id};
 use super::frame::{Frame, Id};
-use super::supervision::EncoderFault;
 use crate::geometry::{Pose, wrap};
-use crate::measurement::{PoseFix, Time};
+use crate::measurement::{EncoderFault, PoseFix, Time};
 use crate::state::{Mode, PoseOutput, Reason};
 
 /// Time between two poses on the bus, s.
@@ -124,17 +123,18 @@ const WANTED_LAYER: Field = Field::unsigned(4, 16, 1.0);
 const STANDSTILL: Field = Field::unsigned(20, 1, 1.0);
 
 /// Numbers of the modes on the bus.
-const MODES: [(u64, Mode); 6] = [
+const MODES: [(u64, Mode); 7] = [
     (0, Mode::NotLocalised),
     (1, Mode::Reflectors),
     (2, Mode::Features),
     (3, Mode::Mixed),
     (4, Mode::DeadReckoning),
     (5, Mode::Lost),
+    (6, Mode::WithoutOdometry),
 ];
 
 /// Numbers of the reasons on the bus.
-const REASONS: [(u64, Reason); 7] = [
+const REASONS: [(u64, Reason); 9] = [
     (0, Reason::None),
     (1, Reason::NoPose),
     (2, Reason::NoLandmarks),
@@ -142,6 +142,8 @@ const REASONS: [(u64, Reason); 7] = [
     (4, Reason::InnovationsTooLarge),
     (5, Reason::Uncertain),
     (6, Reason::OdometryImplausible),
+    (7, Reason::DriveEncoder),
+    (8, Reason::SteeringEncoder),
 ];
 
 /// Numbers of the encoder faults on the bus; 0 is none.

@@ -3,8 +3,8 @@
 use super::encoder::{Encoder, EncoderEvent, EncoderReading, EncoderSettings, EncoderState, Reporting};
 use super::frame::Frame;
 use super::nmt::SyncProducer;
-use super::supervision::{EncoderFault, SupervisionLimits, Supervisor};
-use crate::measurement::{EncoderSample, Time};
+use super::supervision::{SupervisionLimits, Supervisor};
+use crate::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use crate::odometry::CounterRange;
 
 /// One of the two encoders.
@@ -99,15 +99,6 @@ impl Channel {
     }
 }
 
-/// The faults of both encoders.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct EncoderFaults {
-    /// Of the driving wheel's encoder.
-    pub drive: Option<EncoderFault>,
-    /// Of the steering's encoder.
-    pub steering: Option<EncoderFault>,
-}
-
 /// Sets up two encoders, watches them, and puts their positions together.
 ///
 /// A sample is true when the driving wheel's counter was read; the steering angle is that of the same moment, between
@@ -125,7 +116,12 @@ pub struct EncoderPair {
     last_drive: Option<u32>,
     /// A reading of the driving wheel that waits for the steering.
     waiting: Option<EncoderReading>,
+    /// What was said of faults last.
+    told_faults: EncoderFaults,
 }
+
+/// Time between two reports of a fault that lasts, s.
+pub const FAULT_PERIOD: f64 = 0.010;
 
 impl EncoderPair {
     /// Two encoders that have not been heard. If one reports at SYNC, the pair sends SYNC every `sync_period` seconds.
@@ -140,6 +136,7 @@ impl EncoderPair {
             drive_offset: 0,
             last_drive: None,
             waiting: None,
+            told_faults: EncoderFaults::default(),
         }
     }
 
@@ -169,7 +166,7 @@ impl EncoderPair {
         let reading = self.waiting?;
         let steering = self.steering.at(reading.time)?;
         self.waiting = None;
-        if self.faults(now) != EncoderFaults::default() {
+        if self.faults(now).any() {
             return None;
         }
         let drive = self.less(reading.position, self.drive_offset);
@@ -190,7 +187,19 @@ impl EncoderPair {
 
     /// The faults that the encoders have now.
     pub fn faults(&mut self, now: Time) -> EncoderFaults {
-        EncoderFaults { drive: self.drive.check(now), steering: self.steering.check(now) }
+        EncoderFaults { time: now, drive: self.drive.check(now), steering: self.steering.check(now) }
+    }
+
+    /// What there is to say of faults: when they change, and every [`FAULT_PERIOD`] seconds while there are any.
+    pub fn poll_faults(&mut self, now: Time) -> Option<EncoderFaults> {
+        let faults = self.faults(now);
+        let told = self.told_faults;
+        let has_changed = (faults.drive, faults.steering) != (told.drive, told.steering);
+        let is_due = faults.any() && now.since(told.time) >= FAULT_PERIOD;
+        (has_changed || is_due).then(|| {
+            self.told_faults = faults;
+            faults
+        })
     }
 
     /// Where the master is with the encoders: driving wheel, steering.

@@ -16,6 +16,7 @@
 
 pub mod canopen;
 pub mod controller;
+pub mod controller_node;
 pub mod drive_unit;
 pub mod emcy;
 pub mod encoder;

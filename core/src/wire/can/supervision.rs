@@ -7,27 +7,8 @@
 //! A counter that freezes is found by itself only while the vehicle is so fast that it could not have stopped within the
 //! time: from about 0.25 m/s if it brakes with 2.5 m/s^2. Below that it takes another's word that the vehicle moves.
 
-use crate::measurement::Time;
+use crate::measurement::{EncoderFault, Time};
 use crate::odometry::CounterRange;
-
-/// Why an encoder is not to be believed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EncoderFault {
-    /// A reading is overdue.
-    Late,
-    /// There have been no readings for so long that the encoder counts as absent.
-    Missing,
-    /// The counter stands still although the vehicle cannot.
-    Frozen,
-    /// The counter moved farther than the vehicle can.
-    Jumped,
-    /// The counter showed a value beyond its range.
-    OutOfRange,
-    /// The encoder itself reported an error.
-    Reported,
-    /// The encoder's heartbeat has ceased.
-    HeartbeatLost,
-}
 
 /// What an encoder on a sound vehicle does.
 #[derive(Clone, Copy, Debug, PartialEq)]

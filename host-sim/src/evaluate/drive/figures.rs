@@ -109,8 +109,15 @@ pub struct Accuracy {
 }
 
 /// All modes, in the order in which they are shown.
-pub const MODES: [Mode; 6] =
-    [Mode::NotLocalised, Mode::Reflectors, Mode::Features, Mode::Mixed, Mode::DeadReckoning, Mode::Lost];
+pub const MODES: [Mode; 7] = [
+    Mode::NotLocalised,
+    Mode::Reflectors,
+    Mode::Features,
+    Mode::Mixed,
+    Mode::DeadReckoning,
+    Mode::WithoutOdometry,
+    Mode::Lost,
+];
 
 /// All kinds, in the order in which they are shown.
 pub const KINDS: [LandmarkKind; 3] = [LandmarkKind::Reflector, LandmarkKind::Corner, LandmarkKind::EndPoint];

@@ -12,6 +12,7 @@ pub fn mode_name(mode: Mode) -> &'static str {
         Mode::Features => "features",
         Mode::Mixed => "mixed",
         Mode::DeadReckoning => "dead reckoning",
+        Mode::WithoutOdometry => "without odometry",
         Mode::Lost => "lost",
     }
 }
@@ -27,6 +28,8 @@ pub fn reason_name(reason: Reason) -> &'static str {
         Reason::InnovationsTooLarge => "innovations too large",
         Reason::Uncertain => "too uncertain",
         Reason::OdometryImplausible => "odometry implausible",
+        Reason::DriveEncoder => "the drive encoder has a fault",
+        Reason::SteeringEncoder => "the steering encoder has a fault",
     }
 }
 

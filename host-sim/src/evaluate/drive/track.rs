@@ -123,6 +123,10 @@ fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
             RecordedEvent::Encoders(sample) => odometer.encoders(sample),
             RecordedEvent::Speed(sample) => odometer.speed(sample),
             RecordedEvent::Increment(increment) => odometer.increment(increment),
+            RecordedEvent::EncoderFaults(_) => {
+                odometer.restart();
+                return 0.0;
+            }
             RecordedEvent::Reflectors(_) | RecordedEvent::Scan(_) | RecordedEvent::SetPose(_) => return 0.0,
         };
         // The chord: the motion's own distance is that of the driving wheel.

@@ -1,0 +1,18 @@
+//! Puts the memory layout of the chosen board where the linker finds it.
+
+use std::path::PathBuf;
+use std::{env, fs};
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
+        return;
+    }
+    let layout = if env::var_os("CARGO_FEATURE_AN500").is_some() { "src/board/an500/memory.x" } else { "../memory.x" };
+    println!("cargo:rerun-if-changed={layout}");
+    let folder = PathBuf::from(env::var_os("OUT_DIR").expect("cargo names the folder of outputs"));
+    fs::copy(layout, folder.join("memory.x")).expect("the memory layout can be copied");
+    println!("cargo:rustc-link-search={}", folder.display());
+    println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    println!("cargo:rustc-link-arg-bins=--nmagic");
+}

@@ -1,0 +1,53 @@
+//! What two encoders said on a bus whose master is another.
+
+use agv_core::measurement::{EncoderFaults, EncoderSample, Time};
+use agv_core::wire::can::canopen::Message;
+use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_core::wire::can::frame::Frame;
+use agv_core::wire::can::nmt::NmtState;
+use agv_core::wire::can::sdo::{AbortCode, Request, Response};
+
+/// Telegrams with which a pair sets up its encoders, at most.
+const SET_UP: usize = 100;
+
+/// Listens to encoders of which nobody can tell any more how they were set up: the profile's default PDO, and the ranges
+/// in the settings.
+#[derive(Clone, Debug)]
+pub struct EncoderListener {
+    pair: EncoderPair,
+    /// Before both were heard, silence is no fault.
+    is_complete: bool,
+}
+
+impl EncoderListener {
+    /// A listener from `start` on.
+    #[must_use]
+    pub fn new(drive: &ChannelSettings, steering: &ChannelSettings, start: Time) -> Self {
+        let mut pair = EncoderPair::new(drive, steering, 1.0, start);
+        for settings in [drive, steering] {
+            let boot_up = Message::Heartbeat { node: settings.encoder.node, state: NmtState::BootUp };
+            pair.handle(&boot_up.encode(), start);
+        }
+        // The pair is refused everything that it asks for, and takes the defaults.
+        for _ in 0..SET_UP {
+            let Some(asked) = pair.poll(start) else { continue };
+            if let Ok(Message::SdoRequest { node, bytes }) = Message::decode(&asked)
+                && let Ok(Request::Read(object) | Request::Write(object, _)) = Request::decode(bytes)
+            {
+                let refusal = Response::Abort(object, AbortCode::NoSuchObject).encode();
+                pair.handle(&Message::SdoResponse { node, bytes: refusal }.encode(), start);
+            }
+        }
+        Self { pair, is_complete: false }
+    }
+
+    /// Takes a frame that was seen at `time`; gives what it says of the faults, and the sample that it completes.
+    pub fn hear(&mut self, frame: &Frame, time: Time) -> (Option<EncoderFaults>, Option<EncoderSample>) {
+        // Nobody is told to do anything.
+        while self.pair.poll(time).is_some() {}
+        let faults = self.pair.poll_faults(time).filter(|_| self.is_complete);
+        let sample = self.pair.handle(frame, time);
+        self.is_complete |= sample.is_some();
+        (faults, sample)
+    }
+}

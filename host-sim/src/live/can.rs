@@ -1,0 +1,131 @@
+//! What the encoders of a vehicle and other controllers say on a CAN bus, as a log.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use agv_core::localizer::{Event, Parameters};
+use agv_core::measurement::{EncoderFault, Time};
+use agv_core::record::{RawSource, Record};
+use agv_core::wire::can::frame::{AnyFrame, Frame};
+use agv_core::wire::can::slcan::Message;
+
+use super::{LiveError, Recorder};
+use crate::bus::{Bus, BusError};
+use crate::link::clock::Clock;
+use crate::link::encoders::{EncoderLink, EncoderNodes, Outcome};
+use crate::log::LogError;
+
+/// What a recording brought.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CanSummary {
+    /// Frames of others.
+    pub frames: usize,
+    /// Samples of both encoders.
+    pub samples: usize,
+    /// Times at which a fault began or ended.
+    pub fault_changes: usize,
+    /// How often the bus was lost.
+    pub lost: usize,
+}
+
+/// How long a look at the bus may take.
+const LOOK: Duration = Duration::from_millis(5);
+/// Pause before a bus that was lost is opened again.
+const PAUSE: Duration = Duration::from_secs(1);
+
+struct Recording<'a> {
+    recorder: &'a Recorder,
+    link: EncoderLink,
+    summary: CanSummary,
+    faults: [Option<EncoderFault>; 2],
+}
+
+/// Records what is said on a CAN bus until `until` or `is_stopped`, and is the master of the encoders there: the frames
+/// of both directions, what they mean, and a note of everything that happened to the bus and the encoders. `open` opens
+/// the bus, again and again if it is lost.
+///
+/// # Errors
+/// If the log cannot be written, or the bus cannot be opened the first time.
+pub fn record_can(
+    mut open: impl FnMut() -> Result<Box<dyn Bus>, BusError>,
+    nodes: &EncoderNodes,
+    parameters: &Parameters,
+    clock: Clock,
+    until: Time,
+    is_stopped: &AtomicBool,
+    recorder: &Recorder,
+) -> Result<CanSummary, LiveError> {
+    let mut bus = Some(open()?);
+    let start = clock.now();
+    recorder.write_raw(RawSource::FromCan, start, &[])?;
+    let link = EncoderLink::new(nodes, parameters, start);
+    let mut recording = Recording { recorder, link, summary: CanSummary::default(), faults: [None; 2] };
+    let mut tried = Instant::now();
+    while !is_stopped.load(Ordering::Relaxed) && clock.now() < until {
+        let deadline = Instant::now() + LOOK.min(clock.until(until));
+        let outcome = match &mut bus {
+            Some(bus) => recording.look(&mut **bus, clock, deadline),
+            None => {
+                std::thread::sleep(LOOK);
+                recording.step(clock.now(), None)?;
+                Ok(())
+            }
+        };
+        match outcome {
+            Ok(()) => {}
+            Err(LiveError::Log(error)) => return Err(error.into()),
+            Err(LiveError::Bus(error)) => {
+                recording.summary.lost += 1;
+                recorder.write(&Record::Note(&format!("can: lost: {error}")))?;
+                (bus, tried) = (None, Instant::now());
+            }
+        }
+        if bus.is_none() && tried.elapsed() >= PAUSE {
+            tried = Instant::now();
+            bus = open().ok();
+            if bus.is_some() {
+                recorder.write(&Record::Note("can: opened again"))?;
+            }
+        }
+    }
+    Ok(recording.summary)
+}
+
+impl Recording<'_> {
+    fn look(&mut self, bus: &mut dyn Bus, clock: Clock, deadline: Instant) -> Result<(), LiveError> {
+        let frame = bus.receive(deadline)?;
+        for frame in self.step(clock.now(), frame.as_ref())? {
+            bus.send(&frame.into())?;
+        }
+        Ok(())
+    }
+
+    /// Records one look and what comes of it; gives the frames to send.
+    fn step(&mut self, now: Time, frame: Option<&AnyFrame>) -> Result<Vec<Frame>, LogError> {
+        let Self { recorder, link, summary, faults } = self;
+        let line = frame.map(|frame| Message::from(*frame).encode()).unwrap_or_default();
+        recorder.write_raw(RawSource::FromCan, now, &line)?;
+        summary.frames += usize::from(frame.is_some());
+        let mut answers = Vec::new();
+        link.look(now, frame.and_then(AnyFrame::classic), |outcome| match outcome {
+            Outcome::Send(frame) => {
+                answers.push(frame);
+                recorder.write_raw(RawSource::ToCan, now, &Message::from(AnyFrame::from(frame)).encode())
+            }
+            Outcome::Event(event) => {
+                summary.samples += usize::from(matches!(event, Event::Encoders(_)));
+                if let Event::EncoderFaults(found) = event
+                    && [found.drive, found.steering] != *faults
+                {
+                    *faults = [found.drive, found.steering];
+                    summary.fault_changes += 1;
+                    let name = |fault: Option<_>| fault.map_or("sound".to_owned(), |fault| format!("{fault:?}"));
+                    let note = format!("can: encoders: drive {}, steering {}", name(found.drive), name(found.steering));
+                    recorder.write(&Record::Note(&note.to_lowercase()))?;
+                }
+                recorder.write(&Record::Event(event))
+            }
+        })?;
+        Ok(answers)
+    }
+}

@@ -1,0 +1,97 @@
+//! The firmware's images in emulation: the same bits as here, at a cost that is counted.
+//!
+//! The images are those of `cargo xtask firmware build`, which `cargo xtask test` runs first.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use agv_host_sim::evaluate::demonstration;
+use agv_host_sim::{data, log, replay};
+
+/// The folder of the images of the emulated board. None, and a word about it, if one is missing or there is no emulator.
+fn images(test: &str) -> Option<PathBuf> {
+    let target = "../target/firmware/an500/thumbv7em-none-eabihf/firmware";
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(target);
+    if !folder.join("replay").exists() || !folder.join("measure").exists() {
+        data::skip(test, "the firmware is not built; cargo xtask firmware build");
+        return None;
+    }
+    if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|output| output.status.success()) {
+        data::skip(test, "there is no qemu-system-arm");
+        return None;
+    }
+    Some(folder)
+}
+
+/// Runs an image in `folder`, with the files there.
+fn run(image: &Path, folder: &Path, options: &[&str]) {
+    let output = Command::new("qemu-system-arm")
+        .args(["-M", "mps2-an500", "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .args(options)
+        .arg("-kernel")
+        .arg(image)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+}
+
+#[test]
+fn the_emulated_controller_says_the_same_bits() {
+    let Some(images) = images("the_emulated_controller_says_the_same_bits") else { return };
+    for drive in demonstration::run(|_| ()).unwrap() {
+        let folder = tempfile::tempdir().unwrap();
+        log::write(&folder.path().join("drive.agvlog"), &drive.recording).unwrap();
+        run(&images.join("replay"), folder.path(), &[]);
+        let contents = log::read_contents(&folder.path().join("replayed.agvlog"), |_| ()).unwrap();
+        assert!(contents.damages.is_empty(), "{:?}", contents.damages);
+        assert_eq!(contents.outputs.len(), drive.recording.events.len());
+        let comparison = replay::compare(&contents.outputs, &drive.replay);
+        assert_eq!(comparison.first_difference, None, "{}", drive.name);
+        assert!(comparison.compared > 1000);
+    }
+}
+
+/// Most instructions that a piece of work may take: with 480 MHz, the scan cycle ends in about 10 ms.
+const BUDGETS: [(&str, u64); 4] = [
+    ("prediction", 4_000),
+    ("one reflector update", 25_000),
+    ("falko on 1440 beams", 3_000_000),
+    ("scan cycle", 5_000_000),
+];
+
+#[test]
+fn work_costs_the_instructions_that_it_did() {
+    let Some(images) = images("work_costs_the_instructions_that_it_did") else { return };
+    let drives = demonstration::run(|_| ()).unwrap();
+    let drive = drives.iter().find(|drive| drive.name == "mixed").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    log::write(&folder.path().join("drive.agvlog"), &drive.recording).unwrap();
+    let measure = || {
+        run(&images.join("measure"), folder.path(), &["-icount", "shift=6,sleep=off"]);
+        std::fs::read_to_string(folder.path().join("instructions.csv")).unwrap()
+    };
+    let found = measure();
+    assert_eq!(found, measure(), "the count is not repeatable");
+    let rows: Vec<Vec<&str>> = found.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    for (work, budget) in BUDGETS {
+        let row = rows.iter().find(|row| row[0] == work).unwrap();
+        let most: u64 = row[3].parse().unwrap();
+        assert!(row[1].parse::<u64>().unwrap() > 10, "{row:?}");
+        assert!(most <= budget, "{work} takes {most} instructions, {budget} are allowed");
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/instructions.csv");
+    if std::env::var_os("AGV_ACCEPT").is_some() {
+        std::fs::write(&path, &found).unwrap();
+        return;
+    }
+    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    for (kept, found) in kept.lines().skip(1).zip(found.lines().skip(1)) {
+        // Another compiler counts a little differently; what changes more is to be looked at.
+        let number = |line: &str| line.rsplit(',').next().and_then(|word| word.parse::<f64>().ok()).unwrap();
+        let ratio = number(found) / number(kept);
+        assert!((0.9..=1.1).contains(&ratio), "kept {kept}, found {found}");
+    }
+    assert_eq!(kept.lines().count(), found.lines().count());
+}

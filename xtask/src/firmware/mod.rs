@@ -1,0 +1,107 @@
+//! `cargo xtask firmware`.
+
+mod image;
+mod size;
+mod toolchain;
+
+use std::process::Command;
+
+use anyhow::{Context, bail};
+
+use crate::repository;
+use image::{AN500, BOARDS, Board};
+
+/// Build the firmware, run it in emulation, say how large it is, flash it
+#[derive(clap::Args)]
+pub struct Firmware {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(clap::Subcommand)]
+enum Action {
+    /// Build the images of every board.
+    Build,
+    /// Run an image of the emulated board in this folder, with this folder's files.
+    Run {
+        /// Name of the image.
+        image: String,
+        /// Count instructions exactly: no input from outside.
+        #[arg(long)]
+        icount: bool,
+    },
+    /// Flash, RAM and stack of every image, against its budget.
+    Size,
+    /// Flash an image to a vehicle's board, through probe-rs.
+    Flash {
+        /// Name of the image.
+        #[arg(default_value = "vehicle")]
+        image: String,
+    },
+}
+
+impl Firmware {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        match self.action {
+            Action::Build => build(),
+            Action::Run { image, icount } => {
+                build_board(&AN500)?;
+                emulate(&image, icount)
+            }
+            Action::Size => {
+                build()?;
+                size::print()
+            }
+            Action::Flash { image } => flash(&image),
+        }
+    }
+}
+
+/// Builds the images of every board.
+pub fn build() -> anyhow::Result<()> {
+    BOARDS.iter().try_for_each(|board| build_board(board))
+}
+
+/// Fails if an image is larger than its budget.
+pub fn check_sizes() -> anyhow::Result<()> {
+    size::print()
+}
+
+fn build_board(board: &Board) -> anyhow::Result<()> {
+    if board.images.is_empty() {
+        return Ok(());
+    }
+    let mut cargo = toolchain::cargo()?;
+    cargo.args(["build", "--package", "agv-firmware", "--profile", "firmware"]);
+    cargo.args(["--target", image::TARGET, "--features", board.feature, "--target-dir"]);
+    cargo.arg(board.folder());
+    for image in board.images {
+        cargo.args(["--bin", image]);
+    }
+    if !cargo.status().context("cargo cannot be started")?.success() {
+        bail!("the firmware of {} does not build", board.feature);
+    }
+    Ok(())
+}
+
+fn emulate(name: &str, icount: bool) -> anyhow::Result<()> {
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-M", "mps2-an500", "-nographic", "-monitor", "none", "-serial", "none"]);
+    qemu.args(["-semihosting-config", "enable=on,target=native"]);
+    if icount {
+        qemu.args(["-icount", "shift=6,sleep=off"]);
+    }
+    qemu.arg("-kernel").arg(AN500.image(name)?);
+    let status = qemu.status().context("qemu-system-arm cannot be started; apt-get install qemu-system-arm")?;
+    if status.success() { Ok(()) } else { bail!("{name} failed") }
+}
+
+fn flash(name: &str) -> anyhow::Result<()> {
+    let board = &image::H743;
+    build_board(board)?;
+    let mut probe = Command::new("probe-rs");
+    probe.args(["download", "--chip", "STM32H743ZITx"]).arg(board.image(name)?).current_dir(repository());
+    let status = probe.status().context("probe-rs cannot be started; cargo install probe-rs-tools")?;
+    if status.success() { Ok(()) } else { bail!("{name} was not flashed") }
+}

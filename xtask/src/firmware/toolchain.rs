@@ -1,0 +1,50 @@
+//! Which compiler builds for the boards.
+
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::bail;
+
+use super::image::TARGET;
+use crate::packages;
+use crate::repository;
+
+/// Compiler of Debian's package `rustc-web`, which comes with the sources of its own `core` in `rust-web-src`.
+const DEBIAN: &str = "/usr/bin/rustc";
+
+/// `cargo`, set up to build for the boards: the target of rustup where it is installed, else Debian's matched pair of
+/// compiler and sources.
+///
+/// # Errors
+/// If there is neither, with what to install.
+pub fn cargo() -> anyhow::Result<Command> {
+    let mut cargo = Command::new("cargo");
+    cargo.current_dir(repository());
+    if has_target() {
+        return Ok(cargo);
+    }
+    if !has_sources() {
+        packages::install(&["rustc-web", "rust-web-src"]);
+    }
+    if !has_sources() {
+        bail!("nothing here builds for {TARGET}: `rustup target add {TARGET}`, or Debian's rustc-web and rust-web-src");
+    }
+    cargo.env("RUSTC", DEBIAN).env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
+    cargo.arg("-Zbuild-std=core");
+    Ok(cargo)
+}
+
+fn output(command: &mut Command) -> Option<String> {
+    let output = command.output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+fn has_target() -> bool {
+    let folder = output(Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]));
+    folder.is_some_and(|folder| Path::new(&folder).is_dir())
+}
+
+fn has_sources() -> bool {
+    let root = output(Command::new(DEBIAN).args(["--print", "sysroot"]));
+    root.is_some_and(|root| Path::new(&root).join("lib/rustlib/src/rust/library/core").is_dir())
+}
