@@ -2,6 +2,7 @@
 
 pub mod accuracy;
 pub mod carpark;
+pub mod carpark_starts;
 pub mod demonstration;
 pub mod drive;
 pub mod falko;
