@@ -4,6 +4,7 @@ mod carpark;
 mod falko;
 mod kidnapping;
 mod places;
+mod slam;
 mod warehouse;
 
 /// A log of the thesis.
@@ -35,6 +36,7 @@ enum Experiment {
     Falko(falko::Falko),
     Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
+    Slam(slam::Slam),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -46,6 +48,7 @@ impl Evaluate {
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
+            Experiment::Slam(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

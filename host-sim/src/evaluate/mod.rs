@@ -9,4 +9,5 @@ pub mod falko;
 pub mod kidnapping;
 pub mod places;
 pub mod repeatability;
+pub mod slam;
 pub mod warehouse;

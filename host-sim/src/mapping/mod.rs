@@ -3,6 +3,8 @@
 mod clustering;
 mod known_poses;
 pub mod map_file;
+pub mod pose_graph;
+pub mod slam;
 
 pub use clustering::{Clustering, Sighting, cluster};
 

@@ -1,0 +1,77 @@
+//! `agv evaluate slam`.
+
+use std::path::PathBuf;
+
+use agv_host_sim::data;
+use agv_host_sim::evaluate::slam::run;
+use agv_host_sim::mapping::slam::SlamParameters;
+use anyhow::Context;
+
+use crate::command::progress;
+
+const HELP: &str = "\
+Examples:
+  agv evaluate slam
+  agv evaluate slam --log aces-corrected.log.gz --json";
+
+/// A map of a real office from raw odometry and scans, against the corrected poses of others.
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Slam {
+    /// CARMEN log with raw odometry and corrected poses; that of fr079 if absent.
+    #[arg(long)]
+    log: Option<PathBuf>,
+    /// Print a JSON array instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Slam {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let folder = data::folder().map(|folder| folder.join("scans2d"));
+        let (log, relations) = match (self.log, folder) {
+            (Some(log), _) => (log, None),
+            (None, Some(folder)) => {
+                let relations = (folder.join("fr079.relations"), folder.join("fr079.log"));
+                (folder.join("freiburg-079-corrected.log.gz"), Some(relations))
+            }
+            (None, None) => {
+                return Err(anyhow::anyhow!("set AGV_DATA to the folder of recordings"))
+                    .context("the recordings are not there");
+            }
+        };
+        let relations = relations.as_ref().map(|(file, graph)| (file.as_path(), graph.as_path()));
+        let bar = progress::bar("mapping", 0);
+        let mut outcomes = Vec::new();
+        for (name, parameters) in [("honest", SlamParameters::honest()), ("all", SlamParameters::all())] {
+            outcomes.push(run(&log, relations, name, &parameters, || bar.inc(1))?.0);
+        }
+        bar.finish_and_clear();
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&outcomes)?);
+            return Ok(());
+        }
+        println!("closures  key scans  mean error  largest  heading  odometry  loops  refused  false  relations  s");
+        for outcome in outcomes {
+            println!(
+                "{:<9} {:>9} {:>9.3} m {:>6.3} m {:>6.2}° {:>7.2} m {:>6} {:>8} {:>6} {:>8} {:>4.0}",
+                outcome.closures,
+                outcome.key_scans,
+                outcome.mean_position_error_m,
+                outcome.max_position_error_m,
+                outcome.mean_heading_error_deg,
+                outcome.odometry_error_m,
+                outcome.loops,
+                outcome.refused,
+                outcome.false_loops,
+                outcome.relations.map_or("-".to_owned(), |relations| format!(
+                    "{:.3} m of {} (corrected {:.3})",
+                    relations.mean_shift_m, relations.relations, relations.corrected_mean_shift_m
+                )),
+                outcome.seconds,
+            );
+        }
+        Ok(())
+    }
+}
