@@ -8,10 +8,11 @@ use agv_core::measurement::Time;
 use agv_core::places::align;
 use serde::Serialize;
 
-use crate::import::{ScanLog, carmen};
+use crate::import::{ScanLog, carmen, graph_log};
 use crate::mapping::pose_graph::{Edge, PoseGraphError};
 use crate::mapping::slam::{SlamMap, SlamParameters, map};
-use crate::text_file::TextFileError;
+use crate::recording::RecordedScan;
+use crate::text_file::{self, TextFileError};
 
 /// How good a map is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,9 +66,60 @@ pub enum SlamError {
     PoseGraph(#[from] PoseGraphError),
 }
 
-/// Where raw odometry has the laser at each scan; the first scan is where its corrected pose is.
-#[must_use]
-pub fn odometry(log: &ScanLog) -> Vec<Pose> {
+/// Scans with raw odometry, and the corrected poses that the mapping does not see.
+#[derive(Clone, Debug)]
+pub struct OfficeDrive {
+    /// Scans.
+    pub scans: Vec<RecordedScan>,
+    /// Pose of the laser at each scan by raw odometry.
+    pub odometry: Vec<Pose>,
+    /// Corrected pose of the laser at each scan.
+    pub truth: Vec<Pose>,
+    /// Number of the scan by its own time in the log, ns; empty if the log has no relations.
+    by_time: BTreeMap<i64, usize>,
+}
+
+impl OfficeDrive {
+    /// A CARMEN log with both.
+    ///
+    /// # Errors
+    /// If the log cannot be read.
+    pub fn of_carmen(log: &Path) -> Result<Self, TextFileError> {
+        let log = carmen::read(log)?.front;
+        let times: Vec<Time> = log.scans.iter().map(|scan| scan.scan.start).collect();
+        let odometry = odometry_at(&log, &times);
+        let odometry =
+            odometry.iter().zip(&log.scans).map(|(robot, scan)| robot.compose(&scan.robot.between(&scan.laser)));
+        Ok(Self {
+            odometry: odometry.collect(),
+            truth: log.scans.iter().map(|scan| scan.laser).collect(),
+            scans: log.scans.into_iter().map(|scan| scan.scan).collect(),
+            by_time: BTreeMap::new(),
+        })
+    }
+
+    /// The scans and corrected poses of a graph log, with the raw odometry of the CARMEN log of the same drive: each
+    /// scan of the graph log states when it was logged, by the clock of the other.
+    ///
+    /// # Errors
+    /// If a log cannot be read.
+    pub fn of_graph(graph: &Path, carmen_log: &Path) -> Result<Self, TextFileError> {
+        let scans = graph_log::read(graph)?.log.scans;
+        let logged = logging_times(&text_file::read(graph, "a pose graph with scans")?);
+        let times: Vec<Time> = logged.iter().map(|(_, logged)| Time::from_seconds(*logged)).collect();
+        let odometry = odometry_at(&carmen::read(carmen_log)?.front, &times);
+        let odometry = odometry.iter().zip(&scans).map(|(robot, scan)| robot.compose(&scan.robot.between(&scan.laser)));
+        Ok(Self {
+            odometry: odometry.collect(),
+            truth: scans.iter().map(|scan| scan.laser).collect(),
+            scans: scans.into_iter().map(|scan| scan.scan).collect(),
+            by_time: logged.iter().enumerate().map(|(number, (own, _))| (nano(*own), number)).collect(),
+        })
+    }
+}
+
+/// Where raw odometry has the robot at those times.
+fn odometry_at(log: &ScanLog, times: &[Time]) -> Vec<Pose> {
     let mut at = Vec::with_capacity(log.increments.len() + 1);
     let mut pose = Pose::default();
     at.push((Time::default(), pose));
@@ -75,8 +127,8 @@ pub fn odometry(log: &ScanLog) -> Vec<Pose> {
         pose = pose.compose(&increment.displacement);
         at.push((increment.time, pose));
     }
-    let robot = |time: Time| {
-        let after = at.partition_point(|(other, _)| *other <= time);
+    let robot = |time: &Time| {
+        let after = at.partition_point(|(other, _)| other <= time);
         match (at.get(after.wrapping_sub(1)), at.get(after)) {
             (Some(before), Some(next)) => {
                 let duration = next.0.since(before.0);
@@ -87,26 +139,23 @@ pub fn odometry(log: &ScanLog) -> Vec<Pose> {
             (None, _) => Pose::default(),
         }
     };
-    let laser_of = |scan: &crate::import::PosedScan| scan.robot.between(&scan.laser);
-    log.scans.iter().map(|scan| robot(scan.scan.start).compose(&laser_of(scan))).collect()
+    times.iter().map(robot).collect()
 }
 
-/// Maps a CARMEN log with corrected poses, which the mapping does not see.
+/// Maps a drive.
 ///
 /// # Errors
 /// See [`SlamError`].
 pub fn run(
-    log: &Path,
-    relations: Option<(&Path, &Path)>,
+    drive: &OfficeDrive,
+    relations: Option<&Path>,
     closures: &'static str,
     parameters: &SlamParameters,
     done: impl Fn(),
-) -> Result<(Outcome, SlamMap, Vec<Pose>), SlamError> {
-    let log = carmen::read(log)?.front;
-    let poses = odometry(&log);
-    let scans: Vec<_> = log.scans.iter().zip(&poses).map(|(scan, pose)| (&scan.scan, *pose)).collect();
+) -> Result<(Outcome, SlamMap), SlamError> {
+    let scans: Vec<_> = drive.scans.iter().zip(drive.odometry.iter().copied()).collect();
     let map = map(&scans, parameters, done)?;
-    let truth: Vec<Pose> = map.keys.iter().map(|key| log.scans[key.scan].laser).collect();
+    let truth: Vec<Pose> = map.keys.iter().map(|key| drive.truth[key.scan]).collect();
     let errors = fitted(&map.poses, &truth);
     let drift: Vec<Pose> = map.keys.iter().map(|key| key.odometry).collect();
     let shifts = |errors: &[Pose]| errors.iter().map(|error| error.position().norm()).collect::<Vec<_>>();
@@ -117,7 +166,7 @@ pub fn run(
     };
     let shift = shifts(&errors);
     let relations = match relations {
-        Some((file, graph)) => relation_errors(file, graph, &map, &truth)?,
+        Some(file) => relation_errors(file, drive, &map)?,
         None => None,
     };
     let outcome = Outcome {
@@ -133,7 +182,7 @@ pub fn run(
         relations,
         seconds: map.elapsed,
     };
-    Ok((outcome, map, truth))
+    Ok((outcome, map))
 }
 
 /// Errors of poses after the best rigid fit of their positions to the true ones.
@@ -144,16 +193,15 @@ fn fitted(poses: &[Pose], truth: &[Pose]) -> Vec<Pose> {
 }
 
 /// Errors of hand-verified relations between scans that are named by their time in the graph log.
-fn relation_errors(file: &Path, graph: &Path, map: &SlamMap, truth: &[Pose]) -> Result<Option<Relations>, SlamError> {
-    let text = crate::text_file::read(file, "relations of a log")?;
-    let times = logging_times(&crate::text_file::read(graph, "a pose graph with scans")?);
-    // A scan of the graph log is in the map if a key scan was taken so near to it that nothing moves in between.
+fn relation_errors(file: &Path, drive: &OfficeDrive, map: &SlamMap) -> Result<Option<Relations>, TextFileError> {
+    let text = text_file::read(file, "relations of a log")?;
+    // The two files round the time differently.
     let key_of = |name: &str| {
         let name: f64 = name.parse().ok()?;
-        let time = times.range(nano(name - 1e-4)..=nano(name + 1e-4)).next()?.1;
-        let number = map.keys.partition_point(|key| key.time.seconds() < time - NEAR);
-        map.keys.get(number).filter(|key| (key.time.seconds() - time).abs() <= NEAR).map(|_| number)
+        let (_, scan) = drive.by_time.range(nano(name - SAME_TIME)..=nano(name + SAME_TIME)).next()?;
+        map.keys.binary_search_by_key(scan, |key| key.scan).ok()
     };
+    let truth: Vec<Pose> = map.keys.iter().map(|key| drive.truth[key.scan]).collect();
     let (mut shift, mut turn, mut corrected, mut count) = (0.0, 0.0, 0.0, 0);
     for line in text.lines() {
         let words: Vec<_> = line.split_ascii_whitespace().collect();
@@ -178,25 +226,23 @@ fn relation_errors(file: &Path, graph: &Path, map: &SlamMap, truth: &[Pose]) -> 
 }
 
 /// Scans this near in time are one, s.
-const NEAR: f64 = 0.02;
+const SAME_TIME: f64 = 1e-4;
 
 fn nano(seconds: f64) -> i64 {
     (seconds * 1e9) as i64
 }
 
-/// For each scan of a graph log, by its own time, the time of logging, counted from the first one, s.
-fn logging_times(text: &str) -> BTreeMap<i64, f64> {
-    let mut times = BTreeMap::new();
+/// Of each scan of a graph log its own time and that of logging, counted from the first one, s.
+fn logging_times(text: &str) -> Vec<(f64, f64)> {
     let mut start = None;
-    for line in text.lines().filter(|line| line.starts_with("ROBOTLASER1")) {
+    let of_line = |line: &str| {
         let mut words = line.split_ascii_whitespace().rev();
-        let (Some(logged), Some(_), Some(own)) = (words.next(), words.next(), words.next()) else { continue };
-        if let (Ok(logged), Ok(own)) = (logged.parse::<f64>(), own.parse::<f64>()) {
-            let start = *start.get_or_insert(logged);
-            times.insert(nano(own), logged - start);
-        }
-    }
-    times
+        let (logged, _, own) = (words.next()?, words.next()?, words.next()?);
+        let logged: f64 = logged.parse().ok()?;
+        let start = *start.get_or_insert(logged);
+        Some((own.parse().ok()?, logged - start))
+    };
+    text.lines().filter(|line| line.starts_with("ROBOTLASER1")).filter_map(of_line).collect()
 }
 
 /// Where the points of a map lie once it is fitted to the true poses, m.

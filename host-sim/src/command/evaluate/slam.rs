@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use agv_host_sim::data;
-use agv_host_sim::evaluate::slam::run;
+use agv_host_sim::evaluate::slam::{OfficeDrive, run};
 use agv_host_sim::mapping::slam::SlamParameters;
 use anyhow::Context;
 
@@ -29,23 +29,21 @@ pub struct Slam {
 impl Slam {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let folder = data::folder().map(|folder| folder.join("scans2d"));
-        let (log, relations) = match (self.log, folder) {
-            (Some(log), _) => (log, None),
-            (None, Some(folder)) => {
-                let relations = (folder.join("fr079.relations"), folder.join("fr079.log"));
-                (folder.join("freiburg-079-corrected.log.gz"), Some(relations))
-            }
-            (None, None) => {
-                return Err(anyhow::anyhow!("set AGV_DATA to the folder of recordings"))
-                    .context("the recordings are not there");
+        let folder = || {
+            Ok::<_, anyhow::Error>(data::folder().context("set AGV_DATA to the folder of recordings")?.join("scans2d"))
+        };
+        let (drive, relations) = match &self.log {
+            Some(log) => (OfficeDrive::of_carmen(log)?, None),
+            None => {
+                let folder = folder()?;
+                let carmen_log = folder.join("freiburg-079-corrected.log.gz");
+                (OfficeDrive::of_graph(&folder.join("fr079.log"), &carmen_log)?, Some(folder.join("fr079.relations")))
             }
         };
-        let relations = relations.as_ref().map(|(file, graph)| (file.as_path(), graph.as_path()));
         let bar = progress::bar("mapping", 0);
         let mut outcomes = Vec::new();
         for (name, parameters) in [("honest", SlamParameters::honest()), ("all", SlamParameters::all())] {
-            outcomes.push(run(&log, relations, name, &parameters, || bar.inc(1))?.0);
+            outcomes.push(run(&drive, relations.as_deref(), name, &parameters, || bar.inc(1))?.0);
         }
         bar.finish_and_clear();
         if self.json {
