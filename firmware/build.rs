@@ -12,7 +12,10 @@ fn main() {
     println!("cargo:rerun-if-changed={layout}");
     let folder = PathBuf::from(env::var_os("OUT_DIR").expect("cargo names the folder of outputs"));
     fs::copy(layout, folder.join("memory.x")).expect("the memory layout can be copied");
+    // The interrupt vectors are in the program itself.
+    fs::write(folder.join("device.x"), "").expect("the folder of outputs can be written");
     println!("cargo:rustc-link-search={}", folder.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rustc-link-arg-bins=--nmagic");
+    println!("cargo:rustc-link-arg-bin=vehicle=-Tdefmt.x");
 }

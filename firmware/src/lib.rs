@@ -4,4 +4,6 @@
 #![no_std]
 
 #[cfg(target_os = "none")]
+pub mod app;
+#[cfg(target_os = "none")]
 pub mod board;

@@ -83,7 +83,7 @@ fn a_drive_is_read_as_it_was_written() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 30, rng_seed: prop::test_runner::RngSeed::Fixed(2), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 30, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Many scans, so that the reader's buffer is refilled within records.
     #[test]

@@ -39,7 +39,7 @@ fn decode_all(bytes: &[u8]) -> Vec<Result<Message, SlcanError>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, rng_seed: prop::test_runner::RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn what_is_encoded_is_decoded(messages in prop::collection::vec(any_message(), 1..8)) {

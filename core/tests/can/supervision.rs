@@ -41,7 +41,7 @@ fn counter(metres: f64, start: f64) -> u32 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 256, rng_seed: prop::test_runner::RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Any top speed and direction, any start of the counter, frames that come up to 4 ms late.
     #[test]

@@ -23,7 +23,7 @@ use super::output::print_rows;
 use super::stop;
 
 const HELP: &str = "\
-Ends after --duration, or with Ctrl-C. What is older than a second survives a loss of power.
+Ends after --duration or --scans, or with Ctrl-C. What is older than a second survives a loss of power.
 
 Examples:
   agv record --nav350 192.168.1.10 --can can0 --like hall.agvlog --output drive.agvlog
@@ -49,6 +49,9 @@ pub struct Record {
     /// How long to record, s; until Ctrl-C if absent.
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
+    /// End after at least so many scans of the NAV350.
+    #[arg(long, value_name = "COUNT", requires = "nav350")]
+    scans: Option<usize>,
     /// Log to write; an older one is replaced.
     #[arg(short, long, value_name = "LOG")]
     output: PathBuf,
@@ -96,6 +99,9 @@ impl Record {
                 outcome
             });
             let nav350 = self.record_nav350(clock, until, &is_stopped, &recorder);
+            if self.scans.is_some() || nav350.is_err() {
+                is_stopped.store(true, Ordering::Relaxed);
+            }
             (nav350, can.join())
         });
         recorder.finish()?;
@@ -129,7 +135,7 @@ impl Record {
     ) -> Result<Summary, log::LogError> {
         let Some(host) = &self.nav350 else { return Ok(Summary::default()) };
         let mut link = Link::new(&address(host), Configuration::default(), clock);
-        live::record_nav350(&mut link, until, is_stopped, recorder)
+        live::record_nav350(&mut link, until, self.scans.unwrap_or(usize::MAX), is_stopped, recorder)
     }
 
     fn record_can(

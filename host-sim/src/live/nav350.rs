@@ -26,7 +26,7 @@ pub struct Summary {
 /// How long the link is left alone before `is_stopped` is looked at, s.
 const SLICE: f64 = 0.1;
 
-/// Records what a NAV350 says until `until` or `is_stopped`: the bytes of both directions, what they mean, and a note of
+/// Records what a NAV350 says until `until`, `is_stopped` or `scans` scans: the bytes of both directions, what they mean, and a note of
 /// everything that happened to the connection.
 ///
 /// # Errors
@@ -34,11 +34,12 @@ const SLICE: f64 = 0.1;
 pub fn record_nav350(
     link: &mut Link,
     until: Time,
+    scans: usize,
     is_stopped: &AtomicBool,
     recorder: &Recorder,
 ) -> Result<Summary, LogError> {
     let mut summary = Summary::default();
-    while !is_stopped.load(Ordering::Relaxed) && link.clock().now() < until {
+    while summary.scans < scans && !is_stopped.load(Ordering::Relaxed) && link.clock().now() < until {
         let slice = link.clock().now().offset(SLICE * link.clock().speed()).min(until);
         link.run(slice, |time, happening| record(recorder, &mut summary, time, happening))?;
     }

@@ -6,6 +6,7 @@ use std::process::{Child, Command, Stdio};
 
 use agv_host_sim::layout_file;
 use agv_host_sim::log;
+use agv_host_sim::recording::RecordedEvent;
 
 use crate::support::{Files, agv, refusal, text};
 
@@ -53,7 +54,8 @@ fn a_sensor_is_probed_recorded_and_given_a_layout() {
     let host = server.host.as_str();
 
     let probe = succeed(&["nav350", "probe", host]);
-    for expected in ["Binary", "NAV350 emulated", "beams            1440", "navigation"] {
+    let probe = probe.split_whitespace().collect::<Vec<_>>().join(" ");
+    for expected in ["dialect Binary", "DeviceIdent NAV350 emulated", "beams 1440", "mode navigation"] {
         assert!(probe.contains(expected), "{expected}: {probe}");
     }
 
@@ -67,9 +69,10 @@ fn a_sensor_is_probed_recorded_and_given_a_layout() {
     assert_eq!(layout_file::load(Path::new(&again)).unwrap(), layout);
 
     let recorded = files.path("live.agvlog");
-    succeed(&["record", "--nav350", host, "--duration", "3", "-o", &recorded]);
+    succeed(&["record", "--nav350", host, "--scans", "2", "--duration", "120", "-o", &recorded]);
     let (recording, damages) = log::read(Path::new(&recorded)).unwrap();
-    assert!(damages.is_empty() && !recording.events.is_empty());
+    assert!(damages.is_empty());
+    assert!(recording.events.iter().any(|event| matches!(event, RecordedEvent::Scan(_))));
 }
 
 #[test]

@@ -74,7 +74,8 @@ fn record(address: SocketAddr, recording: &Recording, seconds: f64, first: Diale
     };
     let mut link = Link::new(&address.to_string(), configuration, clock);
     let is_stopped = AtomicBool::new(false);
-    let summary = live::record_nav350(&mut link, clock.now().offset(seconds), &is_stopped, &recorder).unwrap();
+    let until = clock.now().offset(seconds);
+    let summary = live::record_nav350(&mut link, until, usize::MAX, &is_stopped, &recorder).unwrap();
     recorder.finish().unwrap();
     summary
 }

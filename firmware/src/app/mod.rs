@@ -1,0 +1,9 @@
+//! What the vehicle does, on any board.
+
+pub mod bus;
+pub mod can_port;
+pub mod exchange;
+pub mod laser;
+pub mod localize;
+pub mod log_stream;
+pub mod settings;
