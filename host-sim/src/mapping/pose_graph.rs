@@ -3,6 +3,7 @@
 use agv_core::geometry::Pose;
 use factrs::core::{BetweenResidual, GemanMcClure, Graph, LevenMarquardt, PriorResidual, SE2, Values};
 use factrs::noise::GaussianNoise;
+use factrs::optimizers::OptError;
 use factrs::traits::Optimizer;
 use factrs::{assign_symbols, fac};
 use nalgebra::Matrix3;
@@ -46,12 +47,24 @@ pub enum PoseGraphError {
 /// Deviation of the first pose, which is held, m and rad.
 const HELD: f64 = 1e-3;
 
+/// Error of a doubtful edge, in standard deviations, at which it loses most of its weight: from one that leaves all edges
+/// theirs to the last.
+const DOUBT: [f64; 6] = [1000.0, 300.0, 100.0, 30.0, 10.0, 4.0];
+
 /// Moves poses to where they agree best with the edges; the first one stays. Edges that may be wrong lose their weight
-/// where they disagree (Geman and McClure's loss).
+/// where they disagree (Geman and McClure's loss), little at first and more as the poses settle: no start is needed that
+/// is near the solution.
 ///
 /// # Errors
 /// See [`PoseGraphError`].
 pub fn optimise(poses: &[Pose], edges: &[Edge]) -> Result<Vec<Pose>, PoseGraphError> {
+    let is_doubtful = edges.iter().any(|edge| edge.is_doubtful);
+    let rounds = if is_doubtful { DOUBT.as_slice() } else { &DOUBT[..1] };
+    rounds.iter().try_fold(poses.to_vec(), |poses, &doubt| settle(&poses, edges, doubt))
+}
+
+/// Solves the graph with one loss for the edges that may be wrong.
+fn settle(poses: &[Pose], edges: &[Edge], doubt: f64) -> Result<Vec<Pose>, PoseGraphError> {
     let mut values = Values::new();
     for (number, pose) in (0..).zip(poses) {
         values.insert(X(number), SE2::new(pose.theta, pose.x, pose.y));
@@ -71,13 +84,17 @@ pub fn optimise(poses: &[Pose], edges: &[Edge]) -> Result<Vec<Pose>, PoseGraphEr
             .ok_or(PoseGraphError::NotDefinite(edge.from, edge.to))?;
         let keys = (X(edge.from as u32), X(edge.to as u32));
         if edge.is_doubtful {
-            graph.add_factor(fac![residual, (keys.0, keys.1), noise, GemanMcClure::default()]);
+            graph.add_factor(fac![residual, (keys.0, keys.1), noise, GemanMcClure::new(doubt)]);
         } else {
             graph.add_factor(fac![residual, (keys.0, keys.1), noise]);
         }
     }
     let mut optimizer: LevenMarquardt = LevenMarquardt::new_default(graph);
-    let found = optimizer.optimize(values).map_err(|problem| PoseGraphError::Unsolvable(format!("{problem:?}")))?;
+    let found = match optimizer.optimize(values) {
+        // What has been reached is no worse than the start.
+        Ok(found) | Err(OptError::MaxIterations(found)) => found,
+        Err(problem) => return Err(PoseGraphError::Unsolvable(format!("{problem:?}"))),
+    };
     let pose = |number: usize| {
         let found = found.get(X(number as u32))?;
         Some(Pose::new(found.x(), found.y(), found.theta()))

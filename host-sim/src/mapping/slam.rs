@@ -104,7 +104,7 @@ const KEYS: usize = 8192;
 /// Places that are looked at for each key scan.
 const CANDIDATES: usize = 10;
 /// Deviation of odometry: share of the way, and of the turn, and the least (m, rad).
-const ODOMETRY: (f64, f64, f64, f64) = (0.1, 0.1, 0.03, 0.02);
+const ODOMETRY: (f64, f64, f64, f64) = (0.1, 0.2, 0.05, 0.1);
 /// Points of one surface err together: the information that they give is smaller by this factor.
 const INFLATION: f64 = 20.0;
 /// No alignment is better than this, m and rad.
@@ -133,7 +133,6 @@ pub fn map(
     let mut refused = take_out(&mut loops, &poses, parameters);
     for _ in 0..ROUNDS {
         poses = optimise(&poses, &[sequence.as_slice(), &loops].concat())?;
-        loops.retain(|edge| !edge.is_doubtful || edge.from != edge.to);
         let near = align_neighbours(&keys, &poses, &loops, parameters);
         loops.extend(near);
         poses = optimise(&poses, &[sequence.as_slice(), &loops].concat())?;
@@ -176,32 +175,16 @@ fn chain(keys: &[KeyScan]) -> (Vec<Pose>, Vec<Edge>) {
     for (from, pair) in keys.windows(2).enumerate() {
         let [before, after] = pair else { continue };
         let moved = before.odometry.between(&after.odometry);
-        // Some odometry loses the sign of the way when the vehicle reverses.
-        let reversed = Pose::new(-moved.x, -moved.y, moved.theta);
-        let best = [moved, reversed]
-            .into_iter()
-            .filter_map(|start| aligned(after, before, &start))
-            .max_by(|a, b| a.confidence().total_cmp(&b.confidence()));
-        let aligned = best.filter(|found| found.confidence() > LEAST_SEQUENCE_CONFIDENCE);
+        let aligned = best_alignment(after, before, &moved);
         let displacement = aligned.map_or(moved, |found| found.pose);
-        let (shift, turn) = (moved.position().norm(), moved.theta.abs());
-        // Where the scans say nothing, the odometry does; if they contradict it, it is not asked.
-        let is_contradicted = (displacement.position() - moved.position()).norm() > 0.5 * shift + ODOMETRY.2;
-        let deviations = (ODOMETRY.0 * shift + ODOMETRY.2, ODOMETRY.1 * turn + ODOMETRY.3);
-        let mut information = information_of(deviations);
-        if is_contradicted {
-            information *= 1e-2;
-        }
         let to = from + 1;
-        edges.push(Edge {
-            from,
-            to,
-            displacement: if is_contradicted { displacement } else { moved },
-            information,
-            is_doubtful: false,
-        });
-        if let Some(found) = aligned {
-            edges.push(edge(from, to, &found, false));
+        match aligned {
+            Some(found) => edges.push(edge(from, to, &found, false)),
+            None => {
+                let turn = ODOMETRY.1 * moved.theta.abs() + ODOMETRY.3;
+                let information = information_of((ODOMETRY.0 * moved.position().norm() + ODOMETRY.2, turn));
+                edges.push(Edge { from, to, displacement, information, is_doubtful: false });
+            }
         }
         let last = poses[from];
         poses.push(last.compose(&displacement));
@@ -209,8 +192,32 @@ fn chain(keys: &[KeyScan]) -> (Vec<Pose>, Vec<Edge>) {
     (poses, edges)
 }
 
+/// The alignment of two neighbouring key scans that agrees best with both, started from the odometry and, where that
+/// fails, beside it: wheels slip, and some odometry loses the sign of the way when the vehicle reverses.
+fn best_alignment(source: &KeyScan, target: &KeyScan, moved: &Pose) -> Option<Recognition> {
+    let try_from = |start: &Pose| aligned(source, target, start);
+    let mut best = try_from(moved);
+    let confidence = |found: &Option<Recognition>| found.as_ref().map_or(0.0, Recognition::confidence);
+    if confidence(&best) < SURE_SEQUENCE_CONFIDENCE {
+        for sign in [1.0, 0.0, -1.0] {
+            for turn in TURNS {
+                let start = Pose::new(sign * moved.x, sign * moved.y, moved.theta + turn);
+                let found = try_from(&start);
+                if confidence(&found) > confidence(&best) {
+                    best = found;
+                }
+            }
+        }
+    }
+    best.filter(|found| found.confidence() > LEAST_SEQUENCE_CONFIDENCE)
+}
+
 /// Least confidence of an alignment of neighbouring key scans.
-const LEAST_SEQUENCE_CONFIDENCE: f32 = 0.5;
+const LEAST_SEQUENCE_CONFIDENCE: f32 = 0.45;
+/// An alignment of this confidence needs no other start.
+const SURE_SEQUENCE_CONFIDENCE: f32 = 0.8;
+/// Errors of the odometry's turn from which an alignment is started, rad.
+const TURNS: [f64; 7] = [0.0, 0.1, -0.1, 0.2, -0.2, 0.35, -0.35];
 
 fn information_of((shift, turn): (f64, f64)) -> Matrix3<f64> {
     Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / (shift * shift), 1.0 / (shift * shift), 1.0 / (turn * turn)))
