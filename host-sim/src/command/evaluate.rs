@@ -2,6 +2,7 @@
 
 mod carpark;
 mod falko;
+mod features;
 mod kidnapping;
 mod places;
 mod slam;
@@ -34,6 +35,7 @@ pub struct Evaluate {
 enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    Features(features::Features),
     Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
     Slam(slam::Slam),
@@ -46,6 +48,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::Features(experiment) => experiment.run(),
             Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),

@@ -6,6 +6,7 @@ pub mod carpark_starts;
 pub mod demonstration;
 pub mod drive;
 pub mod falko;
+pub mod features;
 pub mod kidnapping;
 pub mod places;
 pub mod repeatability;
