@@ -73,10 +73,8 @@ pub fn score(scans: &[PosedScan], keypoints: &[Vec<Point>], pairs: &[Overlapping
         .zip(keypoints)
         .map(|(scan, points)| points.iter().map(|point| scan.laser.transform(point)).collect())
         .collect();
-    let shares: Vec<_> = pairs
-        .par_iter()
-        .filter_map(|pair| share(&world[pair.reference], &world[pair.other]))
-        .collect();
+    let shares: Vec<_> =
+        pairs.par_iter().filter_map(|pair| share(&world[pair.reference], &world[pair.other])).collect();
     let sum: f64 = shares.iter().sum();
     Repeatability {
         excluding_empty: sum / shares.len() as f64,

@@ -32,11 +32,11 @@ impl Default for OrthogonalCornerParameters {
     fn default() -> Self {
         Self {
             farthest: 25.0,
-            thickness: 0.06,
+            thickness: 0.1,
             length: 0.3,
-            points: 5,
+            points: 4,
             gap: 0.5,
-            reach: 0.2,
+            reach: 0.3,
             suppression_radius: 0.2,
             range_deviation: 0.01,
         }
@@ -84,13 +84,7 @@ impl OrthogonalCorners {
     }
 
     /// The corner between a surface along `axis` and one along `normal`, if ends of both are near it.
-    fn corner(
-        &self,
-        first: &SurfaceRun,
-        second: &SurfaceRun,
-        axis: ScanPoint,
-        normal: ScanPoint,
-    ) -> Option<Keypoint> {
+    fn corner(&self, first: &SurfaceRun, second: &SurfaceRun, axis: ScanPoint, normal: ScanPoint) -> Option<Keypoint> {
         // A run along the normal counts its other coordinate against the axis.
         let (x, y) = (-second.across, first.across);
         let nearest = |run: &SurfaceRun, coordinate: f32| {
@@ -104,7 +98,8 @@ impl OrthogonalCorners {
         if apart > self.parameters.reach || other_apart > self.parameters.reach {
             return None;
         }
-        let bisector = axis * libm::copysignf(1.0, first.middle() - x) + normal * libm::copysignf(1.0, second.middle() - y);
+        let bisector =
+            axis * libm::copysignf(1.0, first.middle() - x) + normal * libm::copysignf(1.0, second.middle() - y);
         let deviation = self.parameters.range_deviation;
         let variance = |run: &SurfaceRun| deviation * deviation / f32::from(run.count.max(1));
         let (vx, vy) = (variance(second), variance(first));

@@ -66,7 +66,8 @@ impl HoughSpectrum {
             add(&mut self.across, cell(axis.x * point.x + axis.y * point.y));
             add(&mut self.along, cell(axis.x * point.y - axis.y * point.x));
         }
-        let squares = |cells: &[u16; CELLS]| -> u64 { cells.iter().map(|&count| u64::from(count) * u64::from(count)).sum() };
+        let squares =
+            |cells: &[u16; CELLS]| -> u64 { cells.iter().map(|&count| u64::from(count) * u64::from(count)).sum() };
         (squares(&self.across) + squares(&self.along)) as f32
     }
 }

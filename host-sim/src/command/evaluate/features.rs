@@ -87,14 +87,15 @@ impl Features {
                 );
             }
         }
-        println!("\ndetector  descriptor  us/scan  test          nearest correct");
+        println!("\ndetector  descriptor  radius  us/scan  test          nearest correct");
         for outcome in &outcomes {
             for descriptor in &outcome.descriptors {
                 for test in &descriptor.tests {
                     println!(
-                        "{:<9} {:<10} {:>8.1}  {:<13} {:>15.3}",
+                        "{:<9} {:<10} {:>6.1} m {:>7.1}  {:<13} {:>15.3}",
                         format!("{:?}", outcome.detector).to_lowercase(),
                         descriptor.descriptor,
+                        descriptor.radius_m,
                         descriptor.us_per_scan,
                         test.test,
                         test.nearest_correct

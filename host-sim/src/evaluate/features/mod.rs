@@ -7,7 +7,7 @@ mod pictures;
 mod recognition;
 mod stability;
 
-pub use described::{DetectorKind, Frame, Observer};
+pub use described::{DESCRIPTOR_RADII, DetectorKind, Frame, Observer};
 pub use disturbance::Disturbance;
 pub use pictures::page;
 pub use recognition::{Comparison, RecognitionPoint, curve};
@@ -55,6 +55,8 @@ pub struct DescriptorCurve {
 pub struct DescriptorOutcome {
     /// bsc or cgh.
     pub descriptor: &'static str,
+    /// Radius of the surroundings that are described, m.
+    pub radius_m: f32,
     /// Time of the descriptors of a scan, us.
     pub us_per_scan: f64,
     /// Tests.
@@ -74,7 +76,8 @@ pub struct Outcome {
     pub repeatability_counting_empty: f64,
     /// Pairs of the viewpoint test.
     pub pairs: usize,
-    /// Share of the keypoints that two scans have for which the nearest descriptor is right, the better of the two.
+    /// Share of the keypoints that two scans have for which the nearest descriptor is right, of the best
+    /// descriptor.
     pub nearest_descriptor_correct: f64,
     /// Time of detection, us.
     pub us_per_scan: f64,
@@ -90,14 +93,14 @@ pub struct Outcome {
 const ASSOCIATIONS: [f64; 2] = [0.05, 0.1];
 
 /// Noise levels, densities and so on for which descriptors are rated.
-const DESCRIBED: [Disturbance; 3] = [Disturbance::Noise(0.05), Disturbance::Oversampling(1), Disturbance::Subsampling(1)];
+const DESCRIBED: [Disturbance; 3] =
+    [Disturbance::Noise(0.05), Disturbance::Oversampling(1), Disturbance::Subsampling(1)];
 
 /// Measures one detector on scans with known poses; `done` is called after each part.
 #[must_use]
 pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], done: impl Fn() + Sync) -> Outcome {
     let frames = Observer::new(kind).observe_all(scans.iter().map(|scan| &scan.scan));
-    let world: Vec<Vec<Point>> =
-        frames.iter().zip(scans).map(|(frame, scan)| frame.positions(&scan.laser)).collect();
+    let world: Vec<Vec<Point>> = frames.iter().zip(scans).map(|(frame, scan)| frame.positions(&scan.laser)).collect();
     let positions: Vec<Vec<Point>> = frames.iter().map(|frame| frame.positions(&Default::default())).collect();
     let score = repeatability::score(scans, &positions, pairs);
     done();
@@ -108,10 +111,24 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
             references.iter().map(|&index| disturbance.of(&scans[index].scan, index as u64)).collect();
         Observer::new(kind).observe_all(&changed)
     };
-    let (mut bsc_tests, mut cgh_tests) = (Vec::new(), Vec::new());
-    let mut describe = |test, level, compared: &[(&Frame, &Frame, Vec<Point>, Vec<Point>)]| {
-        bsc_tests.push(rate(test, level, compared, |a, i, b, j| a.shapes[i].distance(&b.shapes[j]) as f32));
-        cgh_tests.push(rate(test, level, compared, |a, i, b, j| a.histograms[i].distance(&b.histograms[j])));
+    let (us_per_scan, descriptor_us) = described::times(kind, scans);
+    let mut descriptors: Vec<_> = DESCRIPTOR_RADII
+        .into_iter()
+        .zip(descriptor_us)
+        .flat_map(|(radius_m, us)| {
+            let outcome =
+                |descriptor, us_per_scan| DescriptorOutcome { descriptor, radius_m, us_per_scan, tests: Vec::new() };
+            [outcome("bsc", us[0]), outcome("cgh", us[1])]
+        })
+        .collect();
+    let mut describe = |test, level, compared: &[Compared]| {
+        for (number, outcome) in descriptors.iter_mut().enumerate() {
+            let radius = number / 2;
+            outcome.tests.push(rate(test, level, compared, |a, i, b, j| match number % 2 {
+                0 => a.shapes[radius][i].distance(&b.shapes[radius][j]) as f32,
+                _ => a.histograms[radius][i].distance(&b.histograms[radius][j]),
+            }));
+        }
     };
     let viewed: Vec<_> = pairs
         .iter()
@@ -140,8 +157,8 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
         done();
     }
     let stability = ASSOCIATIONS.map(|association| stability(&world, association)).to_vec();
-    let [us_per_scan, bsc_us, cgh_us] = described::times(kind, scans);
-    let nearest = bsc_tests[0].nearest_correct.max(cgh_tests[0].nearest_correct);
+    let nearest = descriptors.iter().filter_map(|outcome| outcome.tests.first().map(|test| test.nearest_correct));
+    let nearest = nearest.fold(0.0, f64::max);
     Outcome {
         detector: kind,
         keypoints_per_scan: positions.iter().map(Vec::len).sum::<usize>() as f64 / scans.len().max(1) as f64,
@@ -152,10 +169,7 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
         us_per_scan,
         levels,
         stability,
-        descriptors: vec![
-            DescriptorOutcome { descriptor: "bsc", us_per_scan: bsc_us, tests: bsc_tests },
-            DescriptorOutcome { descriptor: "cgh", us_per_scan: cgh_us, tests: cgh_tests },
-        ],
+        descriptors,
     }
 }
 
@@ -172,7 +186,7 @@ fn viewpoint_levels(world: &[Vec<Point>], pairs: &[OverlappingPair]) -> Vec<Leve
 
 fn mean_level(test: &'static str, level: f64, shares: Vec<Option<f64>>) -> Level {
     let known: Vec<f64> = shares.iter().flatten().copied().collect();
-    let sum: f64 = known.iter().sum();
+    let sum = known.iter().fold(0.0, |sum, share| sum + share);
     Level {
         test,
         level,
@@ -182,11 +196,14 @@ fn mean_level(test: &'static str, level: f64, shares: Vec<Option<f64>>) -> Level
     }
 }
 
+/// Two scans with their keypoints in one frame, m.
+type Compared<'a> = (&'a Frame, &'a Frame, Vec<Point>, Vec<Point>);
+
 /// Rates a distance between descriptors over pairs of scans, whose keypoints are also given in one frame.
 fn rate(
     test: &'static str,
     level: Option<f64>,
-    compared: &[(&Frame, &Frame, Vec<Point>, Vec<Point>)],
+    compared: &[Compared],
     distance: impl Fn(&Frame, usize, &Frame, usize) -> f32 + Sync,
 ) -> DescriptorCurve {
     let rated = compared.par_iter().map(|(first, second, first_points, second_points)| {

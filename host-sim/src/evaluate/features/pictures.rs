@@ -78,19 +78,18 @@ pub fn page(title: &str, outcomes: &[Outcome]) -> Result<Page, FigureError> {
          within 0.2 m of each other in the world, matched one to one, are the same.",
     );
     for outcome in outcomes {
-        let lines: Vec<_> = outcome
-            .descriptors
-            .iter()
-            .flat_map(|descriptor| {
-                descriptor.tests.iter().map(|test| {
+        for descriptor in &outcome.descriptors {
+            let lines: Vec<_> = descriptor
+                .tests
+                .iter()
+                .map(|test| {
                     let points = test.curve.iter().map(|point| (1.0 - point.precision, point.recall));
-                    (format!("{} {}", descriptor.descriptor, test.test), points.collect::<Vec<_>>())
+                    (test.test, points.collect::<Vec<_>>())
                 })
-            })
-            .collect();
-        for (descriptor, lines) in ["bsc", "cgh"].iter().zip(lines.chunks(lines.len().div_ceil(2))) {
+                .collect();
             let series: Vec<_> = lines.iter().map(|(name, points)| Series { name, points }).collect();
-            let caption = format!("{} of {} keypoints", descriptor, name(outcome));
+            let what = format!("{} within {} m", descriptor.descriptor, descriptor.radius_m);
+            let caption = format!("{what} of {} keypoints", name(outcome));
             page.figure(&line_chart(["1 - precision", "recall"], &series, None)?, &caption);
         }
     }

@@ -33,9 +33,8 @@ pub fn stability(scans: &[Vec<Point>], association_m: f64) -> Stability {
         let cell = ((point.x / NEW).floor() as i64, (point.y / NEW).floor() as i64);
         let around = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (cell.0 + i, cell.1 + j)));
         let known = around.filter_map(|cell| cells.get(&cell)).flatten();
-        let nearest = known
-            .map(|&number| ((landmarks[number][0] - point).norm(), number))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest =
+            known.map(|&number| ((landmarks[number][0] - point).norm(), number)).min_by(|a, b| a.0.total_cmp(&b.0));
         match nearest {
             Some((distance, number)) if distance < association_m => landmarks[number].push(*point),
             Some((distance, _)) if distance < NEW => {}
