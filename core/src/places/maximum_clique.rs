@@ -50,6 +50,11 @@ impl<const WORDS: usize> Set<WORDS> {
         }
     }
 
+    /// Number of vertices of the intersection.
+    fn common(&self, other: &Self, words: usize) -> usize {
+        self.0.iter().zip(&other.0).take(words).map(|(one, other)| (one & other).count_ones() as usize).sum()
+    }
+
     fn len(&self, words: usize) -> usize {
         self.0.iter().take(words).map(|word| word.count_ones() as usize).sum()
     }
@@ -97,26 +102,26 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
     pub(super) fn maximum_clique(&self, most_steps: u32) -> Clique {
         let mut best = Clique { vertices: self.greedy_clique(), is_maximum: true };
         let mut chosen = Vec::<u16, DEPTH>::new();
-        let mut sets = Vec::<Set<WORDS>, DEPTH>::new();
-        let _ = sets.push(self.vertices_with_neighbours(best.vertices.len()));
+        // The stack is the recursion: what may join the chosen, and of that what has not been tried.
+        let mut stack = Vec::<(Set<WORDS>, Set<WORDS>), DEPTH>::new();
+        let start = self.vertices_with_neighbours(best.vertices.len());
+        let _ = stack.push((start, self.coloured_beyond(start, best.vertices.len())));
+        let words = self.words();
         let mut steps = 0;
-        // The stack of candidate sets is the recursion; a set loses the vertex that was tried in it.
-        while let Some(candidates) = sets.last().copied() {
-            let enough = best.vertices.len().saturating_sub(chosen.len());
-            let Some(vertex) = self.colour_beyond(candidates, enough) else {
-                let _ = sets.pop();
+        while let Some((candidates, untried)) = stack.last_mut() {
+            let Some(vertex) = untried.first(words) else {
+                let _ = stack.pop();
                 let _ = chosen.pop();
                 continue;
             };
+            untried.remove(vertex);
+            candidates.remove(vertex);
             if steps >= most_steps {
                 best.is_maximum = false;
                 break;
             }
             steps += 1;
-            if let Some(set) = sets.last_mut() {
-                set.remove(vertex);
-            }
-            let remaining = self.neighbours_among(vertex, &candidates);
+            let remaining = self.neighbours.get(vertex).map_or(Set::EMPTY, |set| set.intersection(candidates, words));
             if chosen.push(vertex as u16).is_err() {
                 best.is_maximum = false;
                 break;
@@ -124,7 +129,10 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
             if chosen.len() > best.vertices.len() {
                 best.vertices.clone_from(&chosen);
             }
-            if remaining == Set::EMPTY || sets.push(remaining).is_err() {
+            let enough = best.vertices.len() - chosen.len();
+            let branches =
+                if remaining.len(words) > enough { self.coloured_beyond(remaining, enough) } else { Set::EMPTY };
+            if branches == Set::EMPTY || stack.push((remaining, branches)).is_err() {
                 let _ = chosen.pop();
             }
         }
@@ -159,7 +167,7 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
         let mut rest = *candidates;
         while let Some(vertex) = rest.first(words) {
             rest.remove(vertex);
-            let count = self.neighbours.get(vertex)?.intersection(candidates, words).len(words);
+            let count = self.neighbours.get(vertex)?.common(candidates, words);
             if best.is_none_or(|(_, most)| count > most) {
                 best = Some((vertex, count));
             }
@@ -176,7 +184,7 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
         }
         for _ in 0..PRUNING_PASSES {
             for (vertex, neighbours) in self.neighbours.iter().enumerate() {
-                if neighbours.intersection(&kept, words).len(words) < least {
+                if neighbours.common(&kept, words) < least {
                     kept.remove(vertex);
                 }
             }
@@ -184,9 +192,9 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
         kept
     }
 
-    /// Colours the candidates greedily so that no neighbours have the same colour, and returns the first vertex that
-    /// needs more than `enough` colours. None if no clique among the candidates has more than `enough` vertices.
-    fn colour_beyond(&self, mut rest: Set<WORDS>, enough: usize) -> Option<usize> {
+    /// Colours the candidates greedily so that no neighbours have the same colour, and returns those that need more than
+    /// `enough` colours: a clique with more vertices than that has one of them.
+    fn coloured_beyond(&self, mut rest: Set<WORDS>, enough: usize) -> Set<WORDS> {
         let words = self.words();
         for _ in 0..enough {
             let mut class = rest;
@@ -200,9 +208,9 @@ impl<const VERTICES: usize, const WORDS: usize> Graph<VERTICES, WORDS> {
                 }
             }
             if is_empty {
-                return None;
+                break;
             }
         }
-        rest.first(words)
+        rest
     }
 }
