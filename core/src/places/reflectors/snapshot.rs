@@ -71,12 +71,17 @@ impl<const SEEN: usize> ReflectorSnapshot<SEEN> {
     /// Adds a reflector at `position` (m, in the frame of the snapshot) that was seen at `range` (m): joins it to one seen
     /// before at the same place. What exceeds the capacity is left out.
     pub fn see(&mut self, position: &Point, range: f64, noise: &ReflectorNoise) {
+        let across = range as f32 * noise.bearing;
+        let variance = 0.5 * (noise.range * noise.range + across * across) + noise.map * noise.map;
+        self.see_landmark(position, variance);
+    }
+
+    /// The same for a landmark of any kind whose position has that variance on each axis, m^2, the map's own included.
+    pub fn see_landmark(&mut self, position: &Point, variance: f32) {
         let position: ScanPoint = position.cast();
         if !(position.x.is_finite() && position.y.is_finite()) {
             return;
         }
-        let across = range as f32 * noise.bearing;
-        let variance = 0.5 * (noise.range * noise.range + across * across) + noise.map * noise.map;
         let known = self
             .reflectors
             .iter_mut()

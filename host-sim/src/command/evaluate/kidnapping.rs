@@ -1,7 +1,7 @@
 //! `agv evaluate kidnapping`.
 
 use agv_core::places::RelocalizationParameters;
-use agv_host_sim::evaluate::kidnapping::{Case, run};
+use agv_host_sim::evaluate::kidnapping::{Case, feature_map, run};
 
 use crate::command::progress;
 
@@ -16,7 +16,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Kidnapping {
-    /// Starts of each case; a tenth of them where there are 1000 reflectors.
+    /// Starts of each case; a tenth of them where there are 1000 reflectors, and among features.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
     starts: u64,
     /// Seed; thresholds were chosen with seeds from 1001 on.
@@ -30,6 +30,9 @@ pub struct Kidnapping {
     json: bool,
 }
 
+/// Name of the case of [`feature_map`].
+const FEATURES: &str = "block storage, features";
+
 impl Kidnapping {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
@@ -38,11 +41,16 @@ impl Kidnapping {
             .filter(|case| case.name.contains(&self.only))
             .map(|case| (case, if case.name.starts_with("1000") { self.starts.div_ceil(10) } else { self.starts }))
             .collect();
-        anyhow::ensure!(!cases.is_empty(), "no case's name contains '{}'", self.only);
-        let bar = progress::bar("starting vehicles", cases.iter().map(|(_, starts)| starts).sum());
+        let features = FEATURES.contains(&self.only).then(|| self.starts.div_ceil(10));
+        anyhow::ensure!(!cases.is_empty() || features.is_some(), "no case's name contains '{}'", self.only);
+        let all = cases.iter().map(|(_, starts)| starts).sum::<u64>() + features.unwrap_or(0);
+        let bar = progress::bar("starting vehicles", all);
         let parameters = RelocalizationParameters::default();
-        let outcomes: Vec<_> =
+        let mut outcomes: Vec<_> =
             cases.into_iter().map(|(case, starts)| run(case, self.seed, starts, &parameters, || bar.inc(1))).collect();
+        if let Some(starts) = features {
+            outcomes.push(feature_map::run(self.seed, starts, &feature_map::parameters(), || bar.inc(1))?);
+        }
         bar.finish_and_clear();
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);

@@ -3,6 +3,7 @@
 //! It stands still and sees one revolution after another. A reflector is seen if it is near enough and nothing hides it;
 //! each revolution misses some of them, independently, and holds false ones at random places.
 
+pub mod feature_map;
 mod halls;
 
 use agv_core::geometry::{Point, Pose};
@@ -93,6 +94,7 @@ const RIGHT: (f64, f64) = (0.1, std::f64::consts::PI / 180.0);
 const SLICE: u32 = 16;
 
 /// What happened at one start.
+#[derive(Default)]
 struct Start {
     /// Revolution of the first answer, and whether it was right.
     answered: Option<(usize, bool)>,
@@ -121,14 +123,19 @@ pub fn run(
         .collect();
     let pairs = results.iter().map(|(_, pairs)| *pairs).max().unwrap_or(0);
     let all: Vec<Start> = results.into_iter().flat_map(|(starts, _)| starts).collect();
-    let count = all.len() as f64;
+    outcome(case.name, all, pairs)
+}
+
+/// Sums up starts.
+fn outcome(case: &'static str, all: Vec<Start>, pairs: usize) -> Outcome {
+    let count = all.len().max(1) as f64;
     let right_within = |revolutions: usize| {
         let is_right = |start: &&Start| start.answered.is_some_and(|(at, is_right)| is_right && at < revolutions);
         all.iter().filter(is_right).count() as f64 / count
     };
     let hypotheses = all.iter().flat_map(|start| start.hypotheses).filter(|count| *count > 0);
     Outcome {
-        case: case.name,
+        case,
         starts: all.len(),
         right: [1, 2, 3].map(right_within),
         wrong: all.iter().filter(|start| start.answered.is_some_and(|(_, is_right)| !is_right)).count(),
@@ -181,7 +188,7 @@ fn run_start(
     random: &mut Random,
 ) -> Start {
     let mut snapshot = ReflectorSnapshot::<64>::new();
-    let mut start = Start { answered: None, is_ambiguous: false, seen: 0, hypotheses: [0; REVOLUTIONS] };
+    let mut start = Start::default();
     let visible = visible(hall, caster, truth);
     for revolution in 0..REVOLUTIONS {
         let seen = observe(case, &visible, truth, random);
@@ -191,26 +198,44 @@ fn run_start(
         for (position, range) in seen {
             snapshot.see(&position, range, &ReflectorNoise::default());
         }
-        relocalizer.begin(&snapshot, index);
-        let answer = loop {
-            match relocalizer.advance(index, SLICE) {
-                RelocalizationProgress::Done(answer) => break answer,
-                RelocalizationProgress::Searching => start.hypotheses[revolution] += SLICE,
-            }
-        };
-        match answer {
-            ReflectorAnswer::Found(fix) => {
-                let error = truth.between(&fix.pose);
-                let is_right =
-                    case.layout != Layout::TwinHall && error.position().norm() < RIGHT.0 && error.theta.abs() < RIGHT.1;
-                start.answered = Some((revolution, is_right));
-                return start;
-            }
-            ReflectorAnswer::Ambiguous(..) => start.is_ambiguous |= revolution == 0,
-            ReflectorAnswer::TooFew | ReflectorAnswer::Unknown => {}
+        let can_be_right = case.layout != Layout::TwinHall;
+        if search(&mut start, revolution, truth, &snapshot, index, relocalizer, can_be_right) {
+            break;
         }
     }
     start
+}
+
+/// Searches after one revolution, and notes what comes out. Whether that is a pose.
+fn search(
+    start: &mut Start,
+    revolution: usize,
+    truth: &Pose,
+    snapshot: &ReflectorSnapshot<64>,
+    index: &ReflectorIndex<1024, 60_000>,
+    relocalizer: &mut ReflectorRelocalizer<64>,
+    can_be_right: bool,
+) -> bool {
+    relocalizer.begin(snapshot, index);
+    let answer = loop {
+        match relocalizer.advance(index, SLICE) {
+            RelocalizationProgress::Done(answer) => break answer,
+            RelocalizationProgress::Searching => start.hypotheses[revolution] += SLICE,
+        }
+    };
+    match answer {
+        ReflectorAnswer::Found(fix) => {
+            let error = truth.between(&fix.pose);
+            let is_right = can_be_right && error.position().norm() < RIGHT.0 && error.theta.abs() < RIGHT.1;
+            start.answered = Some((revolution, is_right));
+            true
+        }
+        ReflectorAnswer::Ambiguous(..) => {
+            start.is_ambiguous |= revolution == 0;
+            false
+        }
+        ReflectorAnswer::TooFew | ReflectorAnswer::Unknown => false,
+    }
 }
 
 /// Positions of the reflectors that can be seen from a pose, m.
