@@ -12,6 +12,7 @@ use crate::import::{ScanLog, carmen, graph_log};
 use crate::mapping::pose_graph::{Edge, PoseGraphError};
 use crate::mapping::slam::{SlamMap, SlamParameters, map};
 use crate::recording::RecordedScan;
+use crate::report::{FigureError, Map, Page, PointSet, Series, Table, trajectory_plot};
 use crate::text_file::{self, TextFileError};
 
 /// How good a map is.
@@ -187,8 +188,7 @@ pub fn run(
 
 /// Errors of poses after the best rigid fit of their positions to the true ones.
 fn fitted(poses: &[Pose], truth: &[Pose]) -> Vec<Pose> {
-    let pairs = poses.iter().zip(truth).map(|(pose, truth)| (pose.position(), truth.position(), 1.0));
-    let fit = align(pairs).map_or_else(Pose::default, |fit| fit.pose);
+    let fit = fit(poses, truth);
     poses.iter().zip(truth).map(|(pose, truth)| truth.between(&fit.compose(pose))).collect()
 }
 
@@ -245,10 +245,59 @@ fn logging_times(text: &str) -> Vec<(f64, f64)> {
     text.lines().filter(|line| line.starts_with("ROBOTLASER1")).filter_map(of_line).collect()
 }
 
-/// Where the points of a map lie once it is fitted to the true poses, m.
-#[must_use]
-pub fn fitted_points(map: &SlamMap, truth: &[Pose]) -> Vec<Point> {
-    let pairs = map.poses.iter().zip(truth).map(|(pose, truth)| (pose.position(), truth.position(), 1.0));
-    let fit = align(pairs).map_or_else(Pose::default, |fit| fit.pose);
-    map.points().iter().map(|point| fit.transform(point)).collect()
+/// A page with the figures, and each map drawn over the corrected poses that it was fitted to.
+///
+/// # Errors
+/// If a picture cannot be drawn.
+pub fn page(drive: &OfficeDrive, results: &[(Outcome, SlamMap)]) -> Result<Page, FigureError> {
+    let mut page = Page::new("Mapping from raw odometry and scans");
+    page.section("Figures").paragraph(
+        "Distance of the key scans from the corrected poses after the best rigid fit. 'honest' loops join scans that are \
+         well apart in time, 'all' any that are no neighbours. Relations are displacements verified by hand.",
+    );
+    let heading =
+        ["loops", "mean, m", "largest, m", "heading, deg", "odometry, m", "found", "taken out", "false left in"];
+    let mut heading: Vec<_> = heading.map(str::to_owned).to_vec();
+    heading.extend(["relations", "mean error, m", "of the corrected poses, m"].map(str::to_owned));
+    let rows = results.iter().map(|(outcome, _)| {
+        let mut row = vec![
+            outcome.closures.to_owned(),
+            format!("{:.3}", outcome.mean_position_error_m),
+            format!("{:.3}", outcome.max_position_error_m),
+            format!("{:.2}", outcome.mean_heading_error_deg),
+            format!("{:.2}", outcome.odometry_error_m),
+            outcome.loops.to_string(),
+            outcome.refused.to_string(),
+            outcome.false_loops.to_string(),
+        ];
+        row.extend(outcome.relations.iter().flat_map(|relations| {
+            [
+                relations.relations.to_string(),
+                format!("{:.3}", relations.mean_shift_m),
+                format!("{:.3}", relations.corrected_mean_shift_m),
+            ]
+        }));
+        row
+    });
+    page.table(&Table { rows: rows.collect(), heading });
+    for (outcome, map) in results {
+        let truth: Vec<Pose> = map.keys.iter().map(|key| drive.truth[key.scan]).collect();
+        let fit = fit(&map.poses, &truth);
+        let pair = |point: Point| (point.x, point.y);
+        let points: Vec<_> = map.points().iter().map(|point| pair(fit.transform(point))).collect();
+        let mapped: Vec<_> = map.poses.iter().map(|pose| pair(fit.compose(pose).position())).collect();
+        let corrected: Vec<_> = truth.iter().map(|pose| pair(pose.position())).collect();
+        let figure = trajectory_plot(
+            &Map { outlines: &[], landmarks: &[PointSet { name: "returns", points: &points }] },
+            &[Series { name: "corrected", points: &corrected }, Series { name: "mapped", points: &mapped }],
+        )?;
+        page.section(&format!("Loops: {}", outcome.closures));
+        page.figure(&figure, "Returns of the key scans, and where the laser was.");
+    }
+    Ok(page)
+}
+
+fn fit(poses: &[Pose], truth: &[Pose]) -> Pose {
+    let pairs = poses.iter().zip(truth).map(|(pose, truth)| (pose.position(), truth.position(), 1.0));
+    align(pairs).map_or_else(Pose::default, |fit| fit.pose)
 }

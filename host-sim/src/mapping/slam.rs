@@ -178,13 +178,16 @@ fn chain(keys: &[KeyScan]) -> (Vec<Pose>, Vec<Edge>) {
         let aligned = best_alignment(after, before, &moved);
         let displacement = aligned.map_or(moved, |found| found.pose);
         let to = from + 1;
-        match aligned {
-            Some(found) => edges.push(edge(from, to, &found, false)),
-            None => {
-                let turn = ODOMETRY.1 * moved.theta.abs() + ODOMETRY.3;
-                let information = information_of((ODOMETRY.0 * moved.position().norm() + ODOMETRY.2, turn));
-                edges.push(Edge { from, to, displacement, information, is_doubtful: false });
-            }
+        edges.extend(aligned.map(|found| edge(from, to, &found, false)));
+        // Odometry fixes what a corridor leaves open; where the scans contradict it, it is not asked.
+        let departure = moved.between(&displacement);
+        let (shift, turn) = (moved.position().norm(), moved.theta.abs());
+        let deviations = (ODOMETRY.0 * shift + ODOMETRY.2, ODOMETRY.1 * turn + ODOMETRY.3);
+        if departure.position().norm() < CONTRADICTION * deviations.0
+            && departure.theta.abs() < CONTRADICTION * deviations.1
+        {
+            let information = information_of(deviations);
+            edges.push(Edge { from, to, displacement: moved, information, is_doubtful: false });
         }
         let last = poses[from];
         poses.push(last.compose(&displacement));
@@ -195,27 +198,36 @@ fn chain(keys: &[KeyScan]) -> (Vec<Pose>, Vec<Edge>) {
 /// The alignment of two neighbouring key scans that agrees best with both, started from the odometry and, where that
 /// fails, beside it: wheels slip, and some odometry loses the sign of the way when the vehicle reverses.
 fn best_alignment(source: &KeyScan, target: &KeyScan, moved: &Pose) -> Option<Recognition> {
-    let try_from = |start: &Pose| aligned(source, target, start);
+    let try_from = |start: &Pose| {
+        let found = aligned(source, target, start).filter(|found| found.confidence() > LEAST_SEQUENCE_CONFIDENCE)?;
+        // In a corridor all displacements along it look alike: what departs from the odometry must look better.
+        let departure = moved.between(&found.pose);
+        let doubt = DEPARTURE.0 * departure.position().norm() + DEPARTURE.1 * departure.theta.abs();
+        Some((f64::from(found.confidence()) - doubt, found))
+    };
     let mut best = try_from(moved);
-    let confidence = |found: &Option<Recognition>| found.as_ref().map_or(0.0, Recognition::confidence);
-    if confidence(&best) < SURE_SEQUENCE_CONFIDENCE {
+    let merit = |found: &Option<(f64, Recognition)>| found.as_ref().map_or(f64::NEG_INFINITY, |(merit, _)| *merit);
+    if merit(&best) < SURE_SEQUENCE_CONFIDENCE {
         for sign in [1.0, 0.0, -1.0] {
             for turn in TURNS {
-                let start = Pose::new(sign * moved.x, sign * moved.y, moved.theta + turn);
-                let found = try_from(&start);
-                if confidence(&found) > confidence(&best) {
+                let found = try_from(&Pose::new(sign * moved.x, sign * moved.y, moved.theta + turn));
+                if merit(&found) > merit(&best) {
                     best = found;
                 }
             }
         }
     }
-    best.filter(|found| found.confidence() > LEAST_SEQUENCE_CONFIDENCE)
+    best.map(|(_, found)| found)
 }
 
+/// By how much confidence must rise for each metre, and each radian, that an alignment departs from the odometry.
+const DEPARTURE: (f64, f64) = (0.2, 0.2);
+/// Odometry that is wrong by more than so many standard deviations is left out.
+const CONTRADICTION: f64 = 3.0;
 /// Least confidence of an alignment of neighbouring key scans.
 const LEAST_SEQUENCE_CONFIDENCE: f32 = 0.45;
 /// An alignment of this confidence needs no other start.
-const SURE_SEQUENCE_CONFIDENCE: f32 = 0.8;
+const SURE_SEQUENCE_CONFIDENCE: f64 = 0.8;
 /// Errors of the odometry's turn from which an alignment is started, rad.
 const TURNS: [f64; 7] = [0.0, 0.1, -0.1, 0.2, -0.2, 0.35, -0.35];
 

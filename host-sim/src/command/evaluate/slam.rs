@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use agv_host_sim::data;
-use agv_host_sim::evaluate::slam::{OfficeDrive, run};
+use agv_host_sim::evaluate::slam::{OfficeDrive, page, run};
 use agv_host_sim::mapping::slam::SlamParameters;
 use anyhow::Context;
 
@@ -12,6 +12,7 @@ use crate::command::progress;
 const HELP: &str = "\
 Examples:
   agv evaluate slam
+  agv evaluate slam --report slam.html
   agv evaluate slam --log aces-corrected.log.gz --json";
 
 /// A map of a real office from raw odometry and scans, against the corrected poses of others.
@@ -24,6 +25,9 @@ pub struct Slam {
     /// Print a JSON array instead of a table.
     #[arg(long)]
     json: bool,
+    /// Write a page with the figures and the maps.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 impl Slam {
@@ -41,11 +45,15 @@ impl Slam {
             }
         };
         let bar = progress::bar("mapping", 0);
-        let mut outcomes = Vec::new();
+        let mut results = Vec::new();
         for (name, parameters) in [("honest", SlamParameters::honest()), ("all", SlamParameters::all())] {
-            outcomes.push(run(&drive, relations.as_deref(), name, &parameters, || bar.inc(1))?.0);
+            results.push(run(&drive, relations.as_deref(), name, &parameters, || bar.inc(1))?);
         }
         bar.finish_and_clear();
+        if let Some(report) = &self.report {
+            page(&drive, &results)?.write(report).with_context(|| report.display().to_string())?;
+        }
+        let outcomes: Vec<_> = results.into_iter().map(|(outcome, _)| outcome).collect();
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());
