@@ -8,12 +8,15 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
-    let layout = if env::var_os("CARGO_FEATURE_AN500").is_some() { "src/board/an500/memory.x" } else { "../memory.x" };
+    let is_emulated = env::var_os("CARGO_FEATURE_AN500").is_some();
+    let layout = if is_emulated { "src/board/an500/memory.x" } else { "../memory.x" };
     println!("cargo:rerun-if-changed={layout}");
     let folder = PathBuf::from(env::var_os("OUT_DIR").expect("cargo names the folder of outputs"));
     fs::copy(layout, folder.join("memory.x")).expect("the memory layout can be copied");
-    // The interrupt vectors are in the program itself.
-    fs::write(folder.join("device.x"), "").expect("the folder of outputs can be written");
+    if is_emulated {
+        // The interrupt vectors are in the program itself.
+        fs::write(folder.join("device.x"), "").expect("the folder of outputs can be written");
+    }
     println!("cargo:rustc-link-search={}", folder.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rustc-link-arg-bins=--nmagic");

@@ -92,7 +92,7 @@ fn io_error(path: &Path, source: io::Error) -> LogError {
 /// Reads a log record by record.
 pub struct Reader {
     path: PathBuf,
-    file: File,
+    source: Box<dyn Read + Send>,
     frames: FrameReader,
     buffer: Vec<u8>,
     /// The part of the buffer that is not consumed yet.
@@ -116,9 +116,18 @@ impl Reader {
     /// If the file is missing, empty, foreign, or a log of another version.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path).map_err(|source| io_error(path, source))?;
+        Self::of(path, Box::new(file))
+    }
+
+    /// Reads a log from a source that ends or goes on for ever, such as a controller's log stream. `path` names it in
+    /// errors. Records are given as soon as they have come.
+    ///
+    /// # Errors
+    /// If what comes is nothing, foreign, or a log of another version.
+    pub fn of(path: &Path, source: Box<dyn Read + Send>) -> Result<Self, LogError> {
         let mut reader = Self {
             path: path.to_owned(),
-            file,
+            source,
             frames: FrameReader::new(),
             buffer: vec![0; BUFFER],
             rest: 0..0,
@@ -172,9 +181,6 @@ impl Reader {
 
     fn find(&mut self) -> Result<Found, LogError> {
         loop {
-            if self.rest.len() < MAX_FRAME && !self.is_last {
-                self.fill()?;
-            }
             let (consumed, step) = self.frames.step(&self.buffer[self.rest.clone()], self.is_last);
             let found = match step {
                 FrameStep::Frame { offset, frame } => {
@@ -187,25 +193,26 @@ impl Reader {
                 FrameStep::End => Some(Found::End),
             };
             self.rest.start += consumed;
-            if let Some(found) = found {
-                return Ok(found);
+            match found {
+                Some(found) => return Ok(found),
+                None => self.fill()?,
             }
         }
     }
 
-    /// Moves the rest to the front of the buffer and reads as much behind it as there is room for.
+    /// Moves the rest to the front of the buffer and reads what there is behind it.
     fn fill(&mut self) -> Result<(), LogError> {
         self.buffer.copy_within(self.rest.clone(), 0);
         self.rest = 0..self.rest.len();
-        while self.rest.end < self.buffer.len() && !self.is_last {
-            match self.file.read(&mut self.buffer[self.rest.end..]) {
+        loop {
+            match self.source.read(&mut self.buffer[self.rest.end..]) {
                 Ok(0) => self.is_last = true,
                 Ok(count) => self.rest.end += count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 Err(error) => return Err(io_error(&self.path, error)),
             }
+            return Ok(());
         }
-        Ok(())
     }
 }
 

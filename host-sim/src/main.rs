@@ -35,9 +35,12 @@ enum Command {
     Map(command::map::Map),
     Evaluate(command::evaluate::Evaluate),
     Features(command::features::Features),
+    Layout(command::layout::Layout),
+    Places(command::places::Places),
     Can(command::can::Can),
     Nav350(command::nav350::Nav350),
     Record(command::record::Record),
+    Emulate(command::emulate::Emulate),
 }
 
 fn main() -> ExitCode {
@@ -52,9 +55,12 @@ fn main() -> ExitCode {
         Some(Command::Map(command)) => command.run(),
         Some(Command::Evaluate(command)) => command.run(),
         Some(Command::Features(command)) => command.run(),
+        Some(Command::Layout(command)) => command.run(),
+        Some(Command::Places(command)) => command.run(),
         Some(Command::Can(command)) => command.run(),
         Some(Command::Nav350(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
+        Some(Command::Emulate(command)) => command.run(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -14,7 +14,7 @@ use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
-const ENTRIES: usize = 160;
+const ENTRIES: usize = 128;
 
 /// Localises one vehicle. All of its memory is in this value.
 ///
@@ -24,7 +24,7 @@ const ENTRIES: usize = 160;
 pub struct Localizer<
     const BEAMS: usize = 1440,
     const REFLECTORS: usize = 1000,
-    const FEATURES: usize = 1500,
+    const FEATURES: usize = 1000,
     const DYNAMIC: usize = 256,
 > {
     parameters: Parameters,

@@ -9,5 +9,6 @@ mod encoder;
 mod frames;
 mod node;
 mod pair;
+mod report_clock;
 mod slcan;
 mod supervision;

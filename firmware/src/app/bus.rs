@@ -4,33 +4,40 @@
 //! out; the next one is for its own time.
 
 use agv_core::measurement::EncoderFaults;
+use agv_core::wire::can::canopen::Message;
 use agv_core::wire::can::controller::{Health, Order, OrderReceiver, PosePublisher};
 use agv_core::wire::can::controller_node::ControllerNode;
+use agv_core::wire::can::emcy::Emergency;
 use agv_core::wire::can::encoder_pair::EncoderPair;
-use agv_core::wire::can::frame::AnyFrame;
+use agv_settings::Settings;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
 
 use super::can_port::CanPort;
+use super::encoders::{SYNC_PERIOD, channels, node};
 use super::exchange::{self, BusEvent, now};
-use super::settings::{SYNC_PERIOD, Settings};
+use super::supervision::{self, Task};
 
 /// How often state machines are asked what is due.
 const STEP: Duration = Duration::from_millis(1);
 
 /// Takes part in the bus for ever.
-pub async fn run(mut port: impl CanPort, settings: &Settings) -> ! {
+pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool) -> ! {
     let start = now();
-    let mut pair = EncoderPair::new(&settings.drive, &settings.steering, SYNC_PERIOD, start);
-    let mut node = ControllerNode::new(settings.controller, start);
-    let mut orders = OrderReceiver::new(settings.controller);
-    let mut publisher = PosePublisher::new(settings.controller, start);
+    let [drive, steering] = channels(settings);
+    let controller = node(settings.nodes.controller);
+    let mut pair = EncoderPair::new(&drive, &steering, SYNC_PERIOD, start);
+    let mut node = ControllerNode::new(controller, start);
+    let mut orders = OrderReceiver::new(controller);
+    let mut publisher = PosePublisher::new(controller, start);
     let mut faults = EncoderFaults::default();
+    let mut has_reported = false;
     let mut ticker = Ticker::every(STEP);
     loop {
         let woken = select(port.receive(), ticker.next()).await;
-        let time = now();
-        if let Either::First(AnyFrame::Classic(frame)) = &woken {
+        supervision::check_in(Task::Bus);
+        if let Either::First((frame, heard)) = &woken {
+            let time = *heard;
             if let Some(sample) = pair.handle(frame, time) {
                 exchange::take_encoders(sample);
             }
@@ -41,6 +48,7 @@ pub async fn run(mut port: impl CanPort, settings: &Settings) -> ! {
                 exchange::pass_on(BusEvent::SetPose(fix));
             }
         }
+        let time = now();
         if orders.is_standstill(time) {
             pair.expect_standstill();
         }
@@ -57,6 +65,11 @@ pub async fn run(mut port: impl CanPort, settings: &Settings) -> ! {
         if !node.is_operational() {
             continue;
         }
+        if !core::mem::replace(&mut has_reported, true) {
+            for emergency in troubles(has_panicked) {
+                port.send(&Message::Emergency { node: controller, emergency }.encode());
+            }
+        }
         let (output, laser) = exchange::output();
         let Some(output) = output else { continue };
         let health = Health { drive: faults.drive, steering: faults.steering, laser, layer: 0 };
@@ -66,4 +79,12 @@ pub async fn run(mut port: impl CanPort, settings: &Settings) -> ! {
             }
         }
     }
+}
+
+/// What was wrong at the start, in the codes of CiA 301, table 26.
+fn troubles(has_panicked: bool) -> impl Iterator<Item = Emergency> {
+    let internal_software = has_panicked.then_some(0x6100);
+    let data_set = (!exchange::are_settings_sound()).then_some(0x6300);
+    let generic = |code| Emergency { code, register: 1, details: [0; 5] };
+    internal_software.into_iter().chain(data_set).map(generic)
 }

@@ -1,11 +1,12 @@
 //! The bus as the application sees it.
 
-use agv_core::wire::can::frame::{AnyFrame, Frame};
+use agv_core::measurement::Time;
+use agv_core::wire::can::frame::Frame;
 
 /// A CAN controller with queues.
 pub trait CanPort {
-    /// The next frame of others.
-    fn receive(&mut self) -> impl Future<Output = AnyFrame>;
+    /// The next classic frame of others, and when its end was heard.
+    fn receive(&mut self) -> impl Future<Output = (Frame, Time)>;
 
     /// Queues a frame to send; false if it is dropped because the queue is full. Never waits.
     fn send(&mut self, frame: &Frame) -> bool;

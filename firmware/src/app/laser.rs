@@ -1,14 +1,14 @@
 //! The NAV350 over TCP.
 
-use agv_core::wire::can::controller::LaserHealth;
 use agv_core::wire::nav350::{Configuration, Revolution, Session, Step};
+use agv_settings::Network;
 use embassy_futures::select::{Either, select};
 use embassy_net::tcp::TcpSocket;
 use embassy_net::{IpAddress, IpEndpoint, Stack};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 
 use super::exchange::{self, RevolutionSender, now};
-use super::settings::Settings;
+use super::supervision::{self, Task};
 
 /// How long a connection may take.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -17,8 +17,8 @@ const SEND: Duration = Duration::from_secs(1);
 
 /// Memory of the connection.
 pub struct LaserMemory {
-    /// The session.
-    pub session: Session,
+    /// The session, with room for the longest telegram of a revolution with 1440 beams, in either dialect.
+    pub session: Session<{ 18 * 1024 }>,
     /// Received bytes; the sensor may send no more than this ahead, which is less than the Ethernet controller holds.
     pub receive: [u8; 8192],
     /// Bytes to send.
@@ -47,25 +47,25 @@ pub async fn run(
     stack: Stack<'static>,
     memory: &'static mut LaserMemory,
     mut revolutions: RevolutionSender,
-    settings: &Settings,
+    network: &Network,
 ) -> ! {
     let LaserMemory { session, receive, transmit, read } = memory;
-    let (address, port) = settings.laser;
-    let endpoint = IpEndpoint::new(IpAddress::v4(address[0], address[1], address[2], address[3]), port);
+    let [a, b, c, d] = network.laser;
+    let endpoint = IpEndpoint::new(IpAddress::v4(a, b, c, d), network.laser_port);
     let mut socket = TcpSocket::new(stack, receive, transmit);
     socket.set_nagle_enabled(false);
     let mut is_open = false;
     loop {
         let revolution = revolutions.send().await;
         next(session, &mut socket, &mut is_open, endpoint, read, revolution).await;
-        exchange::set_laser(LaserHealth::Sound);
+        exchange::laser_has_measured();
         revolutions.send_done();
     }
 }
 
 /// Holds the session until a revolution is complete.
 async fn next(
-    session: &mut Session,
+    session: &mut Session<{ 18 * 1024 }>,
     socket: &mut TcpSocket<'_>,
     is_open: &mut bool,
     endpoint: IpEndpoint,
@@ -73,6 +73,7 @@ async fn next(
     revolution: &mut Revolution,
 ) {
     loop {
+        supervision::check_in(Task::Network);
         match session.poll(now(), revolution) {
             Step::Revolution => return,
             Step::Connect => {
@@ -81,13 +82,14 @@ async fn next(
                 if *is_open {
                     session.connected(now());
                 } else {
+                    exchange::laser_has_failed();
                     session.closed();
                 }
             }
             Step::Disconnect(reason) => {
                 *is_open = false;
                 socket.abort();
-                exchange::set_laser(LaserHealth::Silent);
+                exchange::laser_has_failed();
                 defmt::warn!("nav350: {}", defmt::Display2Format(&reason));
             }
             Step::Send(bytes) => {
@@ -101,6 +103,7 @@ async fn next(
                 }
                 if !is_sent {
                     *is_open = false;
+                    exchange::laser_has_failed();
                     session.closed();
                 }
             }
@@ -123,6 +126,7 @@ async fn next(
                     }
                     Either::First(_) => {
                         *is_open = false;
+                        exchange::laser_has_failed();
                         session.closed();
                     }
                     Either::Second(()) => {}

@@ -5,12 +5,14 @@ use agv_core::record::{Output, Record};
 
 use super::exchange::{self, BUS_EVENTS, BusEvent, RevolutionReceiver};
 use super::log_stream::LogWriter;
+use super::supervision::{self, Task};
 
 /// Handles what has come, and returns whether there was anything.
 ///
 /// Samples that wait go first: they are what a revolution is seen from. A revolution takes up to 10 ms at 480 MHz; what
 /// comes meanwhile waits, and the predictor publishes without it.
 pub fn step(localizer: &mut Localizer, revolutions: &mut RevolutionReceiver, log: &mut LogWriter) -> bool {
+    supervision::check_in(Task::Localizer);
     if let Ok(event) = BUS_EVENTS.try_receive() {
         let event = match event {
             BusEvent::Encoders(sample) => Event::Encoders(sample),

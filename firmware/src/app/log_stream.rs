@@ -3,6 +3,8 @@
 //! Frames are numbered. What does not fit the queue, because the network is slow or nobody listens, is dropped whole; the
 //! gap in the numbers tells how much. Nothing ever waits.
 
+use agv_core::landmarks::Landmark;
+use agv_core::localizer::Parameters;
 use agv_core::record::{Capacities, Header, LANDMARKS_A_RECORD, Record, encode};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
@@ -11,12 +13,10 @@ use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::settings::Settings;
-
 /// Bytes that wait for the network.
-const QUEUE: usize = 24 * 1024;
-/// Longest record: a scan of 1440 beams with strengths.
-pub const LONGEST: usize = 9 * 1024;
+const QUEUE: usize = 16 * 1024;
+/// Longest record: a scan of 1440 beams.
+pub const LONGEST: usize = 6 * 1024;
 /// How long a peer may take to read what it asked for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -40,11 +40,11 @@ pub struct LogWriter {
 }
 
 impl LogWriter {
-    /// A writer that makes its frames in `frame`.
+    /// A writer that makes its frames in `frame`, for a map of so many landmarks.
     #[must_use]
-    pub const fn new(frame: &'static mut [u8; LONGEST]) -> Self {
+    pub const fn new(frame: &'static mut [u8; LONGEST], landmarks: usize) -> Self {
         // The header and the map, which each listener is given, come first.
-        Self { sequence: FIRST_SEQUENCE, frame }
+        Self { sequence: 1 + landmarks.div_ceil(LANDMARKS_A_RECORD) as u32, frame }
     }
 
     /// Queues a record, or drops it.
@@ -55,29 +55,32 @@ impl LogWriter {
             return;
         }
         let length = encode(record, sequence, self.frame).ok().filter(|length| *length <= PIPE.free_capacity());
-        let frame = length.and_then(|length| self.frame.get(..length));
-        // This is the only writer, so there is room for all of it.
-        if frame.is_none_or(|frame| PIPE.try_write(frame) != Ok(frame.len())) {
+        let Some(mut rest) = length.and_then(|length| self.frame.get(..length)) else {
             DROPPED.fetch_add(1, Ordering::Relaxed);
+            return;
+        };
+        // There is room for all of it, as nobody else writes; at the end of the queue's memory it goes in two pieces.
+        while let Ok(count) = PIPE.try_write(rest) {
+            rest = rest.get(count..).unwrap_or_default();
+            if rest.is_empty() {
+                break;
+            }
         }
     }
 }
-
-/// Number of the first record behind header and map.
-const FIRST_SEQUENCE: u32 = 1000;
 
 /// Memory of the connection.
 pub struct LogMemory {
     receive: [u8; 64],
     transmit: [u8; 4096],
-    piece: [u8; 4096],
+    piece: [u8; 2048],
 }
 
 impl LogMemory {
     /// Memory of a connection that has not begun.
     #[must_use]
     pub const fn new() -> Self {
-        Self { receive: [0; 64], transmit: [0; 4096], piece: [0; 4096] }
+        Self { receive: [0; 64], transmit: [0; 4096], piece: [0; 2048] }
     }
 }
 
@@ -88,15 +91,21 @@ impl Default for LogMemory {
 }
 
 /// Gives the stream to one listener after the other, for ever.
-pub async fn run(stack: Stack<'static>, memory: &'static mut LogMemory, settings: &Settings) -> ! {
+pub async fn run(
+    stack: Stack<'static>,
+    memory: &'static mut LogMemory,
+    port: u16,
+    parameters: &Parameters,
+    landmarks: &[Landmark],
+) -> ! {
     let LogMemory { receive, transmit, piece } = memory;
     let mut socket = TcpSocket::new(stack, receive, transmit);
     loop {
         socket.abort();
-        if socket.accept(settings.log_port).await.is_err() {
+        if socket.accept(port).await.is_err() {
             continue;
         }
-        if greet(&mut socket, piece, settings).await.is_ok() {
+        if greet(&mut socket, piece, parameters, landmarks).await.is_ok() {
             PIPE.clear();
             IS_HEARD.store(true, Ordering::Relaxed);
             loop {
@@ -125,12 +134,17 @@ async fn send(socket: &mut TcpSocket<'_>, mut bytes: &[u8]) -> Result<(), Gone> 
 }
 
 /// Sends what a log begins with.
-async fn greet(socket: &mut TcpSocket<'_>, frame: &mut [u8], settings: &Settings) -> Result<(), Gone> {
-    let header = Header { software: SOFTWARE, parameters: &settings.parameters, capacities: Capacities::default() };
+async fn greet(
+    socket: &mut TcpSocket<'_>,
+    frame: &mut [u8],
+    parameters: &Parameters,
+    landmarks: &[Landmark],
+) -> Result<(), Gone> {
+    let header = Header { software: SOFTWARE, parameters, capacities: Capacities::default() };
     let mut sequence = 0;
     let first = encode(&Record::Header(header), sequence, frame).map_err(|_| Gone)?;
     send(socket, frame.get(..first).unwrap_or_default()).await?;
-    for piece in settings.landmarks.chunks(LANDMARKS_A_RECORD) {
+    for piece in landmarks.chunks(LANDMARKS_A_RECORD) {
         sequence += 1;
         let length = encode(&Record::Landmarks(piece), sequence, frame).map_err(|_| Gone)?;
         send(socket, frame.get(..length).unwrap_or_default()).await?;

@@ -2,8 +2,12 @@
 
 pub mod bus;
 pub mod can_port;
+pub mod encoders;
 pub mod exchange;
 pub mod laser;
 pub mod localize;
 pub mod log_stream;
+pub mod service;
 pub mod settings;
+pub mod supervision;
+pub mod throttle;

@@ -1,4 +1,4 @@
-//! The firmware of the vehicle, on the emulated board.
+//! The firmware of the vehicle.
 #![no_std]
 #![no_main]
 
@@ -8,13 +8,13 @@ use agv_core::localizer::{Localizer, OutputPredictor};
 use agv_core::wire::nav350::Revolution;
 use agv_firmware::app::laser::LaserMemory;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
-use agv_firmware::app::settings::Settings;
-use agv_firmware::app::{bus, exchange, laser, localize, log_stream};
-use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt, NETWORK_TASKS};
-use agv_firmware::board::an500::lan9118::Lan9118;
-use agv_firmware::board::an500::uart::SlcanPort;
-use agv_firmware::board::an500::{settings_file, time_driver, uart};
-use defmt_semihosting as _;
+use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
+use agv_firmware::app::throttle::Throttle;
+use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, supervision};
+use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash};
+use agv_firmware::board::{retained, stack};
+use agv_settings::Settings;
+use agv_settings::service::Controller;
 use embassy_executor::Spawner;
 use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -23,92 +23,128 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 #[panic_handler]
 fn on_panic(info: &PanicInfo) -> ! {
-    defmt::error!("{}", defmt::Display2Format(info));
-    cortex_m_semihosting::debug::exit(cortex_m_semihosting::debug::EXIT_FAILURE);
-    loop {
-        cortex_m::asm::wfi();
-    }
+    cortex_m::interrupt::disable();
+    retained::keep(info);
+    board::restart()
 }
 
 defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
 
+/// Connections of the service port.
+const CONNECTIONS: usize = 2;
+
+static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
 static SETTINGS: StaticCell<Settings> = StaticCell::new();
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
-static REVOLUTIONS: ConstStaticCell<[Revolution; 2]> = ConstStaticCell::new([const { Revolution::new() }; 2]);
+static REVOLUTIONS: ConstStaticCell<[Revolution; 1]> = ConstStaticCell::new([Revolution::new()]);
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
 static LASER: StaticCell<LaserMemory> = StaticCell::new();
 static LOG: ConstStaticCell<LogMemory> = ConstStaticCell::new(LogMemory::new());
 static FRAME: ConstStaticCell<[u8; LONGEST]> = ConstStaticCell::new([0; LONGEST]);
-static RESOURCES: StaticCell<StackResources<4>> = StaticCell::new();
+static SERVICES: ConstStaticCell<[ServiceMemory; CONNECTIONS]> =
+    ConstStaticCell::new([const { ServiceMemory::new() }; CONNECTIONS]);
+static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
 
-#[embassy_executor::task]
-async fn bus_task(settings: &'static Settings) -> ! {
-    bus::run(SlcanPort, settings).await
+/// What all tasks of the network know.
+#[derive(Clone, Copy)]
+struct Shared {
+    settings: &'static Settings,
+    controller: &'static SharedController<Flash>,
+    landmarks: &'static [agv_core::landmarks::Landmark],
 }
 
 #[embassy_executor::task]
-async fn network_task(mut runner: Runner<'static, Lan9118>) -> ! {
+async fn bus_task(can: Can, settings: &'static Settings, has_panicked: bool) -> ! {
+    bus::run(can, settings, has_panicked).await
+}
+
+#[embassy_executor::task]
+async fn network_task(mut runner: Runner<'static, Throttle<Ethernet>>) -> ! {
     runner.run().await
 }
 
 #[embassy_executor::task]
 async fn laser_task(stack: Stack<'static>, revolutions: exchange::RevolutionSender, settings: &'static Settings) -> ! {
-    laser::run(stack, LASER.init_with(LaserMemory::new), revolutions, settings).await
+    laser::run(stack, LASER.init_with(LaserMemory::new), revolutions, &settings.network).await
 }
 
 #[embassy_executor::task]
-async fn log_task(stack: Stack<'static>, settings: &'static Settings) -> ! {
-    log_stream::run(stack, LOG.take(), settings).await
+async fn log_task(stack: Stack<'static>, shared: Shared) -> ! {
+    let Shared { settings, landmarks, .. } = shared;
+    log_stream::run(stack, LOG.take(), settings.network.log_port, &settings.parameters, landmarks).await
+}
+
+#[embassy_executor::task(pool_size = CONNECTIONS)]
+async fn service_task(stack: Stack<'static>, memory: &'static mut ServiceMemory, shared: Shared) -> ! {
+    let actions = BoardActions { forget_panic: retained::forget, restart: board::restart };
+    service::run(stack, memory, shared.controller, shared.settings.network.service_port, actions).await
 }
 
 /// Starts the network on the executor that runs it: its tasks may not move to another one.
 #[embassy_executor::task]
 #[allow(unsafe_code, reason = "the spawner of an interrupt executor is to be had in no other way")]
-async fn start_network(device: Lan9118, revolutions: exchange::RevolutionSender, settings: &'static Settings) {
+async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSender, shared: Shared) {
     // SAFETY: this task was made by embassy's macro, so its context is embassy's.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    let address = Ipv4Cidr::new(Ipv4Address::new(10, 0, 2, 15), 24);
+    let network = &shared.settings.network;
     let config = Config::ipv4_static(StaticConfigV4 {
-        address,
-        gateway: Some(Ipv4Address::new(10, 0, 2, 2)),
+        address: Ipv4Cidr::new(Ipv4Address::from(network.address), network.prefix),
+        gateway: Some(Ipv4Address::from(network.gateway)),
         dns_servers: heapless::Vec::new(),
     });
     let resources = RESOURCES.init_with(StackResources::new);
-    let (stack, runner) = embassy_net::new(device, config, resources, 0x5eed);
+    let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, 0x5eed);
     spawner.spawn(network_task(runner).expect("the task runs once"));
-    spawner.spawn(laser_task(stack, revolutions, settings).expect("the task runs once"));
-    spawner.spawn(log_task(stack, settings).expect("the task runs once"));
+    spawner.spawn(laser_task(stack, revolutions, shared.settings).expect("the task runs once"));
+    spawner.spawn(log_task(stack, shared).expect("the task runs once"));
+    for memory in SERVICES.take() {
+        spawner.spawn(service_task(stack, memory, shared).expect("there are as many tasks as connections"));
+    }
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    let mut core = cortex_m::Peripherals::take().expect("the program begins once");
-    let settings: &'static Settings = SETTINGS.init_with(settings_file::read);
+    stack::paint();
+    let core = cortex_m::Peripherals::take().expect("the program begins once");
+    let Board { can, ethernet, flash, mut watchdog } = board::start(core);
+    let panic = retained::read();
+    let controller: Controller<Flash> = settings::read(flash, panic);
+    let landmarks = controller.landmarks;
+    let settings: &'static Settings = SETTINGS.init(controller.settings.clone());
+    let controller = CONTROLLER.init(SharedController::new(controller));
     let localizer = LOCALIZER.init_with(|| Localizer::new(settings.parameters));
-    localizer.add_landmarks(settings.landmarks).expect("the map has room for the landmarks");
+    if localizer.add_landmarks(landmarks).is_err() {
+        defmt::error!("the map has more landmarks than the localiser takes, or the same one twice");
+        exchange::set_settings_sound(false);
+    }
     exchange::start(OutputPredictor::new(&settings.parameters));
     exchange::update(&localizer.outputs().pose);
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
     let (sender, mut receiver) = channel.split();
-    let mut log = LogWriter::new(FRAME.take());
-    time_driver::start();
-    uart::start();
-    // Before its interrupt is let through, which it holds active until it is set up.
-    let device = Lan9118::start([2, 0, 0, 0, 0, 1]);
-    interrupts::enable(&mut core.NVIC);
-    let bus = BUS_TASKS.start(Interrupt::BusTasks);
-    bus.spawn(bus_task(settings).expect("the task runs once"));
-    let network = NETWORK_TASKS.start(Interrupt::NetworkTasks);
-    network.spawn(start_network(device, sender, settings).expect("the task runs once"));
-    defmt::info!("{} landmarks", settings.landmarks.len());
+    let mut log = LogWriter::new(FRAME.take(), landmarks.len());
+    watchdog.unleash();
+    let has_panicked = !panic.is_empty();
+    board::bus_tasks().spawn(bus_task(can, settings, has_panicked).expect("the task runs once"));
+    let shared = Shared { settings, controller, landmarks };
+    board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
+    let mut deepest = 0;
     loop {
-        if !localize::step(localizer, &mut receiver, &mut log) {
-            // An interrupt that comes between looking and sleeping ends the sleep at once.
-            cortex_m::interrupt::free(|_| {
-                if exchange::BUS_EVENTS.is_empty() && receiver.is_empty() {
-                    cortex_m::asm::wfi();
-                }
-            });
+        if localize::step(localizer, &mut receiver, &mut log) {
+            continue;
         }
+        if supervision::have_all_run() {
+            watchdog.feed();
+            let depth = stack::deepest();
+            if depth > deepest {
+                deepest = depth;
+                defmt::info!("stack: {} of {} bytes", deepest, stack::RESERVED);
+            }
+        }
+        // An interrupt that comes between looking and sleeping ends the sleep at once.
+        cortex_m::interrupt::free(|_| {
+            if exchange::BUS_EVENTS.is_empty() && receiver.is_empty() {
+                cortex_m::asm::wfi();
+            }
+        });
     }
 }

@@ -8,6 +8,8 @@ mod places;
 mod slam;
 mod warehouse;
 
+pub use places::Places;
+
 /// A log of the thesis.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Set {

@@ -5,16 +5,20 @@
 
 pub mod can;
 pub mod demonstration;
+pub mod emulate;
 mod encoder_arguments;
 pub mod evaluate;
 pub mod export;
 pub mod features;
 pub mod import;
+pub mod layout;
 mod like;
 pub mod map;
 pub mod nav350;
 mod output;
 pub mod panic_message;
+pub mod places;
+mod posed_scans;
 mod progress;
 pub mod record;
 pub mod replay;

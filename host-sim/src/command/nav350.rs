@@ -164,7 +164,12 @@ impl Serve {
         eprintln!("serving {} revolutions on port {port}", drive.turns().len());
         let sensor = Sensor::new(
             drive,
-            Options { speed: self.speed, clock_start: self.clock, dialect: self.dialect.map(Into::into) },
+            Options {
+                speed: self.speed,
+                clock_start: self.clock,
+                dialect: self.dialect.map(Into::into),
+                ..Options::default()
+            },
         );
         Ok(sensor.serve(&listener, &AtomicBool::new(false))?)
     }

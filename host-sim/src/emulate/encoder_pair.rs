@@ -9,12 +9,13 @@ use agv_core::wire::can::frame::Frame;
 use super::encoder::EmulatedEncoder;
 use crate::recording::Recording;
 
-/// Two encoders on a bus. The drive begins when both have been started.
+/// Two encoders on a bus. The drive begins when both have been started, or when it is told to.
 #[derive(Clone, Debug)]
 pub struct EmulatedPair {
     nodes: [EmulatedEncoder; 2],
     samples: Vec<EncoderSample>,
     start: Option<Time>,
+    stands: bool,
 }
 
 /// Why a drive cannot be played.
@@ -44,7 +45,7 @@ impl EmulatedPair {
             _ => (CounterRange::BITS_32, CounterRange::BITS_32),
         };
         let nodes = [EmulatedEncoder::new(drive, drive_range), EmulatedEncoder::new(steering, steering_range)];
-        Ok(Self { nodes, samples, start: None })
+        Ok(Self { nodes, samples, start: None, stands: false })
     }
 
     /// Length of the drive, s.
@@ -56,6 +57,23 @@ impl EmulatedPair {
         }
     }
 
+    /// The same encoders, whose vehicle stands until [`Self::begin`].
+    #[must_use]
+    pub fn standing(self) -> Self {
+        Self { stands: true, ..self }
+    }
+
+    /// Lets the vehicle drive off at `time`.
+    pub const fn begin(&mut self, time: Time) {
+        self.start = Some(time);
+    }
+
+    /// Whether both encoders have been started.
+    #[must_use]
+    pub fn are_operational(&self) -> bool {
+        self.nodes.iter().all(EmulatedEncoder::is_operational)
+    }
+
     /// When the drive began.
     #[must_use]
     pub const fn start(&self) -> Option<Time> {
@@ -64,7 +82,7 @@ impl EmulatedPair {
 
     /// What the encoders send by themselves at `now`, having turned as far as they have by then.
     pub fn poll(&mut self, now: Time) -> Vec<Frame> {
-        if self.start.is_none() && self.nodes.iter().all(EmulatedEncoder::is_operational) {
+        if !self.stands && self.start.is_none() && self.are_operational() {
             self.start = Some(now);
         }
         let elapsed = self.start.map_or(0.0, |start| now.since(start));

@@ -1,4 +1,6 @@
 //! Devices that are not there.
 
+pub mod board;
 pub mod encoder;
 pub mod encoder_pair;
+pub mod vehicle;

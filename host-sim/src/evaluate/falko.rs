@@ -14,14 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use super::repeatability;
 use crate::data;
+pub use crate::import::{BEAMS, KEYPOINTS, RANGES};
 use crate::import::{PosedScan, graph_log};
-
-/// Beams of the longest scan that is looked at.
-pub const BEAMS: usize = 1440;
-/// Keypoints of one scan that are kept.
-pub const KEYPOINTS: usize = 256;
-/// Ranges outside this interval are absent, m.
-pub const RANGES: (f32, f32) = (0.02, 80.0);
 
 /// Columns of the reference program's file before those of the histogram.
 const COLUMNS_BEFORE_HISTOGRAM: usize = 7;

@@ -2,6 +2,7 @@
 
 mod can;
 mod nav350;
+pub mod stream;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

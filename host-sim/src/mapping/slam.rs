@@ -2,18 +2,16 @@
 
 use std::time::Instant;
 
-use agv_core::features::falko::{Detector, Parameters};
-use agv_core::features::{Keypoint, PointScan};
-use agv_core::geometry::{Point, Pose, ScanPoint};
+use agv_core::geometry::{Point, Pose};
 use agv_core::measurement::Time;
 use agv_core::places::{
-    Candidate, Glare, GlareParameters, GlareTables, OverlapParameters, PlaceIndex, PlaceView, Recognition,
-    RecognitionParameters, Recognizer, ScanAlignmentParameters, align_scans, overlap,
+    Candidate, GlareParameters, GlareTables, OverlapParameters, PlaceIndex, Recognition, RecognitionParameters,
+    Recognizer, ScanAlignmentParameters, align_scans, overlap,
 };
 use nalgebra::Matrix3;
 
 use super::pose_graph::{Edge, PoseGraphError, optimise};
-use crate::evaluate::falko::{BEAMS, KEYPOINTS, RANGES};
+use crate::places::{Observation, Observer};
 use crate::recording::RecordedScan;
 
 /// How a map is made.
@@ -64,10 +62,8 @@ pub struct KeyScan {
     pub scan: usize,
     /// When it was taken.
     pub time: Time,
-    /// Its points, in S.
-    pub points: Box<PointScan<BEAMS>>,
-    /// Its keypoints, in S.
-    pub keypoints: Vec<Keypoint>,
+    /// What is seen in it.
+    pub observation: Observation,
     /// Pose of S by odometry alone.
     pub odometry: Pose,
 }
@@ -92,7 +88,13 @@ impl SlamMap {
     #[must_use]
     pub fn points(&self) -> Vec<Point> {
         let of_key = |(key, pose): (&KeyScan, &Pose)| {
-            let present = key.points.points.iter().zip(&key.points.ranges).filter(|(_, range)| **range > 0.0);
+            let present = key
+                .observation
+                .points
+                .points
+                .iter()
+                .zip(&key.observation.points.ranges)
+                .filter(|(_, range)| **range > 0.0);
             present.map(|(point, _)| pose.transform(&point.cast())).collect::<Vec<_>>()
         };
         self.keys.iter().zip(&self.poses).flat_map(of_key).collect()
@@ -144,8 +146,7 @@ pub fn map(
 }
 
 fn key_scans(scans: &[(&RecordedScan, Pose)], parameters: &SlamParameters) -> Vec<KeyScan> {
-    let mut detectors = [Parameters::place_corners(), Parameters::place_ends()]
-        .map(|parameters| Box::new(Detector::<BEAMS>::new(parameters)));
+    let mut observer = Observer::default();
     let mut keys: Vec<KeyScan> = Vec::new();
     for (number, (scan, odometry)) in scans.iter().enumerate() {
         let is_key = keys.last().is_none_or(|last| {
@@ -155,15 +156,8 @@ fn key_scans(scans: &[(&RecordedScan, Pose)], parameters: &SlamParameters) -> Ve
         if !is_key || keys.len() == KEYS {
             continue;
         }
-        let mut points = Box::new(PointScan::new());
-        points.set(&scan.view(), RANGES.0, RANGES.1);
-        let mut keypoints = Vec::new();
-        let mut found = heapless::Vec::<Keypoint, KEYPOINTS>::new();
-        for detector in &mut detectors {
-            detector.detect(&points, &mut found);
-            keypoints.extend_from_slice(&found);
-        }
-        keys.push(KeyScan { scan: number, time: scan.start, points, keypoints, odometry: *odometry });
+        let observation = observer.observe(scan);
+        keys.push(KeyScan { scan: number, time: scan.start, observation, odometry: *odometry });
     }
     keys
 }
@@ -254,9 +248,13 @@ fn edge(from: usize, to: usize, found: &Recognition, is_doubtful: bool) -> Edge 
 fn aligned(source: &KeyScan, target: &KeyScan, start: &Pose) -> Option<Recognition> {
     let parameters =
         ScanAlignmentParameters { first_reach: 0.4, last_reach: 0.08, iterations: 12, every: 1, ..Default::default() };
-    let found = align_scans(&source.points, &target.points, start, &parameters)?;
-    let overlap =
-        overlap(&source.points, &target.points, &found.pose, &OverlapParameters { near: 0.07, ..Default::default() });
+    let found = align_scans(&source.observation.points, &target.observation.points, start, &parameters)?;
+    let overlap = overlap(
+        &source.observation.points,
+        &target.observation.points,
+        &found.pose,
+        &OverlapParameters { near: 0.07, ..Default::default() },
+    );
     Some(Recognition { pose: found.pose, information: found.information, points: 0, overlap })
 }
 
@@ -271,18 +269,16 @@ fn close_loops(keys: &[KeyScan], parameters: &SlamParameters, done: &impl Fn()) 
     let mut recognizer = Box::<Recognizer<1024, 32>>::default();
     let mut loops = Vec::new();
     for (number, key) in keys.iter().enumerate() {
-        let positions: Vec<ScanPoint> = key.keypoints.iter().map(|keypoint| keypoint.position).collect();
-        let signature = Glare::of(&positions, &tables);
+        let signature = key.observation.signature(&tables);
         let mut candidates = heapless::Vec::<Candidate, CANDIDATES>::new();
         let is_admissible = |place: u32| is_loop(keys, place as usize, number, parameters);
         index.search(&signature, is_admissible, &mut candidates);
-        let query = PlaceView { points: &key.points, keypoints: &key.keypoints };
+        let query = key.observation.view();
         let best = candidates
             .iter()
             .filter_map(|candidate| {
-                let place = &keys[candidate.place as usize];
-                let view = PlaceView { points: &place.points, keypoints: &place.keypoints };
-                let found = recognizer.recognise(&query, &view, &RecognitionParameters::default())?;
+                let place = keys[candidate.place as usize].observation.view();
+                let found = recognizer.recognise(&query, &place, &RecognitionParameters::default())?;
                 Some((candidate.place as usize, found))
             })
             .max_by(|a, b| a.1.confidence().total_cmp(&b.1.confidence()));

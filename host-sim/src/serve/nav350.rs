@@ -1,8 +1,8 @@
 //! A NAV350 on TCP that sees what a recorded or simulated drive has seen.
 //!
 //! It speaks both dialects, has the sensor's operating modes, user levels, settings and layout, and answers the reads
-//! that its maker's client makes at start-up. The drive begins with the first question for data; when it is over, the
-//! last revolution is repeated.
+//! that its maker's client makes at start-up. The drive begins with the first question for data, or when it is told to;
+//! until then the first revolution is repeated, and the last one when it is over.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -147,11 +147,13 @@ pub struct Options {
     pub clock_start: u32,
     /// The only dialect that is understood; both if None.
     pub dialect: Option<Dialect>,
+    /// Whether the vehicle stands until [`Nav350::begin`].
+    pub stands: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { speed: 1.0, clock_start: 0, dialect: None }
+        Self { speed: 1.0, clock_start: 0, dialect: None, stands: false }
     }
 }
 
@@ -179,8 +181,8 @@ struct State {
 struct Promise {
     due: f64,
     turn: usize,
-    /// How often the last turn was repeated, s.
-    shift: f64,
+    /// When the first turn began, had every turn been made once, s.
+    start: f64,
     method: PromisedMethod,
     dialect: Dialect,
 }
@@ -239,6 +241,12 @@ impl Nav350 {
     #[must_use]
     pub fn layout(&self) -> Vec<IdentifiedLandmark> {
         self.state().layout.clone()
+    }
+
+    /// Lets the vehicle of a sensor that stands drive off at `time`.
+    pub fn begin(&self, time: Instant) {
+        let seconds = time.saturating_duration_since(self.started).as_secs_f64() * self.options.speed;
+        self.state().drive_start = Some(seconds);
     }
 
     /// Serves every connection, until `is_stopped`.
@@ -523,8 +531,15 @@ impl Nav350 {
             return bytes;
         }
         let now = self.now();
+        let period = self.drive.frame.period;
+        if self.options.stands && state.drive_start.is_none_or(|start| now < start) {
+            let periods = (now / period).floor() + if wait { 1.0 } else { 0.0 };
+            let due = if wait { periods * period } else { now };
+            *promise = Some(Promise { due, turn: 0, start: (periods - 1.0) * period, method, dialect });
+            return bytes;
+        }
         let drive_start = *state.drive_start.get_or_insert(now);
-        let end = |turn: &Turn| drive_start + turn.start.since(self.drive.first_start()) + self.drive.frame.period;
+        let end = |turn: &Turn| drive_start + turn.start.since(self.drive.first_start()) + period;
         let mut turn = self.drive.turns.partition_point(|turn| end(turn) <= now);
         if !wait {
             turn = turn.saturating_sub(1);
@@ -533,11 +548,11 @@ impl Nav350 {
         let (turn, shift) = if turn <= last {
             (turn, 0.0)
         } else {
-            let periods = ((now - end(&self.drive.turns[last])) / self.drive.frame.period).floor() + 1.0;
-            (last, periods * self.drive.frame.period)
+            let periods = ((now - end(&self.drive.turns[last])) / period).floor() + 1.0;
+            (last, periods * period)
         };
         let due = if wait { end(&self.drive.turns[turn]) + shift } else { now };
-        *promise = Some(Promise { due, turn, shift, method, dialect });
+        *promise = Some(Promise { due, turn, start: drive_start + shift, method, dialect });
         bytes
     }
 
@@ -549,8 +564,7 @@ impl Nav350 {
     fn keep(&self, promise: &Promise) -> Vec<u8> {
         let state = self.state();
         let turn = &self.drive.turns[promise.turn];
-        let shift = state.drive_start.unwrap_or(0.0) + promise.shift;
-        let time = |time: Time| self.device_time(time.since(self.drive.first_start()) + shift);
+        let time = |time: Time| self.device_time(time.since(self.drive.first_start()) + promise.start);
         let mut pose_details = false;
         let mut landmarks =
             LandmarkDataFormat { coordinates: CoordinateFormat::Cartesian, has_details: false, filter: 0 };

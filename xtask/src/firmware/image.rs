@@ -21,7 +21,7 @@ pub struct Board {
 pub const AN500: Board = Board { feature: "an500", images: &["measure", "replay", "vehicle"] };
 
 /// The vehicle's board, a Nucleo-H743ZI.
-pub const H743: Board = Board { feature: "h743", images: &[] };
+pub const H743: Board = Board { feature: "h743", images: &["vehicle"] };
 
 /// All boards.
 pub const BOARDS: [&Board; 2] = [&AN500, &H743];

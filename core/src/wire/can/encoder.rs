@@ -10,6 +10,7 @@ use super::emcy::Emergency;
 use super::frame::{Frame, Id, extended_id, standard_id};
 use super::nmt::{HeartbeatConsumer, NmtCommand, NmtState};
 use super::pdo::{MappingEntry, PdoMapping};
+use super::report_clock::ReportClock;
 use super::sdo::{Object, Request, Response, SdoClient, TransferError, Value};
 use crate::measurement::Time;
 use crate::odometry::CounterRange;
@@ -191,6 +192,7 @@ pub struct Encoder {
     heartbeat: HeartbeatConsumer,
     identity: Identity,
     last_sync: Option<Time>,
+    reports: ReportClock,
     error: Option<SetupError>,
 }
 
@@ -214,6 +216,10 @@ impl Encoder {
             heartbeat: HeartbeatConsumer::new(f64::from(settings.heartbeat) * 1e-3 * HEARTBEAT_TOLERANCE),
             identity,
             last_sync: None,
+            reports: ReportClock::new(match settings.reporting {
+                Reporting::Timer { period } => f64::from(period) * 1e-3,
+                _ => 0.0,
+            }),
             error: None,
         }
     }
@@ -334,6 +340,8 @@ impl Encoder {
         }
         let time = match (self.settings.reporting, self.last_sync) {
             (Reporting::Synchronous, Some(sync)) => sync,
+            // A node that does not take the timer reports as it likes.
+            (Reporting::Timer { .. }, _) if self.identity.refused_settings == 0 => self.reports.time(time),
             _ => time,
         };
         Some(EncoderReading { time, position, speed })
@@ -513,6 +521,7 @@ impl Encoder {
 
     fn start(&mut self, now: Time) -> EncoderEvent {
         self.error = None;
+        self.reports.restart();
         self.command = Some(NmtCommand::Start);
         self.phase = if self.identity.pdo_id.is_some() {
             Phase::Reporting { since: now, has_reported: false }

@@ -24,6 +24,7 @@ pub mod encoder_pair;
 pub mod frame;
 pub mod nmt;
 pub mod pdo;
+pub mod report_clock;
 pub mod sdo;
 pub mod signal;
 pub mod slcan;

@@ -1,4 +1,5 @@
-//! Files of the machine that emulates the board (ARM, "Semihosting for AArch32 and AArch64", SYS_OPEN, SYS_READ, SYS_WRITE).
+//! Files of the machine that emulates the board (ARM, "Semihosting for AArch32 and AArch64", SYS_OPEN, SYS_READ, SYS_WRITE,
+//! SYS_SEEK).
 #![allow(unsafe_code, reason = "semihosting passes addresses to the host")]
 
 use cortex_m_semihosting::{nr, syscall};
@@ -27,6 +28,24 @@ impl HostFile {
     /// If the host does not.
     pub fn create(name: &core::ffi::CStr) -> Result<Self, HostFileError> {
         Self::open_as(name, nr::open::W_TRUNC_BINARY)
+    }
+
+    /// Opens a file to read and write; it must be there.
+    ///
+    /// # Errors
+    /// If the host does not.
+    pub fn open_to_change(name: &core::ffi::CStr) -> Result<Self, HostFileError> {
+        Self::open_as(name, nr::open::RW_BINARY)
+    }
+
+    /// Goes to a place, from the beginning of the file.
+    ///
+    /// # Errors
+    /// If the host does not.
+    pub fn seek(&mut self, offset: usize) -> Result<(), HostFileError> {
+        // SAFETY: no addresses are passed.
+        let outcome = unsafe { syscall!(SEEK, self.handle, offset) };
+        if outcome == 0 { Ok(()) } else { Err(HostFileError) }
     }
 
     fn open_as(name: &core::ffi::CStr, mode: usize) -> Result<Self, HostFileError> {

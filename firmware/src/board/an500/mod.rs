@@ -1,12 +1,62 @@
 //! ARM's MPS2 with the image AN500: a Cortex-M7 that QEMU emulates (ARM DAI 0500, "Example Cortex-M7 SMM on V2M-MPS2+").
 
+pub mod flash;
 pub mod host_file;
 pub mod interrupts;
 pub mod lan9118;
 pub mod log_file;
 pub mod panic;
 mod registers;
-pub mod settings_file;
 pub mod stopwatch;
 pub mod time_driver;
 pub mod uart;
+pub mod watchdog;
+
+pub use flash::FileFlash as Flash;
+pub use lan9118::Lan9118 as Ethernet;
+pub use uart::SlcanPort as Can;
+pub use watchdog::Watchdog;
+
+use defmt_semihosting as _;
+use embassy_executor::SendSpawner;
+use interrupts::{BUS_TASKS, Interrupt, NETWORK_TASKS};
+
+/// What the board has.
+pub struct Board {
+    /// The bus: SLCAN on the first serial line, as there is no CAN.
+    pub can: Can,
+    /// Ethernet.
+    pub ethernet: Ethernet,
+    /// Where settings are kept.
+    pub flash: Flash,
+    /// The watchdog, not started.
+    pub watchdog: Watchdog,
+}
+
+/// Starts everything but the tasks.
+#[must_use]
+pub fn start(mut core: cortex_m::Peripherals) -> Board {
+    time_driver::start();
+    uart::start();
+    // Before its interrupt is let through, which it holds active until it is set up.
+    let ethernet = Ethernet::start([2, 0, 0, 0, 0, 1]);
+    interrupts::enable(&mut core.NVIC);
+    Board { can: uart::SlcanPort, ethernet, flash: Flash::open(), watchdog: Watchdog::new() }
+}
+
+/// Starts the tasks of the bus. Call once.
+#[must_use]
+pub fn bus_tasks() -> SendSpawner {
+    BUS_TASKS.start(Interrupt::BusTasks)
+}
+
+/// Starts the tasks of the network. Call once.
+#[must_use]
+pub fn network_tasks() -> SendSpawner {
+    NETWORK_TASKS.start(Interrupt::NetworkTasks)
+}
+
+/// Starts again.
+pub fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}

@@ -5,6 +5,7 @@ use core::cell::RefCell;
 use core::future::poll_fn;
 use core::task::Poll;
 
+use agv_core::measurement::Time;
 use agv_core::wire::can::frame::{AnyFrame, Frame};
 use agv_core::wire::can::slcan::{Decoder, Message};
 use critical_section::Mutex;
@@ -13,6 +14,7 @@ use heapless::Deque;
 
 use super::registers::{read, write};
 use crate::app::can_port::CanPort;
+use crate::app::exchange;
 
 const BASE: usize = 0x4000_4000;
 const DATA: usize = 0;
@@ -35,7 +37,7 @@ const SENT: usize = 2048;
 
 struct State {
     decoder: Decoder,
-    received: Deque<AnyFrame, RECEIVED>,
+    received: Deque<(Frame, Time), RECEIVED>,
     sent: Deque<u8, SENT>,
     waker: WakerRegistration,
     /// Frames that were lost because nobody took them, or the line was too slow.
@@ -75,8 +77,8 @@ pub fn on_receive() {
             while read(BASE, STATE) & RECEIVE_FULL != 0 {
                 let byte = read(BASE, DATA) as u8;
                 match state.decoder.push(byte) {
-                    Some(Ok(Message::Frame { frame, .. })) => {
-                        if state.received.push_back(frame).is_err() {
+                    Some(Ok(Message::Frame { frame: AnyFrame::Classic(frame), .. })) => {
+                        if state.received.push_back((frame, exchange::now())).is_err() {
                             state.lost += 1;
                         }
                         state.waker.wake();
@@ -118,7 +120,7 @@ impl State {
 pub struct SlcanPort;
 
 impl CanPort for SlcanPort {
-    async fn receive(&mut self) -> AnyFrame {
+    async fn receive(&mut self) -> (Frame, Time) {
         poll_fn(|context| {
             let frame = with(|state| {
                 state.waker.register(context.waker());

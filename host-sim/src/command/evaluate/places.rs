@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use agv_host_sim::evaluate::falko;
-use agv_host_sim::evaluate::places::{CANDIDATES, Combination, Experiment, Method, Mode, Protocol};
-use agv_host_sim::import::carmen;
+use agv_host_sim::evaluate::places::{CANDIDATES, Combination, Experiment, Method, Mode, Protocol, page};
+use anyhow::Context;
 
-use crate::command::progress;
+use crate::command::{posed_scans, progress};
 
 const HELP: &str = "\
 Protocol `thesis`: an answer is right within 0.5 m and 10 degrees; neighbours in time are allowed; every scan is a question
@@ -15,6 +15,7 @@ allowed scan within 0.5 m and 30 degrees count for recall; wrong answers to all 
 
 Examples:
   agv evaluate places --set fr079 --json
+  agv evaluate places --set intel --report places.html
   agv evaluate places --log freiburg-079-corrected.log.gz --candidates 50";
 
 /// How well places are recognised from keypoints of one scan (K 4.2).
@@ -24,7 +25,7 @@ pub struct Places {
     /// Log to measure on.
     #[arg(long, required_unless_present = "log")]
     set: Option<super::Set>,
-    /// A CARMEN log with corrected poses instead, plain or .gz.
+    /// A log with poses instead: of this program, a pose graph, or a CARMEN log with corrected poses, plain or .gz.
     #[arg(long, conflicts_with = "set")]
     log: Option<PathBuf>,
     /// Candidates that are looked at for each question.
@@ -36,6 +37,9 @@ pub struct Places {
     /// Print a JSON array instead of a table.
     #[arg(long)]
     json: bool,
+    /// Write a page with the curves of precision and recall.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 impl Places {
@@ -43,7 +47,7 @@ impl Places {
     pub fn run(self) -> anyhow::Result<()> {
         let scans = match (self.set, &self.log) {
             (Some(set), _) => falko::Set::from(set).scans()?,
-            (None, Some(log)) => carmen::read(log)?.front.scans,
+            (None, Some(log)) => posed_scans::read(log)?,
             (None, None) => anyhow::bail!("state a set or a log"),
         };
         anyhow::ensure!(!scans.is_empty(), "the log has no scans");
@@ -66,6 +70,9 @@ impl Places {
             }
         }
         bar.finish_and_clear();
+        if let Some(report) = &self.report {
+            page(&outcomes)?.write(report).with_context(|| report.display().to_string())?;
+        }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());

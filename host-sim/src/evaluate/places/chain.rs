@@ -11,11 +11,7 @@ use agv_core::places::{
 use serde::Serialize;
 
 use super::DescribedScan;
-
-/// Most places of a log.
-pub const PLACES: usize = 8192;
-/// Most candidates of a question.
-pub const CANDIDATES: usize = 64;
+pub use crate::places::{CANDIDATES, LEAST_CONFIDENCE, PLACES};
 
 /// How a place is recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -73,9 +69,6 @@ impl Method {
         }
     }
 }
-
-/// Answers with at least this confidence are accepted by the improved chain; chosen on fr079 and intel, the same for all.
-pub const LEAST_CONFIDENCE: f64 = 0.5;
 
 /// Keypoints closer than this after alignment are the same, m (K 4.2.1).
 const COMMON_RADIUS: f32 = 0.1;

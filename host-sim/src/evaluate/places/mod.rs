@@ -5,10 +5,12 @@ mod chain;
 mod described;
 mod experiment;
 mod figures;
+mod pictures;
 mod protocol;
 
 pub use chain::{Answer, CANDIDATES, LEAST_CONFIDENCE, Memory, Method, PLACES, tables};
 pub use described::DescribedScan;
 pub use experiment::{Combination, Experiment, Outcome};
 pub use figures::{CurvePoint, Figures, Judged, figures};
+pub use pictures::page;
 pub use protocol::{Mode, Protocol, is_right};

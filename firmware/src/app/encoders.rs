@@ -1,0 +1,47 @@
+//! What is expected of the encoders, from the settings.
+
+use agv_core::odometry::Vehicle;
+use agv_core::wire::can::canopen::NodeId;
+use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
+use agv_core::wire::can::encoder_pair::ChannelSettings;
+use agv_core::wire::can::supervision::SupervisionLimits;
+use agv_settings::Settings;
+
+/// Time between SYNC messages if encoders want them, s.
+pub const SYNC_PERIOD: f64 = 0.010;
+
+/// Hardest braking of a sound vehicle, m/s^2.
+const BRAKING: f64 = 2.5;
+/// Fastest turn of the steering, rad/s, and its hardest braking, rad/s^2.
+const STEERING: (f64, f64) = (3.0, 100.0);
+
+/// The node with that number; the settings have no other numbers than those of nodes.
+#[must_use]
+pub fn node(number: u8) -> NodeId {
+    NodeId::new(number).unwrap_or(FIRST)
+}
+
+const FIRST: NodeId = match NodeId::new(1) {
+    Some(node) => node,
+    None => panic!("1 is a node"),
+};
+
+/// The driving wheel's encoder, and the steering's.
+#[must_use]
+pub fn channels(settings: &Settings) -> [ChannelSettings; 2] {
+    let (drive_scale, steering_scale) = match settings.parameters.vehicle {
+        Vehicle::Tricycle(vehicle) => (vehicle.drive_scale.abs(), vehicle.steering_scale.abs()),
+        _ => (1.0, 1.0),
+    };
+    let channel = |number, fastest, braking| ChannelSettings {
+        encoder: EncoderSettings {
+            reporting: Reporting::Timer { period: settings.encoder_period },
+            ..EncoderSettings::new(node(number))
+        },
+        limits: SupervisionLimits::every_10_ms(fastest, braking),
+    };
+    [
+        channel(settings.nodes.drive, settings.parameters.limits.fastest / drive_scale, BRAKING / drive_scale),
+        channel(settings.nodes.steering, STEERING.0 / steering_scale, STEERING.1 / steering_scale),
+    ]
+}

@@ -1,0 +1,95 @@
+//! What a controller's flash holds when it is delivered: settings, map and key.
+
+use agv_core::landmarks::Landmark;
+use agv_settings::Settings;
+use agv_settings::store::{KEY, PIECE, Store, StoreError};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+};
+
+/// Bytes of a page of the STM32H743's flash.
+const PAGE: usize = 128 * 1024;
+/// Bytes of its words.
+const WORD: usize = 32;
+
+/// Why there is no image.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum ProvisionError {
+    /// There is no room.
+    #[error("the map and the settings do not fit the flash")]
+    Full,
+    /// The map is too large.
+    #[error("the map has {count} landmarks; {most} can be kept", most = agv_settings::store::LANDMARKS)]
+    Map {
+        /// Landmarks of the map.
+        count: usize,
+    },
+}
+
+impl From<StoreError> for ProvisionError {
+    fn from(_: StoreError) -> Self {
+        Self::Full
+    }
+}
+
+/// Two pages of flash.
+struct Image(Vec<u8>);
+
+impl ErrorType for Image {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Image {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        check_read(self, offset, bytes.len())?;
+        bytes.copy_from_slice(&self.0[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.len()
+    }
+}
+
+impl NorFlash for Image {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = PAGE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        self.0[from as usize..to as usize].fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        self.0[offset as usize..][..bytes.len()].copy_from_slice(bytes);
+        Ok(())
+    }
+}
+
+/// The bytes of the settings' flash.
+///
+/// # Errors
+/// If they are too many.
+pub fn flash_image(
+    settings: &Settings,
+    landmarks: &[Landmark],
+    key: Option<&[u8; KEY]>,
+) -> Result<Vec<u8>, ProvisionError> {
+    let too_many = || ProvisionError::Map { count: landmarks.len() };
+    let mut store = Store::new(Image(vec![0xFF; 2 * PAGE])).ok_or(ProvisionError::Full)?;
+    if let Some(key) = key {
+        store.provision_key(key)?;
+    }
+    store.store_leaves(settings)?;
+    let count = u16::try_from(landmarks.len()).map_err(|_| too_many())?;
+    let mut writer = store.begin_map(count).map_err(|_| too_many())?;
+    for piece in landmarks.chunks(PIECE) {
+        store.write_piece(&mut writer, piece)?;
+    }
+    store.finish_map(&writer)?;
+    Ok(store.into_flash().0)
+}

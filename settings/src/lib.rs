@@ -1,0 +1,15 @@
+//! What a vehicle is told on commissioning.
+//!
+//! [`Settings`] is a tree of named leaves ([`leaf`]), kept in flash one item a leaf ([`store`]) and spoken of over the
+//! service port ([`service`]). The firmware and the commands of a desktop share this crate.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod leaf;
+mod leaves;
+pub mod service;
+mod settings;
+pub mod store;
+
+pub use leaves::LEAVES;
+pub use settings::{Network, Nodes, Settings};

@@ -1,0 +1,195 @@
+//! The controller's side of a connection, without sockets.
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::Landmark;
+use agv_core::localizer::PoseFix;
+use agv_core::measurement::Time;
+use embedded_storage::nor_flash::NorFlash;
+use heapless::Vec;
+
+use super::authentication::{self, Nonce, TAG};
+use super::frame::{LONGEST_MESSAGE, MessageError, encode};
+use super::message::{Change, PROTOCOL, Refusal, Request, Response};
+use crate::leaf::{Leaf, LeafError};
+use crate::store::{KEY, MapWriter, PIECE, Store, StoreError};
+use crate::{LEAVES, Settings};
+
+/// What requests are about. All of it belongs to the controller, not to a connection.
+pub struct Controller<F: NorFlash> {
+    /// Name and version of the software.
+    pub software: &'static str,
+    /// The settings as they will be after the next start, if they are stored.
+    pub settings: Settings,
+    /// Where they are kept. None if the board's flash cannot be used.
+    pub store: Option<Store<F>>,
+    /// The map that the vehicle uses.
+    pub landmarks: &'static [Landmark],
+    /// The key that changes need. None if none was provisioned.
+    pub key: Option<[u8; KEY]>,
+    /// Starts so far.
+    pub starts: u32,
+    /// Nonces so far.
+    pub nonces: u32,
+    /// What the last panic said.
+    pub panic: &'static str,
+    /// A map that is being written.
+    pub map: Option<MapWriter>,
+}
+
+/// What is left to do when a request was answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Action {
+    /// Nothing.
+    None,
+    /// The vehicle is where it was said to be.
+    SetPose(PoseFix),
+    /// Forget the last panic.
+    ForgetPanic,
+    /// Start again, after the response was sent.
+    Reboot,
+}
+
+/// One connection.
+pub struct Session {
+    nonce: Option<Nonce>,
+    changes: u32,
+}
+
+impl Session {
+    /// A connection on which nothing was said.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { nonce: None, changes: 0 }
+    }
+
+    /// Answers a message: puts the response into `room`, gives its length and what is left to do.
+    ///
+    /// `time` is now. A vehicle that does not stand is not changed.
+    ///
+    /// # Errors
+    /// If the message means nothing. The connection is of no more use.
+    pub fn answer<F: NorFlash>(
+        &mut self,
+        message: &[u8],
+        controller: &mut Controller<F>,
+        is_standing: bool,
+        time: Time,
+        room: &mut [u8; LONGEST_MESSAGE],
+    ) -> Result<(usize, Action), MessageError> {
+        let (request, tag) = postcard::take_from_bytes::<Request>(message).map_err(|_| MessageError)?;
+        let is_change = matches!(request, Request::Change(_));
+        if tag.len() != if is_change { TAG } else { 0 } {
+            return Err(MessageError);
+        }
+        let mut action = Action::None;
+        let response = match request {
+            Request::Version => {
+                Response::Version { software: controller.software, protocol: PROTOCOL, starts: controller.starts, time }
+            }
+            Request::Nonce => self.begin(controller, time),
+            Request::Get(name) => {
+                Leaf::named(name).map_or(Response::Refused(Refusal::Name), |leaf| describe(leaf, &controller.settings))
+            }
+            Request::Leaf(place) => {
+                LEAVES.get(usize::from(place)).map_or(Response::End, |leaf| describe(leaf, &controller.settings))
+            }
+            Request::Map(first) => map_piece(controller.landmarks, first),
+            Request::Panic => Response::Panic(controller.panic),
+            Request::Change(change) => {
+                let signed = message.get(..message.len() - TAG).unwrap_or_default();
+                let outcome = self.permit(controller, signed, tag, is_standing);
+                match outcome.and_then(|()| perform(change, controller, time)) {
+                    Ok(left) => {
+                        action = left;
+                        Response::Done
+                    }
+                    Err(refusal) => Response::Refused(refusal),
+                }
+            }
+        };
+        Ok((encode(&response, |_| None, room)?, action))
+    }
+
+    fn begin<F: NorFlash>(&mut self, controller: &mut Controller<F>, time: Time) -> Response<'static> {
+        let Some(key) = &controller.key else { return Response::Refused(Refusal::NoKey) };
+        controller.nonces = controller.nonces.wrapping_add(1);
+        let nonce = authentication::nonce(key, controller.starts, controller.nonces, time.micros());
+        self.nonce = Some(nonce);
+        self.changes = 0;
+        Response::Nonce(nonce)
+    }
+
+    /// Whether a change may be made. A change with the right tag takes its number, whatever becomes of it.
+    fn permit<F: NorFlash>(
+        &mut self,
+        controller: &Controller<F>,
+        request: &[u8],
+        tag: &[u8],
+        is_standing: bool,
+    ) -> Result<(), Refusal> {
+        let key = controller.key.as_ref().ok_or(Refusal::NoKey)?;
+        let nonce = self.nonce.as_ref().ok_or(Refusal::Tag)?;
+        if !authentication::is_right(key, nonce, self.changes, request, tag) {
+            return Err(Refusal::Tag);
+        }
+        self.changes = self.changes.wrapping_add(1);
+        if is_standing { Ok(()) } else { Err(Refusal::Moving) }
+    }
+}
+
+impl Default for Session {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn describe(leaf: &Leaf, settings: &Settings) -> Response<'static> {
+    match leaf.get(settings) {
+        Some(value) => Response::Leaf { name: leaf.name, unit: leaf.unit, value },
+        None => Response::NoLeaf,
+    }
+}
+
+fn map_piece(landmarks: &[Landmark], first: u16) -> Response<'static> {
+    let rest = landmarks.get(usize::from(first)..).unwrap_or_default();
+    let piece = rest.get(..rest.len().min(PIECE)).unwrap_or_default();
+    Response::Map { count: landmarks.len() as u16, piece: Vec::from_slice(piece).unwrap_or_default() }
+}
+
+fn perform<F: NorFlash>(change: Change, controller: &mut Controller<F>, time: Time) -> Result<Action, Refusal> {
+    let Controller { settings, store, map, .. } = controller;
+    let store = store.as_mut().ok_or(Refusal::Store(StoreError::Flash));
+    match change {
+        Change::Set(name, value) => {
+            let leaf = Leaf::named(name).ok_or(Refusal::Name)?;
+            leaf.set(settings, value).map_err(|error| match error {
+                LeafError::Kind => Refusal::Kind,
+                LeafError::Bounds => Refusal::Bounds,
+            })?;
+        }
+        Change::Store => store?.store_leaves(settings).map_err(Refusal::Store)?,
+        Change::BeginMap(count) => *map = Some(store?.begin_map(count).map_err(Refusal::Store)?),
+        Change::MapPiece(piece) => {
+            let writer = map.as_mut().ok_or(Refusal::Store(StoreError::Map))?;
+            store?.write_piece(writer, &piece).map_err(Refusal::Store)?;
+        }
+        Change::FinishMap => {
+            let writer = map.take().ok_or(Refusal::Store(StoreError::Map))?;
+            store?.finish_map(&writer).map_err(Refusal::Store)?;
+        }
+        Change::SetPose { pose: [x, y, theta], deviations: [position_deviation, heading_deviation] } => {
+            let pose = Pose { x, y, theta };
+            let is_sensible = |deviation: f64| deviation.is_finite() && deviation > 0.0;
+            if !(pose.is_finite() && is_sensible(position_deviation) && is_sensible(heading_deviation)) {
+                return Err(Refusal::Pose);
+            }
+            return Ok(Action::SetPose(PoseFix { time, pose, position_deviation, heading_deviation }));
+        }
+        Change::ForgetPanic => {
+            controller.panic = "";
+            return Ok(Action::ForgetPanic);
+        }
+        Change::Reboot => return Ok(Action::Reboot),
+    }
+    Ok(Action::None)
+}

@@ -1,0 +1,86 @@
+//! Everything that is set on commissioning, but for the map.
+
+use agv_core::geometry::Pose;
+use agv_core::localizer::Parameters;
+use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+
+/// Everything that is set on commissioning, but for the map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// What the localiser believes of its vehicle and its sensors.
+    pub parameters: Parameters,
+    /// Who is who on the CAN bus.
+    pub nodes: Nodes,
+    /// Time between positions of the encoders, ms.
+    pub encoder_period: u16,
+    /// Who is who on the network.
+    pub network: Network,
+}
+
+/// Numbers of the nodes on the CAN bus, 1 to 127.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Nodes {
+    /// This controller.
+    pub controller: u8,
+    /// The driving wheel's encoder.
+    pub drive: u8,
+    /// The steering's encoder.
+    pub steering: u8,
+}
+
+/// Addresses on the network, IPv4.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Network {
+    /// This controller.
+    pub address: [u8; 4],
+    /// Length of the network's prefix, bits.
+    pub prefix: u8,
+    /// The way to other networks.
+    pub gateway: [u8; 4],
+    /// The NAV350.
+    pub laser: [u8; 4],
+    /// Its port.
+    pub laser_port: u16,
+    /// Port of the log stream.
+    pub log_port: u16,
+    /// Port of the service.
+    pub service_port: u16,
+}
+
+impl Default for Settings {
+    /// The vehicle of the standard simulated world, and the NAV350's factory address. A vehicle that was not set up has
+    /// no map either, so it never claims to know where it is.
+    fn default() -> Self {
+        let vehicle = Tricycle {
+            wheelbase: 1.5,
+            drive_scale: 1e-4,
+            drive_range: CounterRange::BITS_32,
+            steering_scale: core::f64::consts::TAU / 65_536.0,
+            steering_range: CounterRange::BITS_16,
+            steering_offset_forward: 0.0,
+            steering_offset_backward: 0.0,
+        };
+        Self::of(Parameters::new(Vehicle::Tricycle(vehicle), Pose::new(0.9, 0.0, 0.0)))
+    }
+}
+
+impl Settings {
+    /// The default settings, but for the localiser's parameters.
+    #[must_use]
+    pub fn of(parameters: Parameters) -> Self {
+        Self {
+            parameters,
+            nodes: Nodes { controller: 16, drive: 1, steering: 2 },
+            encoder_period: 10,
+            network: Network {
+                address: [192, 168, 1, 20],
+                prefix: 24,
+                gateway: [192, 168, 1, 1],
+                laser: [192, 168, 1, 10],
+                laser_port: 2112,
+                log_port: 5350,
+                service_port: 5351,
+            },
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! Settings, map and key in flash, through `sequential-storage`.
+//!
+//! One item a leaf, so that a bad one costs one setting. A new map is written beside the old one and counts from the
+//! moment its index is written, so that a loss of power leaves the old map or the new one. Flash whose words can be
+//! written once only will do.
+
+use agv_core::landmarks::Landmark;
+use agv_core::record::LANDMARKS_A_RECORD;
+use embassy_futures::block_on;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use heapless::Vec;
+use sequential_storage::Error;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::map::{MapConfig, MapStorage};
+use serde::{Deserialize, Serialize};
+
+use crate::leaf::{Leaf, Value};
+use crate::{LEAVES, Settings};
+
+/// Most landmarks of a stored map.
+pub const LANDMARKS: usize = 1500;
+/// Landmarks of an item.
+pub const PIECE: usize = LANDMARKS_A_RECORD;
+/// Bytes of a key.
+pub const KEY: usize = 32;
+
+/// Items that are no leaf. Those of leaves are from 100 to 999.
+const KEY_ITEM: u16 = 1;
+const STARTS_ITEM: u16 = 2;
+const MAP_ITEM: u16 = 3;
+/// First pieces of both generations of the map.
+const PIECES: [u16; 2] = [2000, 3000];
+
+/// Longest item with its key, rounded up to the words of any flash.
+const BUFFER: usize = 1280;
+
+/// What does not fit, is not there or cannot be kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum StoreError {
+    /// The flash refuses.
+    Flash,
+    /// There is no room.
+    Full,
+    /// The map has more landmarks than can be kept, or its pieces do not follow each other.
+    Map,
+}
+
+/// What the flash held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Loaded {
+    /// Settings that were taken.
+    pub leaves: u16,
+    /// Items that mean nothing or are out of bounds; their settings are the default ones.
+    pub bad: u16,
+    /// Whether what was there is no storage at all. It was erased.
+    pub was_formatted: bool,
+    /// Whether there is a map that is not whole. None was loaded.
+    pub is_map_damaged: bool,
+}
+
+/// Index of the map: what makes its pieces a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct MapIndex {
+    generation: u8,
+    count: u16,
+    checksum: u32,
+}
+
+/// A map that is being written.
+#[derive(Clone, Debug)]
+pub struct MapWriter {
+    generation: u8,
+    count: u16,
+    written: u16,
+    digest: u32,
+}
+
+const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// The checksum of bytes and a piece more, from that of the bytes.
+fn checksum(before: u32, piece: &[u8]) -> u32 {
+    let mut digest = CHECKSUM.digest_with_initial((!before).reverse_bits());
+    digest.update(piece);
+    digest.finalize()
+}
+
+/// Flash whose work is done when it returns, as the storage wants it.
+struct Immediate<F>(F);
+
+impl<F: ErrorType> embedded_storage_async::nor_flash::ErrorType for Immediate<F> {
+    type Error = F::Error;
+}
+
+impl<F: ReadNorFlash> embedded_storage_async::nor_flash::ReadNorFlash for Immediate<F> {
+    const READ_SIZE: usize = F::READ_SIZE;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.0.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+impl<F: NorFlash> embedded_storage_async::nor_flash::NorFlash for Immediate<F> {
+    const WRITE_SIZE: usize = F::WRITE_SIZE;
+    const ERASE_SIZE: usize = F::ERASE_SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        self.0.erase(from, to)
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.0.write(offset, bytes)
+    }
+}
+
+type NoCache = Cache<Uncached, Uncached, Uncached, u16>;
+
+/// The storage in a flash of two or more pages, all of it.
+pub struct Store<F: NorFlash> {
+    storage: MapStorage<u16, Immediate<F>, NoCache>,
+    buffer: [u8; BUFFER],
+}
+
+impl<F: NorFlash> Store<F> {
+    /// The storage in `flash`. None if it has fewer than two pages, or words of more than 32 bytes.
+    #[must_use]
+    pub fn new(flash: F) -> Option<Self> {
+        let end = u32::try_from(flash.capacity()).ok()?;
+        let config = MapConfig::try_new(0..end).ok()?;
+        let storage = MapStorage::new(Immediate(flash), config, Cache::new_uncached());
+        Some(Self { storage, buffer: [0; BUFFER] })
+    }
+
+    /// Reads everything: settings into `settings`, the map to `landmarks`, which is empty if there is none.
+    ///
+    /// What cannot be read is left at what it was before, and counted. Rubbish that is no storage is erased.
+    ///
+    /// # Errors
+    /// If the flash cannot be read or erased.
+    pub fn load(
+        &mut self,
+        settings: &mut Settings,
+        landmarks: &mut Vec<Landmark, LANDMARKS>,
+    ) -> Result<Loaded, StoreError> {
+        let mut loaded = Loaded::default();
+        for leaf in &LEAVES {
+            match self.fetch(leaf.key) {
+                Ok(None) => {}
+                Ok(Some(bytes)) => {
+                    let value = postcard::from_bytes::<Value>(bytes).ok();
+                    match value.map(|value| leaf.set(settings, value)) {
+                        Some(Ok(())) => loaded.leaves += 1,
+                        _ => loaded.bad += 1,
+                    }
+                }
+                Err(FetchError::Rubbish) => {
+                    self.format()?;
+                    loaded.was_formatted = true;
+                    break;
+                }
+                Err(FetchError::Item) => loaded.bad += 1,
+                Err(FetchError::Flash) => return Err(StoreError::Flash),
+            }
+        }
+        // Rubbish may look like a storage in which nothing was stored, until it is written to.
+        let has_items = [KEY_ITEM, STARTS_ITEM, MAP_ITEM].iter().any(|item| matches!(self.fetch(*item), Ok(Some(_))));
+        if loaded.leaves == 0 && !has_items && !self.is_erased()? {
+            self.format()?;
+            loaded.was_formatted = true;
+        }
+        landmarks.clear();
+        if let Some(index) = self.map_index()
+            && self.load_map(index, landmarks).is_none()
+        {
+            landmarks.clear();
+            loaded.is_map_damaged = true;
+        }
+        Ok(loaded)
+    }
+
+    fn load_map(&mut self, index: MapIndex, landmarks: &mut Vec<Landmark, LANDMARKS>) -> Option<()> {
+        let first = *PIECES.get(usize::from(index.generation))?;
+        let mut digest = 0;
+        for number in 0..index.count.div_ceil(PIECE as u16) {
+            let bytes = self.fetch(first + number).ok()??;
+            digest = checksum(digest, bytes);
+            let piece: Vec<Landmark, PIECE> = postcard::from_bytes(bytes).ok()?;
+            landmarks.extend_from_slice(&piece).ok()?;
+        }
+        (landmarks.len() == usize::from(index.count) && digest == index.checksum).then_some(())
+    }
+
+    fn map_index(&mut self) -> Option<MapIndex> {
+        let bytes = self.fetch(MAP_ITEM).ok()??;
+        postcard::from_bytes(bytes).ok()
+    }
+
+    /// Keeps a leaf, unless the flash has it already.
+    ///
+    /// # Errors
+    /// If the flash refuses or is full.
+    pub fn store_leaf(&mut self, leaf: &Leaf, settings: &Settings) -> Result<(), StoreError> {
+        let Some(value) = leaf.get(settings) else { return Ok(()) };
+        let mut room = [0; 16];
+        let bytes = postcard::to_slice(&value, &mut room).map_err(|_| StoreError::Full)?;
+        if matches!(self.fetch(leaf.key), Ok(Some(kept)) if kept == bytes) {
+            return Ok(());
+        }
+        self.put(leaf.key, bytes)
+    }
+
+    /// Keeps all leaves.
+    ///
+    /// # Errors
+    /// If the flash refuses or is full.
+    pub fn store_leaves(&mut self, settings: &Settings) -> Result<(), StoreError> {
+        LEAVES.iter().try_for_each(|leaf| self.store_leaf(leaf, settings))
+    }
+
+    /// Begins to write a map of `count` landmarks beside the one that is kept.
+    ///
+    /// # Errors
+    /// If that is more than can be kept.
+    pub fn begin_map(&mut self, count: u16) -> Result<MapWriter, StoreError> {
+        if usize::from(count) > LANDMARKS {
+            return Err(StoreError::Map);
+        }
+        let generation = self.map_index().map_or(0, |index| 1 - index.generation.min(1));
+        Ok(MapWriter { generation, count, written: 0, digest: 0 })
+    }
+
+    /// Writes the next piece: [`PIECE`] landmarks, or the last ones.
+    ///
+    /// # Errors
+    /// If it is no such piece, or the flash refuses or is full.
+    pub fn write_piece(&mut self, writer: &mut MapWriter, piece: &[Landmark]) -> Result<(), StoreError> {
+        let rest = usize::from(writer.count - writer.written);
+        if piece.len() != rest.min(PIECE) || piece.is_empty() {
+            return Err(StoreError::Map);
+        }
+        let piece = Vec::<Landmark, PIECE>::from_slice(piece).map_err(|_| StoreError::Map)?;
+        let mut room = [0; BUFFER];
+        let bytes = postcard::to_slice(&piece, &mut room).map_err(|_| StoreError::Full)?;
+        let first = PIECES.get(usize::from(writer.generation)).copied().ok_or(StoreError::Map)?;
+        self.put(first + writer.written / PIECE as u16, bytes)?;
+        writer.digest = checksum(writer.digest, bytes);
+        writer.written += piece.len() as u16;
+        Ok(())
+    }
+
+    /// Makes the written map the one that is kept.
+    ///
+    /// # Errors
+    /// If it is not whole, or the flash refuses or is full.
+    pub fn finish_map(&mut self, writer: &MapWriter) -> Result<(), StoreError> {
+        if writer.written != writer.count {
+            return Err(StoreError::Map);
+        }
+        let before = self.map_index();
+        let index = MapIndex { generation: writer.generation, count: writer.count, checksum: writer.digest };
+        let mut room = [0; 16];
+        let bytes = postcard::to_slice(&index, &mut room).map_err(|_| StoreError::Full)?;
+        self.put(MAP_ITEM, bytes)?;
+        let Some(before) = before else { return Ok(()) };
+        let first = PIECES.get(usize::from(before.generation)).copied().ok_or(StoreError::Map)?;
+        // The old pieces shrink to nothing, as not every flash can take them away.
+        (0..before.count.div_ceil(PIECE as u16)).try_for_each(|number| self.put(first + number, &[]))
+    }
+
+    /// The key that writers of settings must know. None if none was provisioned.
+    pub fn key(&mut self) -> Option<[u8; KEY]> {
+        self.fetch(KEY_ITEM).ok()??.try_into().ok()
+    }
+
+    /// Provisions the key.
+    ///
+    /// # Errors
+    /// If the flash refuses or is full.
+    pub fn provision_key(&mut self, key: &[u8; KEY]) -> Result<(), StoreError> {
+        self.put(KEY_ITEM, key)
+    }
+
+    /// Counts this start, and says how many there were: a number that never comes again.
+    ///
+    /// # Errors
+    /// If the flash refuses or is full.
+    pub fn count_start(&mut self) -> Result<u32, StoreError> {
+        let before = self.fetch(STARTS_ITEM).ok().flatten().and_then(|bytes| bytes.try_into().ok());
+        let starts = before.map_or(0, u32::from_le_bytes).wrapping_add(1);
+        self.put(STARTS_ITEM, &starts.to_le_bytes())?;
+        Ok(starts)
+    }
+
+    /// Erases everything.
+    ///
+    /// # Errors
+    /// If the flash refuses.
+    pub fn format(&mut self) -> Result<(), StoreError> {
+        block_on(self.storage.erase_all()).map_err(|_| StoreError::Flash)
+    }
+
+    /// The flash.
+    #[must_use]
+    pub fn into_flash(self) -> F {
+        self.storage.destroy().0.0
+    }
+
+    fn is_erased(&mut self) -> Result<bool, StoreError> {
+        let flash = &mut self.storage.flash().0;
+        let end = flash.capacity() as u32;
+        let mut offset = 0;
+        while offset < end {
+            let bytes = self.buffer.get_mut(..256).unwrap_or_default();
+            flash.read(offset, bytes).map_err(|_| StoreError::Flash)?;
+            if bytes.iter().any(|byte| *byte != 0xFF) {
+                return Ok(false);
+            }
+            offset += 256;
+        }
+        Ok(true)
+    }
+
+    fn fetch(&mut self, key: u16) -> Result<Option<&[u8]>, FetchError> {
+        block_on(self.storage.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(|error| match error {
+            Error::Storage { .. } => FetchError::Flash,
+            Error::Corrupted { .. } => FetchError::Rubbish,
+            _ => FetchError::Item,
+        })
+    }
+
+    fn put(&mut self, key: u16, bytes: &[u8]) -> Result<(), StoreError> {
+        block_on(self.storage.store_item(&mut self.buffer, &key, &bytes)).map_err(|error| match error {
+            Error::FullStorage | Error::ItemTooBig => StoreError::Full,
+            _ => StoreError::Flash,
+        })
+    }
+}
+
+enum FetchError {
+    Flash,
+    Rubbish,
+    Item,
+}

@@ -1,0 +1,192 @@
+//! What is stored survives.
+
+mod support;
+
+use agv_settings::leaf::Leaf;
+use agv_settings::store::{LANDMARKS, Store};
+use agv_settings::{LEAVES, Settings};
+use proptest::prelude::*;
+use support::{Flash, WORD, changed, load, map, write_map};
+
+/// The size of the STM32H743's pages.
+const LARGE: usize = 128 * 1024;
+/// Pages that are full now and then.
+const SMALL: usize = 12 * 1024;
+
+#[test]
+fn keys_and_names_are_unique_and_defaults_within_bounds() {
+    let mut settings = Settings::default();
+    for (place, leaf) in LEAVES.iter().enumerate() {
+        assert!((100..1000).contains(&leaf.key), "{}", leaf.name);
+        for other in &LEAVES[..place] {
+            assert!(other.key != leaf.key && other.name != leaf.name, "{}", leaf.name);
+        }
+        let value = leaf.get(&settings).unwrap();
+        let before = settings.clone();
+        leaf.set(&mut settings, value).unwrap();
+        assert_eq!(settings, before, "{}", leaf.name);
+        assert_eq!(Leaf::keyed(leaf.key).unwrap().name, leaf.name);
+        assert_eq!(Leaf::named(leaf.name).unwrap().key, leaf.key);
+    }
+    // Each leaf is a place of its own.
+    for leaf in &LEAVES {
+        let mut one = Settings::default();
+        leaf.set(&mut one, leaf.get(&changed(0.71)).unwrap()).unwrap();
+        let different = LEAVES.iter().filter(|other| other.get(&one) != other.get(&Settings::default()));
+        assert_eq!(different.map(|leaf| leaf.name).collect::<Vec<_>>(), [leaf.name]);
+    }
+}
+
+#[test]
+fn what_is_stored_is_read() {
+    let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
+    assert_eq!(load(&mut store).0, Settings::default());
+    let (settings, landmarks) = (changed(0.3), map(LANDMARKS as u16, 0.0));
+    store.store_leaves(&settings).unwrap();
+    write_map(&mut store, &landmarks).unwrap();
+    store.provision_key(&[7; 32]).unwrap();
+    assert_eq!([store.count_start(), store.count_start()], [Ok(1), Ok(2)]);
+    let mut store = Store::new(Flash::<LARGE>::clone(&store.into_flash())).unwrap();
+    let (found, found_map, loaded) = load(&mut store);
+    assert_eq!((found, found_map), (settings, landmarks));
+    assert_eq!((usize::from(loaded.leaves), loaded.bad, loaded.was_formatted), (LEAVES.len(), 0, false));
+    assert_eq!(store.key(), Some([7; 32]));
+    assert_eq!(store.count_start(), Ok(3));
+    assert!(store.begin_map(LANDMARKS as u16 + 1).is_err());
+}
+
+#[test]
+fn the_largest_map_can_be_replaced_for_ever() {
+    let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
+    for turn in 0..6 {
+        store.store_leaves(&changed(0.1 * f64::from(turn))).unwrap();
+        let landmarks = map(LANDMARKS as u16 - turn, f64::from(turn));
+        write_map(&mut store, &landmarks).unwrap();
+        assert_eq!(load(&mut store).1, landmarks);
+    }
+}
+
+#[test]
+fn the_same_settings_wear_nothing_out() {
+    let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
+    store.store_leaves(&changed(0.3)).unwrap();
+    let flash = store.into_flash();
+    let work = flash.work;
+    let mut store = Store::new(flash).unwrap();
+    store.store_leaves(&changed(0.3)).unwrap();
+    assert_eq!(store.into_flash().work, work);
+}
+
+#[test]
+fn a_loss_of_power_at_any_point_leaves_each_setting_old_or_new() {
+    let (old, new) = (changed(0.3), changed(0.6));
+    let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
+    store.provision_key(&[9; 32]).unwrap();
+    store.store_leaves(&Settings::default()).unwrap();
+    store.store_leaves(&old).unwrap();
+    let flash = store.into_flash();
+    let mut has_finished = false;
+    let mut met = [0; 2];
+    for power in 1.. {
+        let mut cut = flash.clone();
+        cut.power = Some(power);
+        let mut store = Store::new(cut).unwrap();
+        has_finished = store.store_leaves(&new).is_ok();
+        let mut flash = store.into_flash();
+        flash.power = None;
+        let mut store = Store::new(flash).unwrap();
+        let (found, _, loaded) = load(&mut store);
+        assert_eq!((usize::from(loaded.leaves), loaded.bad, loaded.was_formatted), (LEAVES.len(), 0, false), "{power}");
+        assert_eq!(store.key(), Some([9; 32]), "{power}");
+        for leaf in &LEAVES {
+            let value = leaf.get(&found);
+            let is_new = value == leaf.get(&new);
+            assert!(is_new || value == leaf.get(&old), "{power}: {}", leaf.name);
+            met[usize::from(is_new)] += 1;
+        }
+        // It can be done again.
+        store.store_leaves(&new).unwrap();
+        assert_eq!(load(&mut store).0, new, "{power}");
+        if has_finished {
+            break;
+        }
+    }
+    assert!(has_finished && met[0] > 100 && met[1] > 100, "{met:?}");
+}
+
+#[test]
+fn a_loss_of_power_leaves_the_old_map_or_the_new_one() {
+    const PAGE: usize = 24 * 1024;
+    let (old, new) = (map(180, 0.0), map(170, 0.5));
+    let mut store = Store::new(Flash::<PAGE>::new()).unwrap();
+    store.store_leaves(&changed(0.3)).unwrap();
+    write_map(&mut store, &old).unwrap();
+    let flash = store.into_flash();
+    let mut kept = [0; 2];
+    for power in 1.. {
+        let mut cut = flash.clone();
+        cut.power = Some(power);
+        let mut store = Store::new(cut).unwrap();
+        let has_finished = write_map(&mut store, &new).is_ok();
+        let mut flash = store.into_flash();
+        flash.power = None;
+        let mut store = Store::new(flash).unwrap();
+        let (settings, found, loaded) = load(&mut store);
+        assert_eq!(settings, changed(0.3), "{power}");
+        assert!(!loaded.is_map_damaged && loaded.bad == 0, "{power}: {loaded:?}");
+        assert!(found == old || found == new, "{power}: {}", found.len());
+        kept[usize::from(found == new)] += 1;
+        write_map(&mut store, &new).unwrap();
+        assert_eq!(load(&mut store).1, new, "{power}");
+        if has_finished {
+            break;
+        }
+    }
+    assert!(kept[0] > 10 && kept[1] > 0, "{kept:?}");
+}
+
+#[test]
+fn a_bad_item_costs_one_setting() {
+    let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
+    let settings = changed(0.4);
+    store.store_leaves(&settings).unwrap();
+    let flash = store.into_flash();
+    let mut worst = 0;
+    for word in 0..2 * SMALL / WORD {
+        let mut flash = flash.clone();
+        if flash.bytes[word * WORD..][..WORD].iter().all(|byte| *byte == 0xFF) {
+            continue;
+        }
+        flash.bytes[word * WORD + 9] ^= 0x10;
+        let mut store = Store::new(flash).unwrap();
+        let (found, _, loaded) = load(&mut store);
+        let lost = LEAVES.iter().filter(|leaf| leaf.get(&found) != leaf.get(&settings));
+        if !loaded.was_formatted {
+            worst = worst.max(lost.count());
+        }
+        store.store_leaves(&settings).unwrap();
+        assert_eq!(load(&mut store).0, settings);
+    }
+    assert!(worst <= 1, "{worst}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn rubbish_is_survived_and_replaced(seed in any::<u64>(), share in 0.0f64..1.0) {
+        let mut state = seed | 1;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as u8
+        };
+        let end = (share * 2.0 * SMALL as f64) as usize;
+        let bytes = (0..2 * SMALL).map(|place| if place < end { random() } else { 0xFF }).collect();
+        let mut store = Store::new(Flash::<SMALL>::filled(bytes)).unwrap();
+        let (found, landmarks, loaded) = load(&mut store);
+        prop_assert_eq!((found, landmarks.len()), (Settings::default(), 0));
+        prop_assert_eq!(loaded.was_formatted, end > 0);
+        let settings = changed(0.4);
+        store.store_leaves(&settings).unwrap();
+        prop_assert_eq!(load(&mut store).0, settings);
+    }
+}
