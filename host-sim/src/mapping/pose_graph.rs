@@ -2,13 +2,20 @@
 
 use agv_core::geometry::Pose;
 use factrs::core::{BetweenResidual, GemanMcClure, Graph, LevenMarquardt, PriorResidual, SE2, Values};
+use factrs::fac;
 use factrs::noise::GaussianNoise;
 use factrs::optimizers::OptError;
 use factrs::traits::Optimizer;
-use factrs::{assign_symbols, fac};
 use nalgebra::Matrix3;
 
-assign_symbols!(X: SE2);
+mod symbol {
+    #![allow(missing_docs, reason = "the macro documents nothing")]
+    use factrs::assign_symbols;
+    use factrs::core::SE2;
+
+    assign_symbols!(X: SE2);
+}
+use symbol::X;
 
 /// What is known of two poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +100,8 @@ fn settle(poses: &[Pose], edges: &[Edge], doubt: f64) -> Result<Vec<Pose>, PoseG
     let found = match optimizer.optimize(values) {
         // What has been reached is no worse than the start.
         Ok(found) | Err(OptError::MaxIterations(found)) => found,
+        // Nothing is better than the start.
+        Err(OptError::FailedToStep) => return Ok(poses.to_vec()),
         Err(problem) => return Err(PoseGraphError::Unsolvable(format!("{problem:?}"))),
     };
     let pose = |number: usize| {
