@@ -20,8 +20,13 @@ pub const PLACES: usize = 8192;
 /// Most candidates of a question.
 pub const CANDIDATES: usize = 64;
 
-/// Answers with at least this confidence are believed; chosen on fr079 and intel, the same for all halls.
+/// Answers with at least this confidence are accepted where the scan before is stored too, as in the protocol of the thesis;
+/// chosen on fr079 and intel, the same for all halls.
 pub const LEAST_CONFIDENCE: f64 = 0.5;
+
+/// Answers with at least this confidence are believed where the vehicle may be anywhere, and nowhere near a stored place;
+/// chosen on fr079, the same for all halls.
+pub const SURE_CONFIDENCE: f32 = 0.75;
 
 /// First words of a file of places.
 const FORMAT: &str = "agv places 1";
@@ -192,7 +197,7 @@ pub struct FindParameters {
 
 impl Default for FindParameters {
     fn default() -> Self {
-        Self { candidates: 10, least_confidence: LEAST_CONFIDENCE as f32, fewest_points: 5 }
+        Self { candidates: 10, least_confidence: SURE_CONFIDENCE, fewest_points: 5 }
     }
 }
 

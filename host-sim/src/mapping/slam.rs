@@ -11,7 +11,7 @@ use agv_core::places::{
 use nalgebra::Matrix3;
 
 use super::pose_graph::{Edge, PoseGraphError, optimise};
-use crate::places::{Observation, Observer};
+use crate::places::{Observation, Observer, SURE_CONFIDENCE};
 use crate::recording::RecordedScan;
 
 /// How a map is made.
@@ -42,7 +42,7 @@ impl SlamParameters {
             key_turn: 0.25,
             loop_scans: 50,
             loop_seconds: 10.0,
-            least_confidence: 0.75,
+            least_confidence: SURE_CONFIDENCE,
             least_points: 5,
             largest_disagreement: (0.3, 0.06),
         }
