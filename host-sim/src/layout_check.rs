@@ -193,7 +193,7 @@ fn resemblances(looked: &[CheckedPlace]) -> Vec<Resemblance> {
             places,
         })
         .collect();
-    found.sort_by(|a, b| b.places.cmp(&a.places));
+    found.sort_by_key(|resemblance| std::cmp::Reverse(resemblance.places));
     found
 }
 

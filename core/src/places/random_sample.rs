@@ -87,6 +87,6 @@ impl RandomSample {
         // A linear congruential generator; its upper bits are the random ones.
         self.state = self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let count = self.offered.len() as u64;
-        self.offered.get(((self.state >> 33) * count >> 31) as usize).copied()
+        self.offered.get((((self.state >> 33) * count) >> 31) as usize).copied()
     }
 }

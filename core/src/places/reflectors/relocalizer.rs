@@ -34,6 +34,7 @@ impl Default for RelocalizationParameters {
 }
 
 /// Whether a search has ended.
+#[expect(clippy::large_enum_variant, reason = "there is no heap, and one such value at a time")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RelocalizationProgress {
     /// There is more to look at.

@@ -7,6 +7,7 @@ use crate::command::progress;
 
 const HELP: &str = "\
 An answer is right within 0.1 m and 1 degree. A revolution misses reflectors independently of the one before.
+From a blind start fewer than four reflectors can be seen at all; it counts as not right.
 
 Examples:
   agv evaluate kidnapping --json
@@ -57,16 +58,17 @@ impl Kidnapping {
             return Ok(());
         }
         println!(
-            "case                   starts  right within 1, 2, 3 revolutions  wrong  ambiguous  seen  hypotheses, most"
+            "case                   starts  right within 1, 2, 3 revolutions  wrong  ambiguous  blind  seen  hypotheses, most"
         );
         for outcome in outcomes {
             let [one, two, three] = outcome.right.map(|share| 100.0 * share);
             println!(
-                "{:<22} {:>6} {one:>11.2} {two:>9.2} {three:>9.2} %  {:>5} {:>8.2} %  {:>4.1} {:>10.0} {:>7}",
+                "{:<22} {:>6} {one:>11.2} {two:>9.2} {three:>9.2} %  {:>5} {:>8.2} % {:>6}  {:>4.1} {:>10.0} {:>7}",
                 outcome.case,
                 outcome.starts,
                 outcome.wrong,
                 100.0 * outcome.ambiguous,
+                outcome.blind,
                 outcome.seen,
                 outcome.hypotheses.0,
                 outcome.hypotheses.1

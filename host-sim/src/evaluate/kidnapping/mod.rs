@@ -68,6 +68,8 @@ pub struct Outcome {
     pub wrong: usize,
     /// Share of the starts whose first revolution fits two poses.
     pub ambiguous: f64,
+    /// Starts from which fewer than four landmarks can be seen at all, where no answer is given.
+    pub blind: usize,
     /// Mean number of reflectors seen in a revolution, false ones included.
     pub seen: f64,
     /// Hypotheses tried in a revolution: mean, and largest.
@@ -99,6 +101,7 @@ struct Start {
     /// Revolution of the first answer, and whether it was right.
     answered: Option<(usize, bool)>,
     is_ambiguous: bool,
+    is_blind: bool,
     seen: usize,
     hypotheses: [u32; REVOLUTIONS],
 }
@@ -140,6 +143,7 @@ fn outcome(case: &'static str, all: Vec<Start>, pairs: usize) -> Outcome {
         right: [1, 2, 3].map(right_within),
         wrong: all.iter().filter(|start| start.answered.is_some_and(|(_, is_right)| !is_right)).count(),
         ambiguous: all.iter().filter(|start| start.is_ambiguous).count() as f64 / count,
+        blind: all.iter().filter(|start| start.is_blind).count(),
         seen: all.iter().map(|start| start.seen as f64).sum::<f64>() / count,
         hypotheses: (
             hypotheses.clone().map(f64::from).sum::<f64>() / hypotheses.clone().count().max(1) as f64,
@@ -190,6 +194,7 @@ fn run_start(
     let mut snapshot = ReflectorSnapshot::<64>::new();
     let mut start = Start::default();
     let visible = visible(hall, caster, truth);
+    start.is_blind = visible.len() < usize::from(RelocalizationParameters::default().fewest);
     for revolution in 0..REVOLUTIONS {
         let seen = observe(case, &visible, truth, random);
         if revolution == 0 {
