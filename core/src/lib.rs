@@ -10,7 +10,7 @@
 //! |---|---|
 //! | 5 | [`record`] |
 //! | 4 | [`localizer`] |
-//! | 3 | [`calibration`], [`features`], [`filter`] |
+//! | 3 | [`calibration`], [`features`], [`filter`], [`places`] |
 //! | 2 | [`odometry`], [`landmarks`], [`wire`] |
 //! | 1 | [`geometry`], [`measurement`], [`state`] |
 //!
@@ -29,6 +29,7 @@ pub mod landmarks;
 pub mod localizer;
 pub mod measurement;
 pub mod odometry;
+pub mod places;
 pub mod record;
 pub mod state;
 pub mod wire;

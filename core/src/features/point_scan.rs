@@ -12,6 +12,8 @@ pub struct PointScan<const BEAMS: usize> {
     pub points: Vec<ScanPoint, BEAMS>,
     /// Measured range of each beam, m; zero where the return is absent.
     pub ranges: Vec<f32, BEAMS>,
+    /// Direction of the first beam in S, rad.
+    pub first_bearing: f32,
     /// Angle between neighbouring beams, rad, positive.
     pub bearing_step: f32,
     /// Whether the last beam and the first one are neighbours.
@@ -22,7 +24,7 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
     /// An empty scan.
     #[must_use]
     pub const fn new() -> Self {
-        Self { points: Vec::new(), ranges: Vec::new(), bearing_step: 0.0, is_full_circle: false }
+        Self { points: Vec::new(), ranges: Vec::new(), first_bearing: 0.0, bearing_step: 0.0, is_full_circle: false }
     }
 
     /// Replaces the content by the points of `scan` in S, as if all beams were simultaneous. Ranges that are not
@@ -30,6 +32,7 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
     pub fn set(&mut self, scan: &Scan, nearest: f32, farthest: f32) {
         self.points.clear();
         self.ranges.clear();
+        self.first_bearing = scan.first_bearing as f32;
         self.bearing_step = libm::fabs(scan.bearing_step) as f32;
         self.is_full_circle = scan.is_full_circle() && scan.ranges.len() <= BEAMS;
         let (step_sine, step_cosine) = libm::sincos(scan.bearing_step);

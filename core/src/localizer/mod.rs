@@ -6,12 +6,15 @@ mod maps;
 mod output;
 mod output_predictor;
 mod parameters;
+mod start_finder;
 
 pub use event::Event;
 pub use machine::Localizer;
 pub use output::{LandmarkSource, LandmarkUse, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
+
+pub use start_finder::{HYPOTHESES, StartFinder, StartState};
 
 pub use crate::measurement::PoseFix;
 pub use crate::state::{Mode, PoseOutput, Reason};

@@ -3,8 +3,30 @@
 mod calibration;
 mod carpark;
 mod falko;
+mod features;
 mod halting_points;
+mod kidnapping;
+mod places;
+mod slam;
 mod warehouse;
+
+pub use places::Places;
+
+/// A log of the thesis.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Set {
+    Fr079,
+    Intel,
+}
+
+impl From<Set> for agv_host_sim::evaluate::falko::Set {
+    fn from(set: Set) -> Self {
+        match set {
+            Set::Fr079 => Self::Fr079,
+            Set::Intel => Self::Intel,
+        }
+    }
+}
 
 /// Measure on recordings and in simulation how good it is.
 #[derive(clap::Args)]
@@ -19,6 +41,10 @@ enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
+    Features(features::Features),
+    Kidnapping(kidnapping::Kidnapping),
+    Places(places::Places),
+    Slam(slam::Slam),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -30,6 +56,10 @@ impl Evaluate {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
+            Experiment::Features(experiment) => experiment.run(),
+            Experiment::Kidnapping(experiment) => experiment.run(),
+            Experiment::Places(experiment) => experiment.run(),
+            Experiment::Slam(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

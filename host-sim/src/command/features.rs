@@ -1,14 +1,13 @@
 //! `agv features`.
 
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use agv_core::features::falko::Parameters;
-use agv_core::record::MAGIC;
 use agv_host_sim::evaluate::falko;
-use agv_host_sim::import::{PosedScan, carmen, graph_log};
-use agv_host_sim::{export, log};
+use agv_host_sim::export;
 use anyhow::Context;
+
+use super::posed_scans;
 
 /// Find keypoints in the scans of a log.
 #[derive(clap::Args)]
@@ -54,8 +53,7 @@ impl Features {
 
 impl Export {
     fn run(self) -> anyhow::Result<()> {
-        let scans = read(&self.log)?;
-        anyhow::ensure!(!scans.is_empty(), "{} has no scans with poses", self.log.display());
+        let scans = posed_scans::read(&self.log)?;
         let mut count = 0;
         let keypoints =
             scans.iter().zip(falko::detect(&scans, self.profile)).inspect(|(_, found)| count += found.len());
@@ -68,18 +66,6 @@ impl Export {
         }
         Ok(())
     }
-}
-
-/// Scans of a log whose format its first bytes tell.
-fn read(path: &Path) -> anyhow::Result<Vec<PosedScan>> {
-    let mut start = [0; 7];
-    let opened = std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-    // A file shorter than the word is no graph.
-    let is_graph = { opened }.read_exact(&mut start).is_ok() && &start == b"VERTEX2";
-    if start.starts_with(&MAGIC) {
-        return Ok(PosedScan::of_recording(&log::read(path)?.0));
-    }
-    Ok(if is_graph { graph_log::read(path)?.log.scans } else { carmen::read(path)?.front.scans })
 }
 
 fn profile(name: &str) -> Result<Parameters, String> {

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_host_sim::log;
 use agv_host_sim::mapping::{
-    Clustering, map_features, map_features_at, map_file, map_reflectors_at, reflector_clustering,
+    Clustering, map_features, map_features_at, map_file, map_reflectors_at, reflector_clustering, slam::SlamParameters,
+    slam_poses,
 };
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
@@ -19,9 +20,10 @@ Examples:
   agv map drive.agvlog --output features.csv
   agv map drive.agvlog --output features.csv --poses truth
   agv map drive.agvlog --output reflectors.csv --kind reflectors
+  agv map drive.agvlog --output features.csv --slam
 
 A map is a text file whose first line is 'id,kind,x_m,y_m,deviation_m', with one landmark a line.
-Keys of --json: reflectors, corners, end_points, largest_deviation_mm.";
+Keys of --json: reflectors, corners, end_points, largest_deviation_mm; with --slam also key_scans, loops.";
 
 /// Build a map from a log with known poses.
 #[derive(clap::Args)]
@@ -38,6 +40,9 @@ pub struct Map {
     /// Where the poses come from; for reflectors the truth if there is any, else the references.
     #[arg(long)]
     poses: Option<Poses>,
+    /// Find the poses too, from odometry, scans and the loops that are recognised; nothing is known of the hall.
+    #[arg(long, conflicts_with = "poses")]
+    slam: bool,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -67,6 +72,10 @@ struct Summary {
     corners: usize,
     end_points: usize,
     largest_deviation_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    key_scans: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loops: Option<usize>,
 }
 
 impl Map {
@@ -77,12 +86,22 @@ impl Map {
         let (recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
             .map(|read| (read.recording, read.damages))?;
         reading.finish_and_clear();
+        let mut slam = None;
         let default = match self.kind {
             Kind::Features => Poses::Localiser,
             Kind::Reflectors if recording.truth.is_empty() => Poses::References,
             Kind::Reflectors => Poses::Truth,
         };
         let poses = match self.poses.unwrap_or(default) {
+            _ if self.slam => {
+                let bar = ProgressBar::new_spinner().with_message("finding the poses");
+                let found = slam_poses(&recording, &SlamParameters::all(), || bar.tick())
+                    .with_context(|| self.log.display().to_string())?;
+                bar.finish_and_clear();
+                ensure!(!found.1.keys.is_empty(), "{}: the log has no scans", self.log.display());
+                slam = Some((found.1.keys.len(), found.1.closures.len()));
+                Some((found.0, "poses"))
+            }
             Poses::Localiser => None,
             Poses::Truth => Some((recording.truth.clone(), "true poses")),
             Poses::References => Some((recording.referenced_poses(), "reference poses with a heading")),
@@ -107,17 +126,23 @@ impl Map {
         for damage in &damages {
             eprintln!("{}: {damage}", self.log.display());
         }
-        let summary = Summary::of(&landmarks);
+        let summary =
+            Summary { key_scans: slam.map(|slam| slam.0), loops: slam.map(|slam| slam.1), ..Summary::of(&landmarks) };
         if self.json {
             println!("{}", serde_json::to_string_pretty(&summary)?);
             return Ok(());
         }
-        output::print_rows(&[
+        let mut rows = vec![
             ["reflectors".to_owned(), summary.reflectors.to_string()],
             ["corners".to_owned(), summary.corners.to_string()],
             ["end points".to_owned(), summary.end_points.to_string()],
             ["largest deviation".to_owned(), format!("{:.1} mm", summary.largest_deviation_mm.unwrap_or_default())],
-        ]);
+        ];
+        if let Some((keys, loops)) = slam {
+            rows.push(["key scans".to_owned(), keys.to_string()]);
+            rows.push(["loops".to_owned(), loops.to_string()]);
+        }
+        output::print_rows(&rows);
         Ok(())
     }
 }
@@ -133,6 +158,8 @@ impl Summary {
                 .iter()
                 .map(|landmark| 1e3 * f64::from(landmark.deviation))
                 .max_by(f64::total_cmp),
+            key_scans: None,
+            loops: None,
         }
     }
 }

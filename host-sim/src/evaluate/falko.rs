@@ -14,14 +14,11 @@ use serde::{Deserialize, Serialize};
 
 use super::repeatability;
 use crate::data;
+pub use crate::import::{BEAMS, KEYPOINTS, RANGES};
 use crate::import::{PosedScan, graph_log};
 
-/// Beams of the longest scan that is looked at.
-pub const BEAMS: usize = 1440;
-/// Keypoints of one scan that are kept.
-pub const KEYPOINTS: usize = 256;
-/// Ranges outside this interval are absent, m.
-pub const RANGES: (f32, f32) = (0.02, 80.0);
+/// Columns of the reference program's file before those of the histogram.
+const COLUMNS_BEFORE_HISTOGRAM: usize = 7;
 
 /// A log of scans with known poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +46,17 @@ impl Set {
     pub fn reference(self) -> anyhow::Result<Vec<ReferenceKeypoint>> {
         let path = in_data(self.files().1)?;
         let file = File::open(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        let rows: Result<Vec<_>, _> = csv::Reader::from_reader(file).deserialize().collect();
+        let mut reader = csv::Reader::from_reader(file);
+        let header = reader.headers()?.clone();
+        let rows: Result<Vec<_>, csv::Error> = reader
+            .records()
+            .map(|record| {
+                let record = record?;
+                let bins = record.iter().skip(COLUMNS_BEFORE_HISTOGRAM).map(str::parse);
+                let histogram = bins.collect::<Result<Vec<f32>, _>>().ok().filter(|bins| !bins.is_empty());
+                Ok(ReferenceKeypoint { histogram, ..record.deserialize(Some(&header))? })
+            })
+            .collect();
         rows.with_context(|| format!("{} is not what the reference program writes", path.display()))
     }
 }
@@ -60,7 +67,7 @@ fn in_data(name: impl AsRef<Path>) -> anyhow::Result<PathBuf> {
 }
 
 /// A keypoint that the reference program found.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct ReferenceKeypoint {
     /// Index of the scan.
     pub scan: usize,
@@ -74,6 +81,12 @@ pub struct ReferenceKeypoint {
     pub orientation_rad: f32,
     /// Radius of the neighbourhood, m.
     pub radius_m: f32,
+    /// Cells of the binary shape context, ring by ring, as digits; empty where the file has none.
+    #[serde(default)]
+    pub bsc_bits: String,
+    /// The 16 bins of the cumulative Gaussian histogram, where the file has them.
+    #[serde(skip)]
+    pub histogram: Option<Vec<f32>>,
 }
 
 /// What one profile of the detector does on a log.

@@ -3,9 +3,14 @@
 pub mod accuracy;
 pub mod calibration;
 pub mod carpark;
+pub mod carpark_starts;
 pub mod demonstration;
 pub mod drive;
 pub mod falko;
+pub mod features;
 pub mod halting_points;
+pub mod kidnapping;
+pub mod places;
 pub mod repeatability;
+pub mod slam;
 pub mod warehouse;

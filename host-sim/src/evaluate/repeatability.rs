@@ -34,9 +34,20 @@ pub struct Repeatability {
     pub pairs: usize,
 }
 
-/// Pairs of scans that see much the same space, by index; the first one is the reference.
+/// Two scans that see much the same space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OverlappingPair {
+    /// Index of the reference scan.
+    pub reference: usize,
+    /// Index of the other scan.
+    pub other: usize,
+    /// Area of the intersection of their free regions over that of the union.
+    pub overlap: f64,
+}
+
+/// Pairs of scans that see much the same space.
 #[must_use]
-pub fn overlapping_pairs(scans: &[PosedScan]) -> Vec<(usize, usize)> {
+pub fn overlapping_pairs(scans: &[PosedScan]) -> Vec<OverlappingPair> {
     let regions: Vec<_> = scans.par_iter().map(|scan| free_region(&scan.scan.view(), &scan.laser)).collect();
     let references: Vec<_> = (0..scans.len()).step_by(EVERY).collect();
     let found = references.into_par_iter().flat_map_iter(|reference| {
@@ -47,7 +58,8 @@ pub fn overlapping_pairs(scans: &[PosedScan]) -> Vec<(usize, usize)> {
                 return None;
             }
             let (first, second) = (regions[reference].as_ref()?, regions[other].as_ref()?);
-            (overlap(first, second) >= LEAST_OVERLAP).then_some((reference, other))
+            let overlap = overlap(first, second);
+            (overlap >= LEAST_OVERLAP).then_some(OverlappingPair { reference, other, overlap })
         })
     });
     found.collect()
@@ -55,20 +67,14 @@ pub fn overlapping_pairs(scans: &[PosedScan]) -> Vec<(usize, usize)> {
 
 /// Scores keypoints, given per scan in the frame of its laser.
 #[must_use]
-pub fn score(scans: &[PosedScan], keypoints: &[Vec<Point>], pairs: &[(usize, usize)]) -> Repeatability {
+pub fn score(scans: &[PosedScan], keypoints: &[Vec<Point>], pairs: &[OverlappingPair]) -> Repeatability {
     let world: Vec<Vec<Point>> = scans
         .iter()
         .zip(keypoints)
         .map(|(scan, points)| points.iter().map(|point| scan.laser.transform(point)).collect())
         .collect();
-    let shares: Vec<_> = pairs
-        .par_iter()
-        .filter_map(|&(reference, other)| {
-            let (first, second) = (&world[reference], &world[other]);
-            let smaller = first.len().min(second.len());
-            (smaller > 0).then(|| matches(first, second) as f64 / smaller as f64)
-        })
-        .collect();
+    let shares: Vec<_> =
+        pairs.par_iter().filter_map(|pair| share(&world[pair.reference], &world[pair.other])).collect();
     let sum: f64 = shares.iter().sum();
     Repeatability {
         excluding_empty: sum / shares.len() as f64,
@@ -97,8 +103,16 @@ fn overlap(first: &Polygon, second: &Polygon) -> f64 {
     if union > 0.0 { shared / union } else { 0.0 }
 }
 
-/// Number of pairs matched greedily, nearest first, one to one.
-fn matches(first: &[Point], second: &[Point]) -> usize {
+/// Share of the smaller one of two sets of keypoints in one frame that the other has too. None if one is empty.
+#[must_use]
+pub fn share(first: &[Point], second: &[Point]) -> Option<f64> {
+    let smaller = first.len().min(second.len());
+    (smaller > 0).then(|| same_points(first, second).len() as f64 / smaller as f64)
+}
+
+/// Keypoints of both sets that are the same point: matched greedily, nearest first, one to one.
+#[must_use]
+pub fn same_points(first: &[Point], second: &[Point]) -> Vec<(usize, usize)> {
     let mut near: Vec<_> = first
         .iter()
         .enumerate()
@@ -107,11 +121,13 @@ fn matches(first: &[Point], second: &[Point]) -> usize {
         .collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut used_first, mut used_second) = (HashSet::new(), HashSet::new());
-    for (_, i, j) in near {
-        if !used_first.contains(&i) && !used_second.contains(&j) {
+    near.retain(|&(_, i, j)| {
+        let is_free = !used_first.contains(&i) && !used_second.contains(&j);
+        if is_free {
             used_first.insert(i);
             used_second.insert(j);
         }
-    }
-    used_first.len()
+        is_free
+    });
+    near.into_iter().map(|(_, i, j)| (i, j)).collect()
 }

@@ -13,7 +13,7 @@ mod scan_record;
 mod table;
 pub mod tcp_stream;
 
-pub use posed_scan::{PosedScan, ScanLog};
+pub use posed_scan::{BEAMS, KEYPOINTS, PosedScan, RANGES, ScanLog};
 pub use scan_drive::drive;
 
 /// What is wrong with a line of that record.

@@ -5,6 +5,13 @@ use agv_core::measurement::PoseIncrement;
 
 use crate::recording::{RecordedEvent, RecordedScan, Recording, truth_at};
 
+/// Beams of the longest scan that is looked at.
+pub const BEAMS: usize = 1440;
+/// Keypoints of one scan that are kept.
+pub const KEYPOINTS: usize = 256;
+/// Ranges outside this interval are absent, m.
+pub const RANGES: (f32, f32) = (0.02, 80.0);
+
 /// A scan and where the laser was.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PosedScan {

@@ -1,6 +1,6 @@
 //! Sightings of landmarks from poses that another instrument has measured.
 
-use agv_core::geometry::Point;
+use agv_core::geometry::{Point, Pose};
 use agv_core::landmarks::LandmarkKind;
 use agv_core::localizer::{MapUse, PoseFix};
 
@@ -21,12 +21,23 @@ pub fn sightings(
     let Some(first) = poses.first() else {
         return Ok(Vec::new());
     };
+    let replay = replay(&by_odometry(recording, first.pose), |_| {})?;
+    let sightings = replay.uses.iter().filter(|used| is_wanted(used.kind)).filter_map(|used| {
+        let laser = truth_at(poses, used.time)?.compose(&recording.parameters.laser);
+        let [x, y] = used.position.map(f64::from);
+        Some(Sighting { kind: used.kind, position: laser.transform(&Point::new(x, y)), pose_variance: 0.0 })
+    });
+    Ok(sightings.collect())
+}
+
+/// The recording without a map, from a start pose on. The localiser only finds the landmarks; it must not mind that its own
+/// pose rests on odometry alone.
+pub(super) fn by_odometry(recording: &Recording, pose: Pose) -> Recording {
     let mut recording = recording.clone();
     recording.landmarks.clear();
     recording.events.retain(|event| !matches!(event, RecordedEvent::SetPose(_)));
-    // The localiser only finds the landmarks; it must not mind that its own pose rests on odometry alone.
-    let start = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or(first.time);
-    let fix = PoseFix { time: start, pose: first.pose, position_deviation: 0.0, heading_deviation: 0.0 };
+    let start = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
+    let fix = PoseFix { time: start, pose, position_deviation: 0.0, heading_deviation: 0.0 };
     recording.events.insert(0, RecordedEvent::SetPose(fix));
     let parameters = &mut recording.parameters;
     parameters.maps = MapUse { reflectors: true, features: true, dynamic: false };
@@ -34,11 +45,5 @@ pub fn sightings(
     parameters.limits.lost_after = f64::INFINITY;
     parameters.limits.largest_position_deviation = f64::INFINITY;
     parameters.limits.largest_heading_deviation = f64::INFINITY;
-    let replay = replay(&recording, |_| {})?;
-    let sightings = replay.uses.iter().filter(|used| is_wanted(used.kind)).filter_map(|used| {
-        let laser = truth_at(poses, used.time)?.compose(&recording.parameters.laser);
-        let [x, y] = used.position.map(f64::from);
-        Some(Sighting { kind: used.kind, position: laser.transform(&Point::new(x, y)), pose_variance: 0.0 })
-    });
-    Ok(sightings.collect())
+    recording
 }

@@ -1,10 +1,15 @@
-//! Maps from drives whose poses are known.
+//! Maps from drives whose poses are known, or found by the way.
 
 mod clustering;
 mod known_poses;
 pub mod map_file;
+pub mod pose_graph;
+mod simultaneous_scan;
+pub mod slam;
+mod slam_poses;
 
 pub use clustering::{Clustering, Sighting, cluster};
+pub use slam_poses::{SlamPosesError, slam_poses};
 
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{MapUse, Mode, PoseOutput};

@@ -43,6 +43,12 @@ impl LaserTrack {
         Self { interval: motion.interval, positions, headings }
     }
 
+    /// The track of a laser that stands still.
+    #[must_use]
+    pub fn standing(laser: &Pose) -> Self {
+        Self { interval: 1.0, positions: vec![laser.position()], headings: vec![laser.theta] }
+    }
+
     /// From the first state to the last, s.
     #[must_use]
     pub fn duration(&self) -> f64 {

@@ -26,6 +26,8 @@ pub enum Stream {
     Survey = 9,
     /// Error of the start pose.
     Start = 10,
+    /// Where a vehicle is switched on, and what it sees there.
+    Kidnapping = 11,
 }
 
 /// One sequence of random numbers.

@@ -39,6 +39,8 @@ const BAY: f64 = 2.75;
 const RACK_HALF_DEPTH: f64 = 1.15;
 const UPRIGHT: f64 = 0.1;
 const COLUMN: f64 = 0.4;
+/// Columns stand this far beside their grid at most, m.
+const COLUMN_SHIFT: f64 = 0.1;
 const REFLECTOR_RADIUS: f64 = 0.04;
 const REFLECTOR_FARTHEST: f64 = 30.0;
 const WALL_SPACING: f64 = 7.0;
@@ -56,16 +58,28 @@ impl WarehouseHall {
                 self.add_rack_side(&mut world, axis, side, &mut random);
             }
         }
-        for x in [7.0, 53.0] {
-            for y in [4.0, 16.0, 24.0, 36.0] {
-                let pose = Pose::new(x, y + random.between(-0.1, 0.1), 0.0);
-                world.add_rectangle(&Rectangle { pose, length: COLUMN, width: COLUMN });
-                let reflector = pose.position() + Point::new(0.0, 0.5 * COLUMN + 1.5 * REFLECTOR_RADIUS);
-                self.add_reflector(&mut world, reflector);
-            }
+        for (x, y) in columns() {
+            let pose = Pose::new(x, y + random.between(-COLUMN_SHIFT, COLUMN_SHIFT), 0.0);
+            world.add_rectangle(&Rectangle { pose, length: COLUMN, width: COLUMN });
+            let reflector = pose.position() + Point::new(0.0, 0.5 * COLUMN + 1.5 * REFLECTOR_RADIUS);
+            self.add_reflector(&mut world, reflector);
         }
         self.add_wall_reflectors(&mut world, &mut random);
         world
+    }
+
+    /// Where no vehicle can stand: outlines of the double racks, filled or not, and of the columns wherever they are put.
+    #[must_use]
+    pub fn keep_outs() -> Vec<Rectangle> {
+        let length = BAYS as f64 * BAY;
+        let rack = |axis| Rectangle {
+            pose: Pose::new(RACK_START + 0.5 * length, axis, 0.0),
+            length,
+            width: 2.0 * RACK_HALF_DEPTH,
+        };
+        let column =
+            |(x, y)| Rectangle { pose: Pose::new(x, y, 0.0), length: COLUMN, width: COLUMN + 2.0 * COLUMN_SHIFT };
+        RACK_AXES.into_iter().map(rack).chain(columns().map(column)).collect()
     }
 
     fn add_rack_side(&self, world: &mut World, axis: f64, side: f64, random: &mut Random) {
@@ -117,6 +131,11 @@ impl WarehouseHall {
             world.reflectors.push(Reflector { body, farthest: REFLECTOR_FARTHEST, sector: None });
         }
     }
+}
+
+/// Grid of the columns, W, m.
+fn columns() -> impl Iterator<Item = (f64, f64)> {
+    [7.0, 53.0].into_iter().flat_map(|x| [4.0, 16.0, 24.0, 36.0].map(|y| (x, y)))
 }
 
 /// Once round the second rack, 90 m, counter-clockwise.

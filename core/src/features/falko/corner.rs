@@ -1,8 +1,8 @@
 //! The corner between the beams: where the lines through both sides of a candidate meet (K 3.1.2).
 
 use super::line::{Line, intersection_covariance, largest_variance};
-use super::neighbourhood::Disc;
 use super::parameters::{LineGate, Parameters};
+use crate::features::neighbourhood::Disc;
 use crate::geometry::ScanPoint;
 
 /// An intersection of two lines near a candidate.

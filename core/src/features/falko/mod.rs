@@ -13,7 +13,6 @@ mod corner;
 mod detector;
 mod end_point;
 mod line;
-mod neighbourhood;
 mod parameters;
 mod runs;
 mod score;

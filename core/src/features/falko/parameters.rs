@@ -152,6 +152,32 @@ impl Parameters {
             ..Self::thesis()
         }
     }
+
+    /// Corners for the recognition of places: as printed, but one neighbour a side is enough. More keypoints serve there
+    /// better than good ones.
+    #[must_use]
+    pub const fn place_corners() -> Self {
+        Self { points_a_side: 1, ..Self::thesis() }
+    }
+
+    /// Ends of faces for the recognition of places, and no corners.
+    #[must_use]
+    pub const fn place_ends() -> Self {
+        Self {
+            // No beam has so many neighbours.
+            points_a_side: u16::MAX,
+            jump: Some(0.3),
+            end_points: Some(EndPointParameters {
+                length: 0.6,
+                shortest: 0.1,
+                points: 3,
+                residual: 0.03,
+                spacing: 0.5,
+                depth: 0.3,
+            }),
+            ..Self::thesis()
+        }
+    }
 }
 
 impl Default for Parameters {

@@ -1,7 +1,7 @@
 //! Which of several candidates close to each other stays (K 3.1.1).
 
-use super::neighbourhood::beams_within;
 use crate::features::PointScan;
+use crate::features::neighbourhood::beams_within;
 
 /// How good a candidate is; of two candidates the one with the smaller cost stays.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,9 @@
 //! `agv evaluate carpark`.
 
+use std::path::Path;
+
 use agv_host_sim::data;
-use agv_host_sim::evaluate::carpark;
+use agv_host_sim::evaluate::{carpark, carpark_starts};
 use anyhow::Context;
 
 /// Reflectors on a real vehicle: the car park of ACFR against its satellite receiver.
@@ -10,6 +12,12 @@ pub struct Carpark {
     /// What is believed of the vehicle's own sensors.
     #[arg(long, value_enum, default_value = "nominal")]
     noise: Noise,
+    /// Switch the vehicle on at that many random moments instead, with no start pose: it finds itself by its reflectors.
+    #[arg(long, value_name = "STARTS", num_args = 0..=1, default_missing_value = "50")]
+    relocalise: Option<usize>,
+    /// Seed of the random moments.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -28,6 +36,9 @@ impl Carpark {
     pub fn run(self) -> anyhow::Result<()> {
         let folder =
             data::folder().context("the recordings are not there: set AGV_DATA to their folder")?.join("carpark");
+        if let Some(starts) = self.relocalise {
+            return relocalise(&folder, starts, self.seed, self.json);
+        }
         let noise = match self.noise {
             Noise::Nominal => carpark::Noise::Nominal,
             Noise::Tight => carpark::Noise::Tight,
@@ -49,4 +60,17 @@ impl Carpark {
         println!("speed        {:.0} times real time", outcome.realtime_factor);
         Ok(())
     }
+}
+
+fn relocalise(folder: &Path, starts: usize, seed: u64, json: bool) -> anyhow::Result<()> {
+    let outcome = carpark_starts::run(folder, starts, seed)?;
+    if json {
+        println!("{}", serde_json::to_string_pretty(&outcome)?);
+        return Ok(());
+    }
+    println!("starts          {}", outcome.starts);
+    println!("right           {} within {} s of motion", outcome.right, carpark_starts::LONGEST);
+    println!("not localised   {}, and said so", outcome.not_localised);
+    println!("wrong           {}", outcome.wrong);
+    Ok(())
 }

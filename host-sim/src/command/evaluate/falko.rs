@@ -7,26 +7,16 @@ use agv_host_sim::evaluate::falko;
 pub struct Falko {
     /// Log to measure on.
     #[arg(long)]
-    set: Set,
+    set: super::Set,
     /// Print a JSON array instead of a table.
     #[arg(long)]
     json: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Set {
-    Fr079,
-    Intel,
-}
-
 impl Falko {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let set = match self.set {
-            Set::Fr079 => falko::Set::Fr079,
-            Set::Intel => falko::Set::Intel,
-        };
-        let outcomes = falko::run(set)?;
+        let outcomes = falko::run(self.set.into())?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());

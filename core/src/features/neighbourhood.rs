@@ -1,6 +1,6 @@
 //! The points around a candidate (K 3.1.1), organised by beam.
 
-use crate::features::PointScan;
+use super::PointScan;
 use crate::geometry::ScanPoint;
 
 /// How many beams a neighbourhood reaches to each side at most.
@@ -131,4 +131,24 @@ pub(super) fn beams_within(sine: f32, bearing_step: f32) -> usize {
     // x + x^3 / 4 is never below asin(x) for x up to 0.8, and close to it for the small x of most neighbourhoods.
     let angle = sine * (1.0 + 0.25 * sine * sine);
     (angle / bearing_step) as usize + 1
+}
+
+/// Calls `visit` with each return within `radius` (m, at most 0.8 of the range) of the return of beam `index`, relative to it,
+/// in order of beams; the return itself is left out.
+pub(super) fn visit_around<const BEAMS: usize>(
+    scan: &PointScan<BEAMS>,
+    index: usize,
+    radius: f32,
+    mut visit: impl FnMut(ScanPoint),
+) {
+    let (Some(&centre), Some(&range)) = (scan.points.get(index), scan.ranges.get(index)) else { return };
+    if range <= 0.0 {
+        return;
+    }
+    let count = scan.ranges.len();
+    let most = if scan.is_full_circle { ((count - 1) / 2, (count - 1) / 2) } else { (index, count - 1 - index) };
+    let disc = Disc { centre, range, radius: radius.min(0.8 * range) };
+    let window = beams_within(disc.radius / range, scan.bearing_step);
+    Side::before(scan, index, window.min(most.0)).visit(&disc, &mut visit);
+    Side::after(scan, index, window.min(most.1)).visit(&disc, &mut visit);
 }

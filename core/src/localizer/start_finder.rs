@@ -1,0 +1,203 @@
+//! Where a vehicle is that has been switched on: reflectors seen while it stands or moves become a pose.
+//!
+//! It stands beside the [`super::Localizer`] and takes the same events. The pose that it finds is given to the localiser as
+//! [`Event::SetPose`], and so is in the record: a replay needs neither the search nor its index.
+
+use heapless::Vec;
+
+use super::{Event, Parameters, PoseFix};
+use crate::features::detect_reflectors;
+use crate::geometry::{Point, Pose};
+use crate::measurement::{ReflectorObservation, Time};
+use crate::odometry::{Motion, Odometer, OdometryError};
+use crate::places::{
+    ReflectorAnswer, ReflectorFix, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
+    RelocalizationParameters, RelocalizationProgress,
+};
+
+/// What is known of the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartState {
+    /// No revolution has been seen since the last answer.
+    Waiting,
+    /// The search goes on in the next revolution.
+    Searching,
+    /// The vehicle is here.
+    Found(PoseFix),
+    /// Two poses of R fit almost equally.
+    Ambiguous(Pose, Pose),
+    /// Too few reflectors have been seen.
+    TooFew,
+    /// No place of the map looks like what was seen.
+    Unknown,
+}
+
+/// Most reflectors of one revolution.
+const OBSERVATIONS: usize = 64;
+
+/// Way after which what was seen before is forgotten, m: the odometry has then carried it too far.
+const LONGEST_WAY: f64 = 10.0;
+
+/// Hypotheses tried in one revolution unless stated otherwise.
+pub const HYPOTHESES: u32 = 20_000;
+
+/// A found pose is not surer than this, m and rad: reflectors are passed by a moving vehicle.
+const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
+
+/// Finds the pose of a vehicle that does not know it.
+#[derive(Clone, Debug)]
+pub struct StartFinder<const SEEN: usize = 64> {
+    parameters: Parameters,
+    odometer: Odometer,
+    last_motion: Motion,
+    /// Reflectors in R as it was at the end of the last motion.
+    snapshot: ReflectorSnapshot<SEEN>,
+    relocalizer: ReflectorRelocalizer<SEEN>,
+    /// Motion since the search began; none if no search is under way.
+    since: Option<Pose>,
+    way: f64,
+    hypotheses: u32,
+    found: Vec<ReflectorObservation, OBSERVATIONS>,
+}
+
+impl<const SEEN: usize> StartFinder<SEEN> {
+    /// A finder that has seen nothing; tries `hypotheses` in each revolution.
+    #[must_use]
+    pub fn new(parameters: Parameters, search: RelocalizationParameters, hypotheses: u32) -> Self {
+        let (vehicle, noise) = (parameters.vehicle, parameters.odometry_noise);
+        Self {
+            odometer: Odometer::new(vehicle, noise, parameters.integration, parameters.limits.fastest),
+            last_motion: Motion::none(Time::default()),
+            snapshot: ReflectorSnapshot::new(),
+            relocalizer: ReflectorRelocalizer::new(search),
+            since: None,
+            way: 0.0,
+            hypotheses,
+            found: Vec::new(),
+            parameters,
+        }
+    }
+
+    /// Takes one event. `index` is the map of the reflectors.
+    pub fn handle<const REFLECTORS: usize, const PAIRS: usize>(
+        &mut self,
+        event: &Event,
+        index: &ReflectorIndex<REFLECTORS, PAIRS>,
+    ) -> StartState {
+        match event {
+            Event::Encoders(sample) => {
+                let motion = self.odometer.encoders(sample);
+                self.travel(motion)
+            }
+            Event::Speed(sample) => {
+                let motion = self.odometer.speed(sample);
+                self.travel(motion)
+            }
+            Event::Increment(increment) => {
+                let motion = self.odometer.increment(increment);
+                self.travel(motion)
+            }
+            Event::Reflectors(reflectors) => return self.revolution(reflectors.observations, index),
+            Event::Scan(scan) => {
+                if let Some(detection) = self.parameters.reflectors.detection
+                    && !scan.intensities.is_empty()
+                {
+                    let mut found = core::mem::take(&mut self.found);
+                    detect_reflectors(scan, &detection, &mut found);
+                    let state = self.revolution(&found, index);
+                    self.found = found;
+                    return state;
+                }
+            }
+            Event::EncoderFaults(_) | Event::SetPose(_) => self.forget(),
+        }
+        StartState::Waiting
+    }
+
+    /// Forgets what was seen.
+    fn forget(&mut self) {
+        self.snapshot.clear();
+        self.since = None;
+        self.way = 0.0;
+    }
+
+    fn travel(&mut self, motion: Result<Motion, OdometryError>) {
+        match motion {
+            Ok(motion) => {
+                let covariance = &motion.covariance;
+                let shift = 0.5 * (covariance.m11 + covariance.m22);
+                self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
+                self.since = self.since.map(|since| since.compose(&motion.displacement));
+                self.way += motion.distance;
+                self.last_motion = motion;
+                if self.way > LONGEST_WAY {
+                    self.forget();
+                }
+            }
+            // What was seen before cannot be carried on.
+            Err(OdometryError::Implausible) => self.forget(),
+            Err(_) => {}
+        }
+    }
+
+    fn revolution<const REFLECTORS: usize, const PAIRS: usize>(
+        &mut self,
+        observations: &[ReflectorObservation],
+        index: &ReflectorIndex<REFLECTORS, PAIRS>,
+    ) -> StartState {
+        self.see(observations);
+        if self.since.is_none() {
+            self.relocalizer.begin(&self.snapshot, index);
+            self.since = Some(Pose::default());
+        }
+        let since = self.since.unwrap_or_default();
+        let answer = match self.relocalizer.advance(index, self.hypotheses) {
+            RelocalizationProgress::Searching => return StartState::Searching,
+            RelocalizationProgress::Done(answer) => answer,
+        };
+        self.since = None;
+        match answer {
+            ReflectorAnswer::Found(fix) => StartState::Found(self.fix(&fix, &since)),
+            ReflectorAnswer::Ambiguous(one, other) => {
+                StartState::Ambiguous(one.pose.compose(&since), other.pose.compose(&since))
+            }
+            ReflectorAnswer::TooFew => StartState::TooFew,
+            ReflectorAnswer::Unknown => StartState::Unknown,
+        }
+    }
+
+    /// Notes reflectors where they are in R at the end of the last motion.
+    fn see(&mut self, observations: &[ReflectorObservation]) {
+        let believed = &self.parameters.reflectors;
+        let noise = ReflectorNoise {
+            range: believed.range_deviation as f32,
+            bearing: believed.bearing_deviation as f32,
+            ..ReflectorNoise::default()
+        };
+        let duration = self.last_motion.end.since(self.last_motion.start);
+        for observation in observations {
+            let range = f64::from(observation.range);
+            let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
+            let in_robot = self.parameters.laser.transform(&Point::new(range * cosine, range * sine));
+            // The vehicle goes on, or has come here, as in its last motion.
+            let late = observation.time.since(self.last_motion.end);
+            let share = if duration > 0.0 { (late / duration).clamp(-LONGEST_SHARE, LONGEST_SHARE) } else { 0.0 };
+            let position = self.last_motion.displacement.fraction(share).transform(&in_robot);
+            self.snapshot.see(&position, range, &noise);
+        }
+    }
+
+    fn fix(&self, fix: &ReflectorFix, since: &Pose) -> PoseFix {
+        let covariance = &fix.covariance;
+        let position = libm::sqrt(covariance.m11.max(covariance.m22));
+        PoseFix {
+            time: self.last_motion.end,
+            pose: fix.pose.compose(since),
+            position_deviation: position.max(LEAST_DEVIATION.0),
+            heading_deviation: libm::sqrt(covariance.m33).max(LEAST_DEVIATION.1),
+        }
+    }
+}
+
+/// An observation is carried over at most so many intervals of the odometry.
+const LONGEST_SHARE: f64 = 32.0;

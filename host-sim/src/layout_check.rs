@@ -1,0 +1,237 @@
+//! Where a layout of reflectors resembles itself: a vehicle that is switched on there cannot tell where it is.
+
+use std::collections::BTreeMap;
+
+use agv_core::geometry::{Point, Pose};
+use agv_core::places::{
+    ReflectorAnswer, ReflectorIndex, ReflectorIndexError, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
+    RelocalizationParameters, RelocalizationProgress,
+};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Most reflectors of a layout.
+pub const REFLECTORS: usize = 1024;
+
+/// What is assumed of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CheckOptions {
+    /// Distance between the places that are looked at, m.
+    pub spacing: f64,
+    /// Farthest reflector that is seen, m.
+    pub farthest: f64,
+    /// Most reflectors that are seen at once, the nearest ones: walls and racks hide others, which a layout does not say.
+    pub most_seen: usize,
+}
+
+/// What was found at one place.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "answer")]
+pub enum Finding {
+    /// A vehicle there finds itself.
+    Unique,
+    /// It may as well be elsewhere; the pose there of a vehicle that faces along the first axis here.
+    Resembles {
+        /// Position, m.
+        x_m: f64,
+        /// Position, m.
+        y_m: f64,
+        /// Heading, deg.
+        heading_deg: f64,
+    },
+    /// Too few reflectors are seen there.
+    TooFew,
+    /// The search finds nothing there.
+    Unknown,
+}
+
+/// One place.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CheckedPlace {
+    /// Position, m.
+    pub x_m: f64,
+    /// Position, m.
+    pub y_m: f64,
+    /// Reflectors seen there.
+    pub seen: usize,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: Finding,
+}
+
+/// A movement of the layout that puts reflectors on reflectors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Resemblance {
+    /// Turn about the origin of W, deg, to whole degrees.
+    pub turn_deg: f64,
+    /// Shift after the turn, m.
+    pub shift_m: [f64; 2],
+    /// Places at which this movement cannot be told from standing still.
+    pub places: usize,
+}
+
+/// The outcome of a check.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// Number of reflectors.
+    pub reflectors: usize,
+    /// Places that were looked at.
+    pub places: usize,
+    /// Share of them where a vehicle finds itself.
+    pub unique_share: f64,
+    /// Share of them where the layout resembles itself.
+    pub ambiguous_share: f64,
+    /// Share of them with too few reflectors.
+    pub too_few_share: f64,
+    /// By what movements the layout resembles itself, the commonest first.
+    pub resemblances: Vec<Resemblance>,
+    /// All places where a vehicle does not find itself.
+    pub problems: Vec<CheckedPlace>,
+}
+
+/// Looks at places on a grid over the layout, with what a vehicle would see there without noise, and asks whether it could
+/// be elsewhere.
+///
+/// # Errors
+/// If there are too many reflectors, or one is nowhere.
+pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, ReflectorIndexError> {
+    let mut index = Box::new(ReflectorIndex::<REFLECTORS, 60_000>::new());
+    index.build(positions.iter().copied(), (2.0 * options.farthest) as f32)?;
+    let places = grid(positions, options.spacing);
+    let looked: Vec<CheckedPlace> = places
+        .par_iter()
+        .map_init(
+            || Box::new(ReflectorRelocalizer::<64>::new(RelocalizationParameters::default())),
+            |relocalizer, place| look(place, positions, options, &index, relocalizer),
+        )
+        .collect();
+    let share = |is: fn(&Finding) -> bool| {
+        looked.iter().filter(|place| is(&place.finding)).count() as f64 / looked.len().max(1) as f64
+    };
+    Ok(Check {
+        reflectors: positions.len(),
+        places: looked.len(),
+        unique_share: share(|finding| *finding == Finding::Unique),
+        ambiguous_share: share(|finding| matches!(finding, Finding::Resembles { .. })),
+        too_few_share: share(|finding| *finding == Finding::TooFew),
+        resemblances: resemblances(&looked),
+        problems: looked.into_iter().filter(|place| place.finding != Finding::Unique).collect(),
+    })
+}
+
+/// Places over the rectangle around the reflectors.
+fn grid(positions: &[Point], spacing: f64) -> Vec<Point> {
+    let low = positions.iter().fold(Point::repeat(f64::INFINITY), |low, position| low.inf(position));
+    let high = positions.iter().fold(Point::repeat(f64::NEG_INFINITY), |high, position| high.sup(position));
+    let steps = |axis: usize| ((high[axis] - low[axis]) / spacing).max(0.0) as usize;
+    if positions.is_empty() {
+        return Vec::new();
+    }
+    let (columns, rows) = (steps(0), steps(1));
+    // The grid stands in the middle of the rectangle.
+    let start =
+        Point::new(0.5 * (low.x + high.x - columns as f64 * spacing), 0.5 * (low.y + high.y - rows as f64 * spacing));
+    let place = |column: usize, row: usize| start + Point::new(column as f64 * spacing, row as f64 * spacing);
+    (0..=columns).flat_map(|column| (0..=rows).map(move |row| place(column, row))).collect()
+}
+
+fn look(
+    place: &Point,
+    positions: &[Point],
+    options: &CheckOptions,
+    index: &ReflectorIndex<REFLECTORS, 60_000>,
+    relocalizer: &mut ReflectorRelocalizer<64>,
+) -> CheckedPlace {
+    let mut near: Vec<_> = positions
+        .iter()
+        .map(|position| ((position - place).norm(), position))
+        .filter(|(distance, _)| *distance <= options.farthest)
+        .collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    near.truncate(options.most_seen);
+    let mut snapshot = ReflectorSnapshot::<64>::new();
+    for (distance, position) in &near {
+        snapshot.see(&(*position - place), *distance, &ReflectorNoise::default());
+    }
+    relocalizer.begin(&snapshot, index);
+    let answer = loop {
+        if let RelocalizationProgress::Done(answer) = relocalizer.advance(index, u32::MAX) {
+            break answer;
+        }
+    };
+    let here = Pose::new(place.x, place.y, 0.0);
+    let finding = match answer {
+        ReflectorAnswer::Found(_) => Finding::Unique,
+        ReflectorAnswer::Ambiguous(one, other) => {
+            let apart = |pose: &Pose| here.between(pose).position().norm() + here.between(pose).theta.abs();
+            let elsewhere = if apart(&one.pose) > apart(&other.pose) { one.pose } else { other.pose };
+            Finding::Resembles { x_m: elsewhere.x, y_m: elsewhere.y, heading_deg: elsewhere.theta.to_degrees() }
+        }
+        ReflectorAnswer::TooFew => Finding::TooFew,
+        ReflectorAnswer::Unknown => Finding::Unknown,
+    };
+    CheckedPlace { x_m: place.x, y_m: place.y, seen: near.len(), finding }
+}
+
+/// Movements that differ by less than a degree and half a metre are one.
+fn resemblances(looked: &[CheckedPlace]) -> Vec<Resemblance> {
+    let mut found: BTreeMap<(i64, i64, i64), usize> = BTreeMap::new();
+    for place in looked {
+        if let Finding::Resembles { x_m, y_m, heading_deg } = place.finding {
+            let turn = heading_deg.round().rem_euclid(360.0);
+            let (sine, cosine) = turn.to_radians().sin_cos();
+            let moved = (cosine * place.x_m - sine * place.y_m, sine * place.x_m + cosine * place.y_m);
+            let shift = ((x_m - moved.0) * 2.0, (y_m - moved.1) * 2.0);
+            *found.entry((turn as i64, shift.0.round() as i64, shift.1.round() as i64)).or_default() += 1;
+        }
+    }
+    let mut found: Vec<_> = found
+        .into_iter()
+        .map(|((turn, x, y), places)| Resemblance {
+            turn_deg: turn as f64,
+            shift_m: [0.5 * x as f64, 0.5 * y as f64],
+            places,
+        })
+        .collect();
+    found.sort_by_key(|resemblance| std::cmp::Reverse(resemblance.places));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OPTIONS: CheckOptions = CheckOptions { spacing: 4.0, farthest: 30.0, most_seen: 12 };
+
+    /// Reflectors at irregular places of a hall of 40 x 20 m.
+    fn irregular() -> Vec<Point> {
+        (0..24_u32)
+            .map(|number| {
+                let (x, y) = (f64::from(number * 37 % 41), f64::from(number * number * 13 % 21));
+                Point::new(x + 0.13 * f64::from(number % 7), y + 0.17 * f64::from(number % 5))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn an_irregular_layout_is_unique() {
+        let check = check(&irregular(), &OPTIONS).unwrap();
+        assert_eq!(check.unique_share, 1.0, "{:?}", check.problems);
+    }
+
+    #[test]
+    fn a_layout_with_a_turned_copy_of_itself_resembles_itself_by_that_turn() {
+        let mut positions = irregular();
+        positions.extend(irregular().iter().map(|position| Point::new(50.0, 60.0) - position));
+        let check = check(&positions, &OPTIONS).unwrap();
+        assert_eq!(check.ambiguous_share, 1.0);
+        let first = check.resemblances[0];
+        assert_eq!((first.turn_deg, first.shift_m, first.places), (180.0, [50.0, 60.0], check.places));
+    }
+
+    #[test]
+    fn three_reflectors_are_too_few() {
+        let check = check(&irregular()[..3], &OPTIONS).unwrap();
+        assert_eq!(check.too_few_share, 1.0);
+    }
+}
