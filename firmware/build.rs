@@ -22,4 +22,5 @@ fn main() {
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bin=vehicle=-Tdefmt.x");
     println!("cargo:rustc-link-arg-bin=latency=-Tdefmt.x");
+    println!("cargo:rustc-link-arg-bin=restart=-Tdefmt.x");
 }

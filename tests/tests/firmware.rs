@@ -12,7 +12,7 @@ use agv_host_sim::{data, log, replay};
 fn images(test: &str) -> Option<PathBuf> {
     let target = "../target/firmware/an500/thumbv7em-none-eabihf/firmware";
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(target);
-    if ["replay", "measure", "latency"].iter().any(|image| !folder.join(image).exists()) {
+    if ["replay", "measure", "latency", "restart"].iter().any(|image| !folder.join(image).exists()) {
         data::skip(test, "the firmware is not built; cargo xtask firmware build");
         return None;
     }
@@ -115,4 +115,15 @@ fn no_prediction_waits_for_a_scan() {
     let instructions = latest * 1000 / 64;
     assert!(instructions <= LATEST_PREDICTION, "{instructions} instructions");
     assert_eq!(lost, 0);
+}
+
+#[test]
+fn a_panic_is_told_after_the_restart_and_the_watchdog_bites() {
+    let Some(images) = images("a_panic_is_told_after_the_restart_and_the_watchdog_bites") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    // Virtual time goes as fast as it can: the watchdog's patience costs little of ours.
+    run(&images.join("restart"), folder.path(), &["-icount", "shift=10,sleep=off"]);
+    let said = std::fs::read_to_string(folder.path().join("panic.txt")).unwrap();
+    assert!(said.contains("restart.rs") && said.contains("nothing was said before 42"), "{said}");
+    assert_eq!(std::fs::read_to_string(folder.path().join("watchdog.txt")).unwrap(), "bitten");
 }

@@ -1,0 +1,260 @@
+//! The emulated board on a real CAN interface of Linux: its serial line is an SLCAN adapter of user-mode-linux, where
+//! `candump` hears its poses, this program's encoders move the vehicle, and `cansend` tells it where it is.
+#![cfg(target_os = "linux")]
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use agv_core::geometry::Pose;
+use agv_core::measurement::Time;
+use agv_core::wire::can::canopen::NodeId;
+use agv_core::wire::can::controller::{Content, PoseReceiver, PublishedPose};
+use agv_core::wire::can::frame::AnyFrame;
+use agv_host_sim::bus::{Bus, BusError, SocketCanBus};
+use agv_host_sim::data;
+use agv_host_sim::emulate::encoder_pair::EmulatedPair;
+use agv_host_sim::emulate::vehicle::settings_like;
+use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line};
+use agv_host_sim::provision::flash_image;
+use agv_host_sim::recording::Recording;
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+use serde_json::Value;
+
+/// Names the interface to the program inside.
+const INTERFACE: &str = "AGV_BOARD_INTERFACE";
+const NAME: &str = "the_board_is_a_node_of_a_real_bus";
+/// Where `candump` writes, in the folder that this names.
+const FOLDER: &str = "AGV_BOARD_FOLDER";
+const START: Pose = Pose { x: 12.5, y: -3.25, theta: 0.5 };
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+fn controller() -> NodeId {
+    NodeId::new(16).unwrap()
+}
+
+fn drive() -> Recording {
+    let mut scenario = Scenario::read(&repository("host-sim/scenarios/warehouse_hall.toml")).unwrap();
+    scenario.laser.scans = false;
+    simulate(&scenario).unwrap().recording
+}
+
+fn is_there(program: &str) -> bool {
+    let script = format!("command -v {program}");
+    let path = format!("{}:/usr/sbin:/sbin", std::env::var("PATH").unwrap_or_default());
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &script]).env("PATH", path).stdout(Stdio::null());
+    shell.status().is_ok_and(|status| status.success())
+}
+
+#[test]
+fn the_board_is_a_node_of_a_real_bus() {
+    if let Ok(interface) = std::env::var(INTERFACE) {
+        return inside(&interface, Path::new(&std::env::var(FOLDER).unwrap()));
+    }
+    let image = repository("target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle");
+    if !image.exists() {
+        return data::skip(NAME, "the firmware is not built; cargo xtask firmware build");
+    }
+    let programs = ["qemu-system-arm", "linux.uml", "insmod", "slcand", "candump", "cansend", "stty", "ip"];
+    if let Some(missing) = programs.into_iter().find(|program| !is_there(program)) {
+        return data::skip(NAME, &format!("there is no {missing}"));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let recording = drive();
+    let flash = flash_image(&settings_like(&recording, 2112), &recording.landmarks, None).unwrap();
+    std::fs::write(folder.path().join("flash.bin"), flash).unwrap();
+    let (mut board, terminal) = start_board(&image, folder.path());
+    assert!(Command::new("stty").args(["-F", &terminal, "raw", "-echo"]).status().unwrap().success());
+    let report = in_user_mode_linux(&terminal, folder.path());
+    let _ = board.kill();
+    let _ = board.wait();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap_or_default();
+    assert_eq!(read("status").trim(), "0", "{report}\n{}", read("output"));
+    check_candump(&read("candump.log"));
+}
+
+/// The board with its serial line on a pseudo terminal, and the name of that.
+fn start_board(image: &Path, folder: &Path) -> (Child, String) {
+    let said = folder.join("qemu.txt");
+    let file = std::fs::File::create(&said).unwrap();
+    let board = Command::new("qemu-system-arm")
+        .args(["-M", "mps2-an500", "-display", "none", "-monitor", "none", "-serial", "pty"])
+        .args(["-nic", "user,model=lan9118", "-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(image)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .stdout(file.try_clone().unwrap())
+        .stderr(file)
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    loop {
+        let text = String::from_utf8_lossy(&std::fs::read(&said).unwrap()).into_owned();
+        if let Some(place) = text.find("/dev/pts/") {
+            let name: String = text[place..].chars().take_while(|letter| !letter.is_whitespace()).collect();
+            return (board, name);
+        }
+        assert!(start.elapsed() < Duration::from_secs(30), "{text}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn in_user_mode_linux(terminal: &str, folder: &Path) -> String {
+    let program = std::env::current_exe().unwrap();
+    let script = folder.join("init");
+    let place = folder.display();
+    let text = format!(
+        "#!/bin/sh\n\
+         export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin\n\
+         mount -t proc proc /proc\n\
+         mount -t sysfs sys /sys\n\
+         mount -t devtmpfs dev /dev 2>/dev/null\n\
+         for name in can can-raw can-dev slcan; do\n\
+           insmod \"$(find /usr/lib/uml/modules -name $name.ko | head -n 1)\"\n\
+         done\n\
+         slcand -o -s6 -t hw ttyS0 can0\n\
+         for i in 1 2 3 4 5 6 7 8 9 10; do ip link set can0 up txqueuelen 1000 && break; sleep 0.2; done\n\
+         {INTERFACE}=can0 {FOLDER}='{place}' '{}' --exact {NAME} --nocapture > '{place}/output' 2>&1\n\
+         echo $? > '{place}/status'\n\
+         sync\n\
+         echo o > /proc/sysrq-trigger\n\
+         sleep 10\n",
+        program.display(),
+    );
+    std::fs::write(&script, text).unwrap();
+    assert!(Command::new("chmod").arg("+x").arg(&script).status().unwrap().success());
+    let run = Command::new("timeout")
+        .args(["--kill-after=5", "150", "linux.uml", "mem=256M", "rootfstype=hostfs", "rootflags=/", "rw", "quiet"])
+        .arg(format!("init={}", script.display()))
+        .arg(format!("ssl0=tty:{terminal}"))
+        .args(["noreboot", "con=null", "con0=null,fd:1"])
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    String::from_utf8_lossy(&run.stdout).into_owned()
+}
+
+/// What runs in user-mode-linux.
+fn inside(interface: &str, folder: &Path) {
+    let log = std::fs::File::create(folder.join("candump.log")).unwrap();
+    let mut candump = Command::new("candump").args(["-L", interface]).stdout(log).spawn().unwrap();
+    let node = |number| NodeId::new(number).unwrap();
+    let mut pair = EmulatedPair::new(&drive(), node(1), node(2)).unwrap().standing();
+    let mut bus = SocketCanBus::open(interface).unwrap();
+    let mut receiver = PoseReceiver::new(controller());
+    let start = Instant::now();
+    let now = || Time::from_micros(1_000_000).offset(start.elapsed().as_secs_f64());
+    let mut poses: Vec<PublishedPose> = Vec::new();
+    let (mut told, mut begun): (Option<Instant>, Option<Instant>) = (None, None);
+    while begun.is_none_or(|begun| begun.elapsed() < Duration::from_secs(6)) {
+        assert!(start.elapsed() < Duration::from_secs(100), "{:?}", poses.last());
+        for frame in pair.poll(now()) {
+            send(&mut bus, &frame.into());
+        }
+        if let Some(frame) = bus.receive(Instant::now() + Duration::from_millis(2)).unwrap()
+            && let Some(frame) = frame.classic()
+        {
+            for answer in pair.handle(frame) {
+                send(&mut bus, &answer.into());
+            }
+            poses.extend(receiver.handle(frame));
+        }
+        let is_placed = poses.last().is_some_and(|pose| (pose.pose.x - START.x).abs() < 0.01);
+        if begun.is_none() && is_placed {
+            begun = Some(Instant::now());
+            pair.begin(now());
+        } else if begun.is_none()
+            && pair.are_operational()
+            && told.is_none_or(|told| told.elapsed() > Duration::from_secs(2))
+        {
+            told = Some(Instant::now());
+            cansend_pose(interface, (start.elapsed().as_secs() % 16) as u8);
+        }
+    }
+    let _ = candump.kill();
+    let _ = candump.wait();
+    let last = poses.last().unwrap().pose;
+    assert!((last.x - START.x).hypot(last.y - START.y) > 3.0, "{last:?}");
+    println!("1 passed inside, {} poses", poses.len());
+}
+
+/// Sends a frame; a queue that is full is no failure of the board.
+fn send(bus: &mut SocketCanBus, frame: &AnyFrame) {
+    for _ in 0..50 {
+        match bus.send(frame) {
+            Err(BusError::Io { .. }) => std::thread::sleep(Duration::from_millis(2)),
+            outcome => return outcome.unwrap(),
+        }
+    }
+}
+
+/// Tells the vehicle where it is, through `cansend`.
+fn cansend_pose(interface: &str, counter: u8) {
+    let Pose { x, y, theta } = START;
+    let contents = [
+        Content::InitialPosition { x, y },
+        Content::InitialHeading { heading: theta, position_deviation: 0.05, heading_deviation: 0.02 },
+    ];
+    for content in contents {
+        let frame = content.encode(controller(), counter).into();
+        let line = log_line(&SeenFrame { time: None, interface: interface.to_owned(), frame });
+        let frame = line.split_whitespace().last().unwrap();
+        assert!(Command::new("cansend").args([interface, frame]).status().unwrap().success());
+    }
+}
+
+/// The poses that `candump` has heard, as our DBC decodes them in another program, move as the encoders did.
+fn check_candump(log: &str) {
+    let mut positions = Vec::new();
+    let mut identifiers: BTreeMap<String, usize> = BTreeMap::new();
+    let mut text = String::new();
+    for line in log.lines() {
+        let Some(Line::Frame(_)) = parse_line(line) else { continue };
+        let frame = line.split_whitespace().last().unwrap();
+        let Some((identifier, _)) = frame.split_once('#') else { continue };
+        *identifiers.entry(identifier.to_owned()).or_default() += 1;
+        if identifier == "190" {
+            text.push_str(frame);
+            text.push('\n');
+        }
+    }
+    // Positions, headings, covariances and states of the controller; both encoders.
+    for identifier in ["190", "290", "390", "490", "181", "182"] {
+        assert!(identifiers.get(identifier).is_some_and(|count| *count > 100), "{identifiers:?}");
+    }
+    let inherited = std::env::var("PYTHONPATH").unwrap_or_default();
+    let mut python = Command::new("python3")
+        .env("PYTHONPATH", format!("{}:{inherited}", repository("target/python").display()))
+        .arg(repository("host-sim/tests/can/agv_description.py"))
+        .args([repository("docs/agv.dbc"), repository("docs/agv.eds")])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = python.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || input.write_all(text.as_bytes()));
+    let output = python.wait_with_output().unwrap();
+    let _ = writer.join();
+    if !output.status.success() && String::from_utf8_lossy(&output.stderr).contains("ModuleNotFoundError") {
+        return data::skip(NAME, "cantools is not there to decode what candump has heard");
+    }
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for line in String::from_utf8_lossy(&output.stdout).lines() {
+        let decoded: Value = serde_json::from_str(line).unwrap();
+        positions.push([&decoded["signals"]["X"], &decoded["signals"]["Y"]].map(|number| number.as_f64().unwrap()));
+    }
+    let placed: Vec<_> = positions.iter().filter(|[x, _]| *x > 1.0).collect();
+    let ([first_x, first_y], [last_x, last_y]) = (placed[0], placed[placed.len() - 1]);
+    assert!((first_x - START.x).abs() < 0.1 && (first_y - START.y).abs() < 0.1, "{first_x} {first_y}");
+    // Along the heading that it was told.
+    let heading = (last_y - first_y).atan2(last_x - first_x);
+    assert!((last_x - first_x).hypot(last_y - first_y) > 3.0 && (heading - START.theta).abs() < 0.1, "{heading}");
+}
