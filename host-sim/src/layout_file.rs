@@ -7,6 +7,7 @@
 use std::path::Path;
 use std::str::FromStr;
 
+use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
 
 use crate::text_file::{self, TextFileError};
@@ -122,4 +123,38 @@ pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
 pub fn save(path: &Path, landmarks: &[IdentifiedLandmark]) -> Result<(), TextFileError> {
     let text = write(landmarks, Format::of(path)?);
     std::fs::write(path, text).map_err(|source| TextFileError::of_system(path, source))
+}
+
+/// Standard deviation of a surveyed reflector's place along each axis, m.
+const SURVEY_DEVIATION: f32 = 0.005;
+
+/// The reflectors of a layout as the localiser's map has them.
+#[must_use]
+pub fn landmarks(layout: &[IdentifiedLandmark]) -> Vec<Landmark> {
+    let landmark = |entry: &IdentifiedLandmark| Landmark {
+        id: entry.id,
+        kind: LandmarkKind::Reflector,
+        x: entry.landmark.x.metres(),
+        y: entry.landmark.y.metres(),
+        deviation: SURVEY_DEVIATION,
+    };
+    layout.iter().map(landmark).collect()
+}
+
+/// The reflectors of a map as a layout has them: in whole millimetres, all of one size.
+#[must_use]
+pub fn layout(landmarks: &[Landmark]) -> Vec<IdentifiedLandmark> {
+    let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
+    let entry = |landmark: &Landmark| IdentifiedLandmark {
+        id: landmark.id,
+        landmark: LayoutLandmark {
+            x: Coordinate::from_metres(landmark.x),
+            y: Coordinate::from_metres(landmark.y),
+            kind: 1,
+            subtype: 2,
+            size: Size(80),
+            layers: [0].into_iter().collect(),
+        },
+    };
+    reflectors.map(entry).collect()
 }

@@ -35,6 +35,13 @@ impl Ekf {
         Self { pose, covariance: Matrix3::from_diagonal(&nalgebra::Vector3::new(position, position, heading)) }
     }
 
+    /// The covariance as outputs state it: xx, xy, yy, x-heading, y-heading, heading-heading; m^2, m rad, rad^2.
+    #[must_use]
+    pub fn covariance_entries(&self) -> [f64; 6] {
+        let covariance = &self.covariance;
+        [covariance.m11, covariance.m12, covariance.m22, covariance.m13, covariance.m23, covariance.m33]
+    }
+
     /// Prediction, K 5.3 and 5.4: `F P F' + G Q G'`, written out, as `F` differs from identity in two places and `G`
     /// turns by the heading.
     pub fn predict(&mut self, motion: &Motion) {

@@ -405,18 +405,10 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             (None, None, false, true) => (Mode::Features, Reason::None),
             (None, None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
         };
-        let covariance = &state.covariance;
         self.outputs.pose = PoseOutput {
             time: timeline.now(),
             pose: state.pose,
-            covariance: [
-                covariance.m11,
-                covariance.m12,
-                covariance.m22,
-                covariance.m13,
-                covariance.m23,
-                covariance.m33,
-            ],
+            covariance: state.covariance_entries(),
             mode,
             reason,
             dead_reckoning_distance: distance.any(),

@@ -91,7 +91,6 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         let base = self.base?;
         let newest = self.motions.back().filter(|motion| motion.end > base.time);
         let way: f64 = self.motions.iter().filter(|motion| motion.end > base.time).map(|motion| motion.distance).sum();
-        let covariance = &self.state.covariance;
         let is_localised = !matches!(base.mode, Mode::NotLocalised | Mode::Lost);
         let (mode, reason) = match (is_localised, self.faults.drive, self.faults.steering) {
             (true, Some(_), _) => (Mode::WithoutOdometry, Reason::DriveEncoder),
@@ -101,14 +100,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         Some(PoseOutput {
             time: newest.map_or(base.time, |motion| motion.end),
             pose: self.state.pose,
-            covariance: [
-                covariance.m11,
-                covariance.m12,
-                covariance.m22,
-                covariance.m13,
-                covariance.m23,
-                covariance.m33,
-            ],
+            covariance: self.state.covariance_entries(),
             mode,
             reason,
             dead_reckoning_distance: base.dead_reckoning_distance + way,

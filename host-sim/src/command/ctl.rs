@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, Setting};
 use agv_settings::leaf::Value;
@@ -109,38 +107,6 @@ enum MapAction {
     },
 }
 
-/// Standard deviation of a surveyed reflector's place along each axis, m.
-const SURVEY_DEVIATION: f32 = 0.005;
-
-/// The reflectors of a layout as the localiser's map has them.
-pub fn map_of_layout(layout: &[IdentifiedLandmark]) -> Vec<Landmark> {
-    let landmark = |entry: &IdentifiedLandmark| Landmark {
-        id: entry.id,
-        kind: LandmarkKind::Reflector,
-        x: entry.landmark.x.metres(),
-        y: entry.landmark.y.metres(),
-        deviation: SURVEY_DEVIATION,
-    };
-    layout.iter().map(landmark).collect()
-}
-
-/// The reflectors of a map as a layout has them: in whole millimetres, all of one size.
-fn layout_of_map(landmarks: &[Landmark]) -> Vec<IdentifiedLandmark> {
-    let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
-    let entry = |landmark: &Landmark| IdentifiedLandmark {
-        id: landmark.id,
-        landmark: LayoutLandmark {
-            x: Coordinate::from_metres(landmark.x),
-            y: Coordinate::from_metres(landmark.y),
-            kind: 1,
-            subtype: 2,
-            size: Size(80),
-            layers: [0].into_iter().collect(),
-        },
-    };
-    reflectors.map(entry).collect()
-}
-
 /// The key in a file: 64 hexadecimal digits.
 pub fn read_key(path: &Path) -> anyhow::Result<[u8; 32]> {
     let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
@@ -231,7 +197,7 @@ impl Ctl {
             }
             Action::Store => client.store()?,
             Action::Map { action: MapAction::Upload { file } } => {
-                let landmarks = map_of_layout(&layout_file::load(file)?);
+                let landmarks = layout_file::landmarks(&layout_file::load(file)?);
                 let progress = ProgressBar::new(landmarks.len() as u64);
                 client.upload_map(&landmarks, |count| progress.inc(count as u64))?;
                 progress.finish_and_clear();
@@ -240,7 +206,7 @@ impl Ctl {
             Action::Map { action: MapAction::Download { file } } => {
                 layout_file::Format::of(file)?;
                 let landmarks = client.download_map()?;
-                layout_file::save(file, &layout_of_map(&landmarks))?;
+                layout_file::save(file, &layout_file::layout(&landmarks))?;
                 self.print(&[["landmarks".to_owned(), landmarks.len().to_string()]])?;
             }
             Action::SetPose { x, y, theta, position_deviation, heading_deviation } => {

@@ -8,7 +8,7 @@ use agv_settings::Settings;
 use agv_settings::leaf::{Leaf, LeafError};
 use anyhow::{Context, bail};
 
-use super::ctl::{map_of_layout, parse_value, read_key};
+use super::ctl::{parse_value, read_key};
 
 const HELP: &str = "\
 The image is for the last two pages of the controller's flash, 0x081C0000 on the STM32H743:
@@ -51,7 +51,7 @@ impl Provision {
             None => (Settings::default(), Vec::new()),
         };
         if let Some(map) = &self.map {
-            landmarks = map_of_layout(&layout_file::load(map)?);
+            landmarks = layout_file::landmarks(&layout_file::load(map)?);
         }
         for text in &self.settings {
             let (name, value) = text.split_once('=').with_context(|| format!("{text} is not NAME=VALUE"))?;

@@ -22,6 +22,7 @@ use agv_core::wire::nav350::{
     Setting, Size, SpeedReport, UserLevel, Value, Variable,
 };
 
+use crate::layout_file;
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 
 /// What the sensor measured in one turn.
@@ -108,22 +109,7 @@ impl Drive {
             let truth = recording.truth.get(index.saturating_sub(1));
             turn.pose = truth.map(|truth| truth.pose.compose(&recording.parameters.laser));
         }
-        let layout = recording
-            .landmarks
-            .iter()
-            .filter(|landmark| landmark.kind == LandmarkKind::Reflector)
-            .map(|landmark| IdentifiedLandmark {
-                id: landmark.id,
-                landmark: LayoutLandmark {
-                    x: Coordinate::from_metres(landmark.x),
-                    y: Coordinate::from_metres(landmark.y),
-                    kind: 1,
-                    subtype: 2,
-                    size: Size(80),
-                    layers: [0].into_iter().collect(),
-                },
-            })
-            .collect();
+        let layout = layout_file::layout(&recording.landmarks);
         if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, layout, frame }) }
     }
 
