@@ -11,15 +11,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::LandmarkKind;
 use agv_core::measurement::{ReflectorObservation, Time};
 use agv_core::wire::cola::{CommandWord, Deframed, Deframer, Dialect, Fault, Raw, Sequence, Telegram, Text};
 use agv_core::wire::nav350::{
     Angle, Answer, Channel, ChannelName, Coordinate, CoordinateFormat, DeviceTime, Distance, ErrorCode,
-    IdentifiedLandmark, LandmarkData, LandmarkDataFormat, LayoutLandmark, MapConfiguration, Method, MethodName,
-    MethodResult, Milliangle, NavigationData, OperatingMode, PoseAnswer, PoseDataFormat, PoseDetails, PoseReport,
-    PositionMode, Reflector, ReflectorDetails, ReflectorList, ReflectorType, Request, ScanDataFormat, SensorFrame,
-    Setting, Size, SpeedReport, UserLevel, Value, Variable,
+    IdentifiedLandmark, LandmarkData, LandmarkDataFormat, MapConfiguration, Method, MethodName, MethodResult,
+    Milliangle, NavigationData, OperatingMode, PoseAnswer, PoseDataFormat, PoseDetails, PoseReport, PositionMode,
+    Reflector, ReflectorDetails, ReflectorList, ReflectorType, Request, ScanDataFormat, SensorFrame, Setting, Size,
+    SpeedReport, UserLevel, Value, Variable,
 };
 
 use crate::layout_file;
