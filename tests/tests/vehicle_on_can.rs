@@ -70,21 +70,30 @@ fn the_board_is_a_node_of_a_real_bus() {
     let recording = drive();
     let flash = flash_image(&settings_like(&recording, 2112), &recording.landmarks, None).unwrap();
     std::fs::write(folder.path().join("flash.bin"), flash).unwrap();
-    let (mut board, terminal) = start_board(&image, folder.path());
+    let (board, terminal) = start_board(&image, folder.path());
     assert!(Command::new("stty").args(["-F", &terminal, "raw", "-echo"]).status().unwrap().success());
     let report = in_user_mode_linux(&terminal, folder.path());
-    let _ = board.kill();
-    let _ = board.wait();
+    drop(board);
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap_or_default();
     assert_eq!(read("status").trim(), "0", "{report}\n{}", read("output"));
     check_candump(&read("candump.log"));
 }
 
+/// The emulator, which ends with this value.
+struct Board(Child);
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// The board with its serial line on a pseudo terminal, and the name of that.
-fn start_board(image: &Path, folder: &Path) -> (Child, String) {
+fn start_board(image: &Path, folder: &Path) -> (Board, String) {
     let said = folder.join("qemu.txt");
     let file = std::fs::File::create(&said).unwrap();
-    let board = Command::new("qemu-system-arm")
+    let child = Command::new("qemu-system-arm")
         .args(["-M", "mps2-an500", "-display", "none", "-monitor", "none", "-serial", "pty"])
         .args(["-nic", "user,model=lan9118", "-semihosting-config", "enable=on,target=native", "-kernel"])
         .arg(image)
@@ -94,6 +103,7 @@ fn start_board(image: &Path, folder: &Path) -> (Child, String) {
         .stderr(file)
         .spawn()
         .unwrap();
+    let board = Board(child);
     let start = Instant::now();
     loop {
         let text = String::from_utf8_lossy(&std::fs::read(&said).unwrap()).into_owned();
