@@ -80,6 +80,8 @@ pub struct BusTrouble {
     pub is_drive_silent: AtomicBool,
     /// Of so many frames to the controller one has a wrong bit; none if 0.
     pub corrupted_in: AtomicU32,
+    /// Whether somebody is about to tell the vehicle where it is; off again when that was done.
+    pub is_pose_told: AtomicBool,
 }
 
 /// How a drive is emulated.
@@ -331,6 +333,12 @@ impl Stage<'_> {
                 self.hear(frame, controller, &mut receiver);
             }
             if end.is_some() {
+                if self.trouble.is_pose_told.swap(false, Ordering::Relaxed) {
+                    orders = (orders + 1) % 16;
+                    for frame in self.initial_pose(controller, orders) {
+                        bus.send(&frame.into()).map_err(BoardError::from)?;
+                    }
+                }
                 continue;
             }
             let is_localised = self.mode().is_some_and(|mode| mode == Mode::Reflectors || mode == Mode::Mixed);
@@ -409,7 +417,8 @@ impl Stage<'_> {
     }
 
     fn initial_pose(&self, controller: NodeId, counter: u8) -> [agv_core::wire::can::frame::Frame; 2] {
-        let Pose { x, y, theta } = truth_at(&self.recording.truth, self.first).unwrap_or_default();
+        let driven = self.heard().begin.map_or(0.0, |begin| begin.elapsed().as_secs_f64());
+        let Pose { x, y, theta } = truth_at(&self.recording.truth, self.first.offset(driven)).unwrap_or_default();
         let [position_deviation, heading_deviation] = START_DEVIATIONS;
         [
             Content::InitialPosition { x, y },
