@@ -1,0 +1,1 @@
+//! Intrinsic calibration from scans of planes (M chapter 3).

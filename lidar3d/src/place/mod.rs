@@ -1,0 +1,1 @@
+//! Places recognised from signatures.
