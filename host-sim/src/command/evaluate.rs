@@ -2,6 +2,7 @@
 
 mod carpark;
 mod falko;
+mod lidar3d_calibration;
 mod warehouse;
 
 /// Measure on recordings and in simulation how good it is.
@@ -15,6 +16,7 @@ pub struct Evaluate {
 enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -24,6 +26,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

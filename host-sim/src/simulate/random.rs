@@ -26,6 +26,10 @@ pub enum Stream {
     Survey = 9,
     /// Error of the start pose.
     Start = 10,
+    /// In what the believed parameters of a multi-beam lidar differ from the true ones.
+    LaserParameters = 11,
+    /// Noise of a multi-beam lidar's distances.
+    MultiBeam = 12,
 }
 
 /// One sequence of random numbers.

@@ -82,11 +82,8 @@ pub fn calibrate(start: &[Laser], offsets: Offsets, targets: &[Target]) -> Resul
     let mut planes: Vec<Plane> = targets.iter().map(|target| target.plane).collect();
     for round in 1..=ROUNDS {
         let noise = noise(&lasers, offsets, targets, &planes);
-        let sums: Vec<PlaneSums> = targets
-            .iter()
-            .zip(&planes)
-            .map(|(target, plane)| sums(&lasers, offsets, target, plane, noise))
-            .collect();
+        let sums: Vec<PlaneSums> =
+            targets.iter().zip(&planes).map(|(target, plane)| sums(&lasers, offsets, target, plane, noise)).collect();
         let shift = lasers.iter().zip(start).zip(&is_observed).filter(|(_, is_observed)| **is_observed);
         let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
         let observed = is_observed.iter().filter(|is_observed| **is_observed).count();

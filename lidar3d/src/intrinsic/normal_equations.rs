@@ -49,9 +49,11 @@ impl PlaneSums {
 
     /// The plane's own step, given the steps of the lasers; None if its points do not span it.
     pub(super) fn plane_step(&self, steps: &[Vector3<f64>]) -> Option<Vector3<f64>> {
-        let moved = self.by_laser.iter().zip(steps).fold(self.plane_gradient, |gradient, (shared, step)| {
-            gradient + shared.mixed.transpose() * step
-        });
+        let moved = self
+            .by_laser
+            .iter()
+            .zip(steps)
+            .fold(self.plane_gradient, |gradient, (shared, step)| gradient + shared.mixed.transpose() * step);
         Some(-(self.plane.try_inverse()? * moved))
     }
 }
@@ -71,7 +73,8 @@ impl LaserEquations {
         let (mut matrix, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for sums in planes {
             let Some(inverse) = sums.plane.try_inverse() else { continue };
-            let seen: Vec<usize> = (0..is_observed.len()).filter(|laser| sums.by_laser[*laser].laser.trace() > 0.0).collect();
+            let seen: Vec<usize> =
+                (0..is_observed.len()).filter(|laser| sums.by_laser[*laser].laser.trace() > 0.0).collect();
             for row in &seen {
                 let shared = &sums.by_laser[*row];
                 let carried = shared.mixed * inverse;

@@ -30,9 +30,9 @@ impl Plane {
     /// points.
     #[must_use]
     pub fn fit(points: impl Iterator<Item = [f64; 3]> + Clone) -> Option<Self> {
-        let (count, sum) = points.clone().fold((0_usize, Vector3::zeros()), |(count, sum), point| {
-            (count + 1, sum + Vector3::from(point))
-        });
+        let (count, sum) = points
+            .clone()
+            .fold((0_usize, Vector3::zeros()), |(count, sum), point| (count + 1, sum + Vector3::from(point)));
         if count < 3 {
             return None;
         }

@@ -86,6 +86,7 @@ fn most_voted(
             best = (Some(plane), votes);
         }
     }
-    let near = |plane: &Plane| Plane::fit(voters.iter().copied().filter(|voter| plane.distance_of(*voter).abs() < VOTE));
+    let near =
+        |plane: &Plane| Plane::fit(voters.iter().copied().filter(|voter| plane.distance_of(*voter).abs() < VOTE));
     (best.0.and_then(|plane| near(&plane)), best.1)
 }
