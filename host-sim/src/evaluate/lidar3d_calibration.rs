@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
-use agv_lidar3d::intrinsic::{self, Deviation, Return, Target};
+use agv_lidar3d::intrinsic::{self, Deviation, Residual, Return, Target};
 use anyhow::Context;
 use serde::Serialize;
 
@@ -17,7 +17,7 @@ use crate::simulate::random::{Random, Stream};
 const DISTANCES: [f64; 9] = [3.0, 5.0, 6.7, 8.5, 10.0, 12.5, 15.0, 18.5, 22.0];
 const HELD_OUT: f64 = 26.0;
 /// Upwards turn and roll of the sensor at each distance, deg.
-const TILTS: [[f64; 2]; 5] = [[0.0, 3.0], [6.0, -6.0], [12.0, 6.0], [18.0, -3.0], [24.0, 0.0]];
+const TILTS: [[f64; 2]; 5] = [[0.0, 3.0], [9.0, -6.0], [18.0, 6.0], [27.0, -3.0], [36.0, 0.0]];
 /// The sensor's forward axis is within this angle of the wall's normal, deg.
 const HEADING: f64 = 15.0;
 /// Standard deviation of a distance, m.
@@ -75,7 +75,7 @@ pub struct Outcome {
 ///
 /// # Errors
 /// If the file cannot be read, or its lasers cannot be calibrated.
-pub fn run(path: &Path, offsets: Offsets, seed: u64) -> anyhow::Result<Outcome> {
+pub fn run(path: &Path, offsets: Offsets, residual: Residual, seed: u64) -> anyhow::Result<Outcome> {
     let name = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
     let calibration = Calibration::read(&text).with_context(|| format!("{name}"))?;
@@ -89,7 +89,7 @@ pub fn run(path: &Path, offsets: Offsets, seed: u64) -> anyhow::Result<Outcome> 
 
     let began = Instant::now();
     let used = targets(&start, offsets, &used)?;
-    let found = intrinsic::calibrate(&start, offsets, &used).with_context(|| format!("{name}"))?;
+    let found = intrinsic::calibrate(&start, offsets, residual, &used).with_context(|| format!("{name}"))?;
     let seconds = began.elapsed().as_secs_f64();
     let held_out = targets(&start, offsets, &held_out)?;
 

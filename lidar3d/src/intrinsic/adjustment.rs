@@ -9,7 +9,7 @@ use std::vec::Vec;
 use nalgebra::{Matrix3, Vector3};
 
 use super::normal_equations::{LaserEquations, PlaneSums};
-use super::{Plane, Target};
+use super::{Plane, Return, Target};
 use crate::calibration::Laser;
 use crate::geometry::{Offsets, jacobian};
 
@@ -17,13 +17,26 @@ use crate::geometry::{Offsets, jacobian};
 const ROUNDS: usize = 40;
 /// A laser with fewer points is held where it is.
 const LEAST_POINTS: usize = 100;
-/// Points count less from here on, and not at all from here on, in deviations of the noise (Huber; truncated).
-const LESS: f64 = 1.5;
-const CUT: f64 = 4.0;
+/// From here on points do not count, in deviations of the noise (Tukey's biweight, 95 % as efficient as least squares).
+const CUT: f64 = 4.685;
 /// The median of an absolute normal deviate.
 const MEDIAN_DEVIATE: f64 = 0.6745;
-/// Steps below these end it: m, rad, rad.
-const SMALL: [f64; 3] = [1e-6, 1e-8, 1e-8];
+/// Steps below this part of a parameter's standard deviation end it.
+const SMALL: f64 = 0.01;
+
+/// What is made small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Residual {
+    /// From the point to the plane along the beam, where the noise is: unbiased.
+    #[default]
+    AlongBeam,
+    /// From the point to the plane at right angles (M 3.7). As the noise of a point then depends on the angle at which its
+    /// beam meets the plane, the least sum is not at the true parameters, but where beams look more oblique.
+    Perpendicular,
+}
+
+/// Beams that meet their plane at less than about 6 deg are left out: sine of it.
+const MOST_OBLIQUE: f64 = 0.1;
 
 /// Why there is no calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -57,7 +70,7 @@ pub struct Adjustment {
     pub lasers: Vec<Laser>,
     /// How well each is known; None for a laser that was not observed.
     pub deviations: Vec<Option<Deviation>>,
-    /// Standard deviation of a point from its plane, m.
+    /// Standard deviation of the residuals, m.
     pub noise: f64,
     /// Rounds that it took.
     pub rounds: usize,
@@ -67,7 +80,12 @@ pub struct Adjustment {
 ///
 /// # Errors
 /// See [`AdjustmentError`].
-pub fn calibrate(start: &[Laser], offsets: Offsets, targets: &[Target]) -> Result<Adjustment, AdjustmentError> {
+pub fn calibrate(
+    start: &[Laser],
+    offsets: Offsets,
+    residual: Residual,
+    targets: &[Target],
+) -> Result<Adjustment, AdjustmentError> {
     let mut points = vec![0_usize; start.len()];
     for seen in targets.iter().flat_map(|target| &target.returns) {
         if let Some(count) = points.get_mut(seen.laser) {
@@ -81,9 +99,12 @@ pub fn calibrate(start: &[Laser], offsets: Offsets, targets: &[Target]) -> Resul
     let mut lasers = start.to_vec();
     let mut planes: Vec<Plane> = targets.iter().map(|target| target.plane).collect();
     for round in 1..=ROUNDS {
-        let noise = noise(&lasers, offsets, targets, &planes);
-        let sums: Vec<PlaneSums> =
-            targets.iter().zip(&planes).map(|(target, plane)| sums(&lasers, offsets, target, plane, noise)).collect();
+        let noise = noise(&lasers, offsets, residual, targets, &planes);
+        let sums: Vec<PlaneSums> = targets
+            .iter()
+            .zip(&planes)
+            .map(|(target, plane)| sums(&lasers, offsets, residual, target, plane, noise))
+            .collect();
         let shift = lasers.iter().zip(start).zip(&is_observed).filter(|(_, is_observed)| **is_observed);
         let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
         let observed = is_observed.iter().filter(|is_observed| **is_observed).count();
@@ -98,10 +119,11 @@ pub fn calibrate(start: &[Laser], offsets: Offsets, targets: &[Target]) -> Resul
             let step = sums.plane_step(&steps).ok_or(AdjustmentError::Undetermined)?;
             *plane = plane.moved(step.into());
         }
-        let is_small = |step: &Vector3<f64>| step.iter().zip(SMALL).all(|(value, small)| value.abs() < small);
-        if steps.iter().all(is_small) {
-            let deviations = variances.iter().zip(&is_observed).map(|(variance, is_observed)| {
-                let [distance, elevation, rotation] = (variance.map(libm::sqrt) * noise).into();
+        let deviations: Vec<Vector3<f64>> = variances.iter().map(|variance| variance.map(libm::sqrt) * noise).collect();
+        let mut pairs = steps.iter().flatten().zip(deviations.iter().flatten());
+        if pairs.all(|(step, deviation)| step.abs() < SMALL * deviation) {
+            let deviations = deviations.iter().zip(&is_observed).map(|(deviation, is_observed)| {
+                let [distance, elevation, rotation] = (*deviation).into();
                 is_observed.then_some(Deviation { distance, elevation, rotation })
             });
             return Ok(Adjustment { deviations: deviations.collect(), lasers, noise, rounds: round });
@@ -110,36 +132,78 @@ pub fn calibrate(start: &[Laser], offsets: Offsets, targets: &[Target]) -> Resul
     Err(AdjustmentError::Unsettled)
 }
 
-/// Standard deviation of the points from their planes, by the median, m.
-fn noise(lasers: &[Laser], offsets: Offsets, targets: &[Target], planes: &[Plane]) -> f64 {
+/// Where a return lies to its plane.
+struct Sight {
+    /// From the plane, m.
+    residual: f64,
+    /// The residual's derivatives by D_corr, theta and alpha.
+    by_laser: Vector3<f64>,
+    /// The same by the normal itself.
+    by_normal: Vector3<f64>,
+    /// The same by the plane's distance.
+    by_distance: f64,
+}
+
+impl Sight {
+    /// None if there is no such laser, or the beam only grazes the plane.
+    fn new(lasers: &[Laser], offsets: Offsets, kind: Residual, seen: &Return, plane: &Plane) -> Option<Self> {
+        let laser = lasers.get(seen.laser)?;
+        let normal = Vector3::from(plane.normal);
+        // Its columns are the rows of the Jacobian.
+        let derivatives = |distance| Matrix3::from(jacobian(laser, offsets, seen.azimuth, distance));
+        let at = derivatives(seen.distance);
+        let perpendicular = plane.distance_of(seen.point(lasers, offsets)?);
+        let point = Vector3::from(seen.point(lasers, offsets)?);
+        match kind {
+            Residual::Perpendicular => {
+                Some(Self { residual: perpendicular, by_laser: at * normal, by_normal: point, by_distance: -1.0 })
+            }
+            Residual::AlongBeam => {
+                let beam = at.row(0).transpose();
+                let incidence = beam.dot(&normal);
+                if incidence.abs() < MOST_OBLIQUE {
+                    return None;
+                }
+                // Where the beam meets the plane: derivatives there do not carry the noise of the distance.
+                let residual = perpendicular / incidence;
+                Some(Self {
+                    residual,
+                    by_laser: derivatives(seen.distance - residual) * normal / incidence,
+                    by_normal: (point - beam * residual) / incidence,
+                    by_distance: -1.0 / incidence,
+                })
+            }
+        }
+    }
+}
+
+/// Standard deviation of the residuals, by the median, m.
+fn noise(lasers: &[Laser], offsets: Offsets, kind: Residual, targets: &[Target], planes: &[Plane]) -> f64 {
     let residuals = targets.iter().zip(planes).flat_map(|(target, plane)| {
-        let points = target.returns.iter().filter_map(|seen| seen.point(lasers, offsets));
-        points.map(|point| plane.distance_of(point).abs())
+        let sights = target.returns.iter().filter_map(|seen| Sight::new(lasers, offsets, kind, seen, plane));
+        sights.map(|sight| sight.residual.abs())
     });
     let mut residuals: Vec<f64> = residuals.collect();
+    if residuals.is_empty() {
+        return f64::INFINITY;
+    }
     let middle = residuals.len() / 2;
     let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
     (*median / MEDIAN_DEVIATE).max(1e-6)
 }
 
-fn sums(lasers: &[Laser], offsets: Offsets, target: &Target, plane: &Plane, noise: f64) -> PlaneSums {
+fn sums(lasers: &[Laser], offsets: Offsets, kind: Residual, target: &Target, plane: &Plane, noise: f64) -> PlaneSums {
     let mut sums = PlaneSums::new(lasers.len());
-    let normal = Vector3::from(plane.normal);
     let [first, second] = plane.directions();
     for seen in &target.returns {
-        let Some(laser) = lasers.get(seen.laser) else { continue };
-        let Some(point) = seen.point(lasers, offsets) else { continue };
-        let residual = plane.distance_of(point);
-        let deviate = residual.abs() / noise;
+        let Some(sight) = Sight::new(lasers, offsets, kind, seen, plane) else { continue };
+        let deviate = sight.residual.abs() / noise;
         if deviate > CUT {
             continue;
         }
-        let weight = (LESS / deviate).min(1.0);
-        // Of arrays of columns, nalgebra makes the transpose of what the array of rows means.
-        let derivatives = Matrix3::from(jacobian(laser, offsets, seen.azimuth, seen.distance));
-        let point = Vector3::from(point);
-        let by_plane = Vector3::new(first.dot(&point), second.dot(&point), -1.0);
-        sums.add(seen.laser, derivatives * normal, by_plane, residual, weight);
+        let by_plane = Vector3::new(first.dot(&sight.by_normal), second.dot(&sight.by_normal), sight.by_distance);
+        let weight = (1.0 - (deviate / CUT).powi(2)).powi(2);
+        sums.add(seen.laser, sight.by_laser, by_plane, sight.residual, weight);
     }
     sums
 }

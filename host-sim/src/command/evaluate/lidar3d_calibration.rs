@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use agv_host_sim::data;
 use agv_host_sim::evaluate::lidar3d_calibration;
-use agv_lidar3d::geometry;
+use agv_lidar3d::{geometry, intrinsic};
 use anyhow::Context;
 
 use crate::command::progress;
@@ -35,6 +35,9 @@ pub struct Lidar3dCalibration {
     /// How the offsets of a beam are measured.
     #[arg(long, default_value = "orthogonal")]
     offsets: Offsets,
+    /// What the adjustment makes small.
+    #[arg(long, default_value = "along-beam")]
+    residual: Residual,
     /// Seed of noise and disturbance.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -49,12 +52,24 @@ enum Offsets {
     Alternate,
 }
 
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Residual {
+    /// Distance to the plane along the beam.
+    AlongBeam,
+    /// Distance to the plane at right angles (thesis M, equation 3.7).
+    Perpendicular,
+}
+
 impl Lidar3dCalibration {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let offsets = match self.offsets {
             Offsets::Orthogonal => geometry::Offsets::Orthogonal,
             Offsets::Alternate => geometry::Offsets::Alternate,
+        };
+        let residual = match self.residual {
+            Residual::AlongBeam => intrinsic::Residual::AlongBeam,
+            Residual::Perpendicular => intrinsic::Residual::Perpendicular,
         };
         let truths = if self.truth.is_empty() {
             let folder = data::folder().context("no folder of real data: set AGV_DATA, or name a file with --truth")?;
@@ -65,7 +80,7 @@ impl Lidar3dCalibration {
         let bar = progress::bar("calibrations", truths.len() as u64);
         let mut outcomes = Vec::new();
         for truth in truths {
-            outcomes.push(lidar3d_calibration::run(&truth, offsets, self.seed)?);
+            outcomes.push(lidar3d_calibration::run(&truth, offsets, residual, self.seed)?);
             bar.inc(1);
         }
         bar.finish_and_clear();
