@@ -3,14 +3,17 @@
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::{
-    BLOCKS, Decoder, Filter, LENGTH, Packet, PacketError, RETURNS, Return, STATUS_CYCLE, Sensor, Tail, calibration_from_stream,
+    BLOCKS, Decoder, Filter, LENGTH, Packet, PacketError, RETURNS, Return, STATUS_CYCLE, Sensor, Tail,
+    calibration_from_stream,
 };
 use proptest::prelude::*;
 
 fn packet_of(seen: impl Fn(usize, usize) -> u16, tail: Tail) -> [u8; LENGTH] {
     let blocks = std::array::from_fn::<_, BLOCKS, _>(|block| {
-        let returns =
-            std::array::from_fn::<_, RETURNS, _>(|place| Return { distance: seen(block, place), intensity: place as u8 });
+        let returns = std::array::from_fn::<_, RETURNS, _>(|place| Return {
+            distance: seen(block, place),
+            intensity: place as u8,
+        });
         (block % 2 == 1, 100 * block as u16, returns)
     });
     Packet::write(&blocks, tail)
@@ -66,7 +69,10 @@ fn false_returns_are_counted_by_kind() {
     let mut seen = Vec::new();
     decoder.packet(&Packet::new(&bytes).unwrap(), |point| seen.push(point));
     let tally = decoder.tally();
-    assert_eq!([tally.points, tally.empty, tally.near, tally.far, tally.unused], [96; 4].into_iter().chain([0]).collect::<Vec<_>>()[..]);
+    assert_eq!(
+        [tally.points, tally.empty, tally.near, tally.far, tally.unused],
+        [96; 4].into_iter().chain([0]).collect::<Vec<_>>()[..]
+    );
     // Odd blocks are of the lower lasers.
     assert!(seen.iter().any(|point| point.laser == 34) && seen.iter().any(|point| point.laser == 2));
 }

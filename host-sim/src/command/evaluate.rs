@@ -2,6 +2,7 @@
 
 mod carpark;
 mod falko;
+mod lidar3d_places;
 mod warehouse;
 
 /// Measure on recordings and in simulation how good it is.
@@ -15,6 +16,7 @@ pub struct Evaluate {
 enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -24,6 +26,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

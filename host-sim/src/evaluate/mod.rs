@@ -5,5 +5,6 @@ pub mod carpark;
 pub mod demonstration;
 pub mod drive;
 pub mod falko;
+pub mod lidar3d_places;
 pub mod repeatability;
 pub mod warehouse;

@@ -19,7 +19,8 @@ pub(super) fn read(text: &str) -> Result<Calibration, CalibrationError> {
     let points = child(db, "points_").ok_or_else(|| foreign("there is no element points_"))?;
     let resolution = number(db, "distLSB_").ok_or_else(|| foreign("there is no distLSB_"))?;
     let list = |name| {
-        let items = child(db, name).into_iter().flat_map(|list| list.children().filter(|node| node.has_tag_name("item")));
+        let items =
+            child(db, name).into_iter().flat_map(|list| list.children().filter(|node| node.has_tag_name("item")));
         items.map(|item| item.text().and_then(|text| text.trim().parse::<f64>().ok())).collect::<Vec<_>>()
     };
     let (enabled, least, most) = (list("enabled_"), list("minIntensity_"), list("maxIntensity_"));
@@ -103,7 +104,8 @@ pub(super) fn write(calibration: &Calibration) -> String {
             values.push(("focalDistance_", full.focal_distance / CENTIMETRE));
             values.push(("focalSlope_", full.focal_slope));
         }
-        let class = if id == 0 { "class_id=\"9\" tracking_level=\"1\" version=\"1\"" } else { "class_id_reference=\"9\"" };
+        let class =
+            if id == 0 { "class_id=\"9\" tracking_level=\"1\" version=\"1\"" } else { "class_id_reference=\"9\"" };
         let _ = writeln!(text, "\t\t<item>\n\t\t\t<px {class} object_id=\"_{}\">", id + 1);
         let _ = writeln!(text, "\t\t\t\t<id_>{id}</id_>");
         for (name, value) in values {

@@ -48,9 +48,10 @@ struct Entry {
 }
 
 pub(super) fn read(text: &str) -> Result<Calibration, CalibrationError> {
-    let file: File = serde_yaml_ng::from_str(text)
-        .map_err(|error| CalibrationError::Foreign { reason: error.to_string() })?;
-    if let Some((place, entry)) = file.lasers.iter().enumerate().find(|(place, entry)| entry.laser_id != *place as i64) {
+    let file: File =
+        serde_yaml_ng::from_str(text).map_err(|error| CalibrationError::Foreign { reason: error.to_string() })?;
+    if let Some((place, entry)) = file.lasers.iter().enumerate().find(|(place, entry)| entry.laser_id != *place as i64)
+    {
         return Err(CalibrationError::Numbers { place, found: entry.laser_id });
     }
     let found = file.lasers.len();

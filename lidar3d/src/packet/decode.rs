@@ -146,9 +146,12 @@ impl<'a> Decoder<'a> {
                     turned = at;
                     (sin_head, cos_head) = head(at);
                 }
-                let position = if beam.has_two_points && let Some(laser) = self.lasers.get(laser) {
+                let position = if beam.has_two_points
+                    && let Some(laser) = self.lasers.get(laser)
+                {
                     let angle = f64::from(at) * (core::f64::consts::TAU / f64::from(TURN));
-                    geometry::point_with_two_points(laser, self.offsets, angle, f64::from(measured)).map(|value| value as f32)
+                    geometry::point_with_two_points(laser, self.offsets, angle, f64::from(measured))
+                        .map(|value| value as f32)
                 } else {
                     let forward = beam.forward[0] + beam.forward[1] * distance;
                     let sin = sin_head * beam.cos_rotation - cos_head * beam.sin_rotation;

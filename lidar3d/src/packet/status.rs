@@ -15,7 +15,9 @@ impl Tail {
     #[must_use]
     pub fn early(self) -> Option<(u16, [u8; 4])> {
         let [low, high, text @ ..] = self.0;
-        text.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ').then_some((u16::from_le_bytes([low, high]), text))
+        text.iter()
+            .all(|byte| byte.is_ascii_graphic() || *byte == b' ')
+            .then_some((u16::from_le_bytes([low, high]), text))
     }
 
     /// In the later dialect: time past the hour, microseconds; a time of an hour or more is none.

@@ -76,10 +76,9 @@ impl<'a> Block<'a> {
     /// The returns in the order in which they stand.
     pub fn returns(&self) -> impl Iterator<Item = Return> + use<'a> {
         let (triples, _) = self.bytes[4..].as_chunks::<3>();
-        triples.iter().map(|[low, high, intensity]| Return {
-            distance: u16::from_le_bytes([*low, *high]),
-            intensity: *intensity,
-        })
+        triples
+            .iter()
+            .map(|[low, high, intensity]| Return { distance: u16::from_le_bytes([*low, *high]), intensity: *intensity })
     }
 }
 
