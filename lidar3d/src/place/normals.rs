@@ -20,7 +20,7 @@ pub struct Neighbours {
 
 impl Default for Neighbours {
     fn default() -> Self {
-        Self { angle: 0.9_f32.to_radians(), rings: 2, reach: 1.5, near: 3.0, far: 50.0 }
+        Self { angle: 2.07_f32.to_radians(), rings: 2, reach: 3.0, near: 3.0, far: 50.0 }
     }
 }
 
