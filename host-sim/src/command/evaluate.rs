@@ -2,6 +2,7 @@
 
 mod carpark;
 mod falko;
+mod lidar3d_calibration;
 mod lidar3d_places;
 mod warehouse;
 
@@ -16,6 +17,7 @@ pub struct Evaluate {
 enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
+    Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Warehouse(warehouse::Warehouse),
 }
@@ -26,6 +28,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
+            Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }

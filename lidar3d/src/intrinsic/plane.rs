@@ -22,7 +22,8 @@ impl Plane {
 /// The plane with the least sum of squared distances (M 3.7). None for fewer than three points.
 #[must_use]
 pub fn fit(points: impl Iterator<Item = [f64; 3]> + Clone) -> Option<Plane> {
-    let (count, sum) = points.clone().fold((0usize, Vector3::zeros()), |(count, sum), p| (count + 1, sum + Vector3::from(p)));
+    let (count, sum) =
+        points.clone().fold((0usize, Vector3::zeros()), |(count, sum), p| (count + 1, sum + Vector3::from(p)));
     if count < 3 {
         return None;
     }
