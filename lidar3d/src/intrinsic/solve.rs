@@ -112,7 +112,7 @@ pub fn solve(start: &[Laser], offsets: Offsets, scans: &[Vec<Return>]) -> Result
             }
         }
         let step = information.clone().cholesky().ok_or(SolveError::NotObservable)?.solve(&vector);
-        for (laser, step) in lasers.iter_mut().zip(step.as_slice().chunks_exact(PARAMETERS)) {
+        for (laser, step) in lasers.iter_mut().zip(step.as_slice().as_chunks::<PARAMETERS>().0) {
             laser.distance += step[0];
             laser.elevation += step[1];
             laser.rotation += step[2];
