@@ -3,6 +3,7 @@
 mod carpark;
 mod falko;
 mod lidar3d_calibration;
+mod lidar3d_places;
 mod warehouse;
 
 /// Measure on recordings and in simulation how good it is.
@@ -17,6 +18,7 @@ enum Experiment {
     Carpark(carpark::Carpark),
     Falko(falko::Falko),
     Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
+    Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -27,6 +29,7 @@ impl Evaluate {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::Lidar3dCalibration(experiment) => experiment.run(),
+            Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

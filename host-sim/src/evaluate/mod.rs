@@ -6,5 +6,6 @@ pub mod demonstration;
 pub mod drive;
 pub mod falko;
 pub mod lidar3d_calibration;
+pub mod lidar3d_places;
 pub mod repeatability;
 pub mod warehouse;

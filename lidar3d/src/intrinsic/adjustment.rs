@@ -22,7 +22,7 @@ const CUT: f64 = 4.685;
 /// The median of an absolute normal deviate.
 const MEDIAN_DEVIATE: f64 = 0.6745;
 /// Steps below this part of a parameter's standard deviation end it.
-const SMALL: f64 = 0.01;
+const SMALL: f64 = 0.02;
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,8 +35,8 @@ pub enum Residual {
     Perpendicular,
 }
 
-/// Beams that meet their plane at less than about 6 deg are left out: sine of it.
-const MOST_OBLIQUE: f64 = 0.1;
+/// Sine of the angle at which a beam meets its plane: from 12 deg downwards points count less, below 6 deg not at all.
+const OBLIQUE: [f64; 2] = [0.1, 0.2];
 
 /// Why there is no calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -142,6 +142,8 @@ struct Sight {
     by_normal: Vector3<f64>,
     /// The same by the plane's distance.
     by_distance: f64,
+    /// Between 0 and 1.
+    weight: f64,
 }
 
 impl Sight {
@@ -155,13 +157,18 @@ impl Sight {
         let perpendicular = plane.distance_of(seen.point(lasers, offsets)?);
         let point = Vector3::from(seen.point(lasers, offsets)?);
         match kind {
-            Residual::Perpendicular => {
-                Some(Self { residual: perpendicular, by_laser: at * normal, by_normal: point, by_distance: -1.0 })
-            }
+            Residual::Perpendicular => Some(Self {
+                residual: perpendicular,
+                by_laser: at * normal,
+                by_normal: point,
+                by_distance: -1.0,
+                weight: 1.0,
+            }),
             Residual::AlongBeam => {
                 let beam = at.row(0).transpose();
                 let incidence = beam.dot(&normal);
-                if incidence.abs() < MOST_OBLIQUE {
+                let [least, full] = OBLIQUE;
+                if incidence.abs() < least {
                     return None;
                 }
                 // Where the beam meets the plane: derivatives there do not carry the noise of the distance.
@@ -171,6 +178,7 @@ impl Sight {
                     by_laser: derivatives(seen.distance - residual) * normal / incidence,
                     by_normal: (point - beam * residual) / incidence,
                     by_distance: -1.0 / incidence,
+                    weight: ((incidence.abs() - least) / (full - least)).min(1.0),
                 })
             }
         }
@@ -202,7 +210,7 @@ fn sums(lasers: &[Laser], offsets: Offsets, kind: Residual, target: &Target, pla
             continue;
         }
         let by_plane = Vector3::new(first.dot(&sight.by_normal), second.dot(&sight.by_normal), sight.by_distance);
-        let weight = (1.0 - (deviate / CUT).powi(2)).powi(2);
+        let weight = sight.weight * (1.0 - (deviate / CUT).powi(2)).powi(2);
         sums.add(seen.laser, sight.by_laser, by_plane, sight.residual, weight);
     }
     sums

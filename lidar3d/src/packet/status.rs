@@ -55,11 +55,11 @@ pub fn calibration_from_stream(tails: impl IntoIterator<Item = Tail>) -> Option<
     let starts = values.windows(5).enumerate().filter(|(_, window)| window == b"UNIT#").map(|(start, _)| start);
     for start in starts {
         let Some(cycle) = values.get(start..start + CALIBRATION_LENGTH) else { continue };
-        let records = cycle[7..].chunks_exact(LASER_LENGTH).take(64);
+        let records = cycle[7..].as_chunks::<LASER_LENGTH>().0.iter().take(64);
         if records.clone().enumerate().any(|(id, record)| usize::from(record[0]) != id) {
             continue;
         }
-        return Some(Calibration { distance_resolution: 0.002, lasers: records.map(laser).collect() });
+        return Some(Calibration { distance_resolution: 0.002, lasers: records.map(|record| laser(record)).collect() });
     }
     None
 }

@@ -134,10 +134,10 @@ impl<'a> Packet<'a> {
     #[must_use]
     pub fn write(blocks: &[(bool, u16, [Return; RETURNS]); BLOCKS], tail: Tail) -> [u8; LENGTH] {
         let mut bytes = [0; LENGTH];
-        for (target, (is_lower, azimuth, returns)) in bytes.chunks_exact_mut(BLOCK_LENGTH).zip(blocks) {
+        for (target, (is_lower, azimuth, returns)) in bytes.as_chunks_mut::<BLOCK_LENGTH>().0.iter_mut().zip(blocks) {
             target[..2].copy_from_slice(&if *is_lower { LOWER } else { UPPER }.to_le_bytes());
             target[2..4].copy_from_slice(&azimuth.to_le_bytes());
-            for (target, value) in target[4..].chunks_exact_mut(3).zip(returns) {
+            for (target, value) in target[4..].as_chunks_mut::<3>().0.iter_mut().zip(returns) {
                 target[..2].copy_from_slice(&value.distance.to_le_bytes());
                 target[2] = value.intensity;
             }
