@@ -6,6 +6,8 @@ mod falko;
 mod features;
 mod halting_points;
 mod kidnapping;
+mod lidar3d_calibration;
+mod lidar3d_places;
 mod places;
 mod slam;
 mod warehouse;
@@ -45,6 +47,8 @@ enum Experiment {
     Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
     Slam(slam::Slam),
+    Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
+    Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -60,6 +64,8 @@ impl Evaluate {
             Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),
+            Experiment::Lidar3dCalibration(experiment) => experiment.run(),
+            Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

@@ -10,6 +10,8 @@ pub mod falko;
 pub mod features;
 pub mod halting_points;
 pub mod kidnapping;
+pub mod lidar3d_calibration;
+pub mod lidar3d_places;
 pub mod places;
 pub mod repeatability;
 pub mod slam;

@@ -5,13 +5,16 @@ pub mod capture;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;
+pub mod packets;
 mod posed_scan;
+pub mod range_image;
 pub mod raw;
 pub mod sapienza;
 mod scan_drive;
 mod scan_record;
 mod table;
 pub mod tcp_stream;
+pub mod velodyne;
 
 pub use posed_scan::{BEAMS, KEYPOINTS, PosedScan, RANGES, ScanLog};
 pub use scan_drive::drive;

@@ -5,6 +5,7 @@
 
 pub mod block_storage;
 pub mod laser;
+pub mod multi_beam;
 pub mod odometer;
 pub mod path;
 pub mod people;

@@ -28,6 +28,10 @@ pub enum Stream {
     Start = 10,
     /// Where a vehicle is switched on, and what it sees there.
     Kidnapping = 11,
+    /// In what the believed parameters of a multi-beam lidar differ from the true ones.
+    LaserParameters = 13,
+    /// Noise of a multi-beam lidar's distances.
+    MultiBeam = 12,
 }
 
 /// One sequence of random numbers.

@@ -1,0 +1,22 @@
+//! Multi-beam lidars: parameters of a real sensor found back from simulated scans.
+
+use agv_host_sim::data;
+use agv_host_sim::evaluate::lidar3d_calibration;
+use agv_lidar3d::geometry::Offsets;
+use agv_lidar3d::intrinsic::Residual;
+
+const TRUTH: &str = "lidar3d/calib/ros_64e_utexas.yaml";
+
+#[test]
+fn disturbed_parameters_of_a_real_sensor_come_back_and_their_deviations_are_honest() {
+    let Some(path) = data::for_test("lidar3d calibration", TRUTH) else { return };
+    let outcome = lidar3d_calibration::run(&path, Offsets::Orthogonal, Residual::AlongBeam, 11).unwrap();
+    assert_eq!(outcome.lasers, 64);
+    assert!(outcome.is_within_limits, "{outcome:?}");
+    assert!(outcome.normalised_errors.iter().all(|error| (0.6..1.5).contains(error)), "{outcome:?}");
+    assert!(outcome.used.sum_of_squares_ratio >= 5.0, "{outcome:?}");
+    // Not thinner than the truth makes them, up to a hundredth: that would be fitted noise.
+    for walls in [outcome.used, outcome.held_out] {
+        assert!((walls.thickness_after_m / walls.thickness_true_m - 1.0).abs() < 0.01, "{outcome:?}");
+    }
+}

@@ -1,0 +1,15 @@
+//! Intrinsic calibration from scans of planes (M chapter 3).
+//!
+//! A plane is scanned from many distances and at many tilts. [`segment`] finds it in each scan; [`calibrate`] then
+//! moves D_corr, theta and alpha of all lasers, and every plane, until the points lie on their planes.
+
+mod adjustment;
+mod normal_equations;
+mod plane;
+mod scan;
+mod segmentation;
+
+pub use adjustment::{Adjustment, AdjustmentError, Deviation, Residual, calibrate};
+pub use plane::Plane;
+pub use scan::{Flatness, Return, Target, flatness};
+pub use segmentation::{SegmentationError, segment};

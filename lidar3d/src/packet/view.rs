@@ -1,0 +1,148 @@
+//! A checked view of the 1206 bytes that HDL-64E, HDL-32E and VLP-16 send.
+
+use super::status::Tail;
+
+/// UDP port to which the sensors send.
+pub const PORT: u16 = 2368;
+/// Bytes of a packet.
+pub const LENGTH: usize = 1206;
+/// Blocks in a packet.
+pub const BLOCKS: usize = 12;
+/// Returns in a block.
+pub const RETURNS: usize = 32;
+
+const BLOCK_LENGTH: usize = 100;
+const UPPER: u16 = 0xEEFF;
+const LOWER: u16 = 0xDDFF;
+/// Hundredths of a degree in a turn.
+const TURN: u16 = 36_000;
+
+/// Why bytes are no packet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(thiserror::Error))]
+pub enum PacketError {
+    /// The length is not [`LENGTH`].
+    #[cfg_attr(feature = "std", error("a packet has 1206 bytes, this one {length}"))]
+    Length {
+        /// Bytes that were given.
+        length: usize,
+    },
+    /// A block begins with neither of the two identifiers.
+    #[cfg_attr(feature = "std", error("block {block} begins with {found:#06x}, not with 0xeeff or 0xddff"))]
+    Identifier {
+        /// Number of the block, from 0.
+        block: usize,
+        /// What stands there.
+        found: u16,
+    },
+    /// A rotation angle of a full turn or more.
+    #[cfg_attr(feature = "std", error("block {block} states an angle of {found} hundredths of a degree"))]
+    Azimuth {
+        /// Number of the block, from 0.
+        block: usize,
+        /// What stands there, 0.01 degrees.
+        found: u16,
+    },
+}
+
+/// One return.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Return {
+    /// Distance in counts of the sensor (2 mm); 0 if there is none.
+    pub distance: u16,
+    /// Intensity.
+    pub intensity: u8,
+}
+
+/// One block of a packet.
+#[derive(Clone, Copy)]
+pub struct Block<'a> {
+    bytes: &'a [u8; BLOCK_LENGTH],
+}
+
+impl<'a> Block<'a> {
+    /// Whether the returns are of the lower lasers of an HDL-64E (32 to 63).
+    #[must_use]
+    pub fn is_lower(&self) -> bool {
+        u16::from_le_bytes([self.bytes[0], self.bytes[1]]) == LOWER
+    }
+
+    /// Rotation angle of the head, 0.01 degrees, 0 to 35999.
+    #[must_use]
+    pub fn azimuth(&self) -> u16 {
+        u16::from_le_bytes([self.bytes[2], self.bytes[3]])
+    }
+
+    /// The returns in the order in which they stand.
+    pub fn returns(&self) -> impl Iterator<Item = Return> + use<'a> {
+        let (triples, _) = self.bytes[4..].as_chunks::<3>();
+        triples
+            .iter()
+            .map(|[low, high, intensity]| Return { distance: u16::from_le_bytes([*low, *high]), intensity: *intensity })
+    }
+}
+
+/// A checked packet.
+#[derive(Clone, Copy)]
+pub struct Packet<'a> {
+    blocks: &'a [[u8; BLOCK_LENGTH]],
+    tail: [u8; 6],
+}
+
+impl<'a> Packet<'a> {
+    /// Checks the bytes of a packet.
+    ///
+    /// # Errors
+    /// See [`PacketError`].
+    pub fn new(bytes: &'a [u8]) -> Result<Self, PacketError> {
+        let length = PacketError::Length { length: bytes.len() };
+        if bytes.len() != LENGTH {
+            return Err(length);
+        }
+        let (body, tail) = bytes.split_last_chunk::<6>().ok_or(length)?;
+        let (blocks, _) = body.as_chunks::<BLOCK_LENGTH>();
+        for (index, bytes) in blocks.iter().enumerate() {
+            let identifier = u16::from_le_bytes([bytes[0], bytes[1]]);
+            if identifier != UPPER && identifier != LOWER {
+                return Err(PacketError::Identifier { block: index, found: identifier });
+            }
+            let azimuth = Block { bytes }.azimuth();
+            if azimuth >= TURN {
+                return Err(PacketError::Azimuth { block: index, found: azimuth });
+            }
+        }
+        Ok(Self { blocks, tail: *tail })
+    }
+
+    /// The blocks, [`BLOCKS`] of them.
+    pub fn blocks(&self) -> impl Iterator<Item = Block<'a>> + use<'a> {
+        self.blocks.iter().map(|bytes| Block { bytes })
+    }
+
+    /// Rotation angle of a block, 0.01 degrees.
+    pub(super) fn azimuth(&self, block: usize) -> Option<u16> {
+        self.blocks.get(block).map(|bytes| Block { bytes }.azimuth())
+    }
+
+    /// The six bytes behind the blocks.
+    #[must_use]
+    pub fn tail(&self) -> Tail {
+        Tail(self.tail)
+    }
+
+    /// Writes a packet: for each block whether it is of the lower lasers, its angle in 0.01 degrees, and its returns.
+    #[must_use]
+    pub fn write(blocks: &[(bool, u16, [Return; RETURNS]); BLOCKS], tail: Tail) -> [u8; LENGTH] {
+        let mut bytes = [0; LENGTH];
+        for (target, (is_lower, azimuth, returns)) in bytes.as_chunks_mut::<BLOCK_LENGTH>().0.iter_mut().zip(blocks) {
+            target[..2].copy_from_slice(&if *is_lower { LOWER } else { UPPER }.to_le_bytes());
+            target[2..4].copy_from_slice(&azimuth.to_le_bytes());
+            for (target, value) in target[4..].as_chunks_mut::<3>().0.iter_mut().zip(returns) {
+                target[..2].copy_from_slice(&value.distance.to_le_bytes());
+                target[2] = value.intensity;
+            }
+        }
+        bytes[LENGTH - 6..].copy_from_slice(&tail.0);
+        bytes
+    }
+}

@@ -1,0 +1,13 @@
+//! Qualitative localisation: has this place been seen (M chapter 5)?
+
+mod enriched;
+mod histogram;
+mod normals;
+mod orientation;
+mod threshold;
+
+pub use enriched::{ENRICHED_LENGTH, Enriched};
+pub use histogram::{BINS, Histogram, chi_square, normalised_chi_square, normalised_sorensen, sorensen};
+pub use normals::{Neighbours, vertical_parts};
+pub use orientation::{DIRECTIONS, Orientation};
+pub use threshold::from_key_scans;

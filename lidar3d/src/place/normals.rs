@@ -1,0 +1,76 @@
+//! Surface normals from the neighbours in the rings (M 5.1.2.2).
+
+use crate::cloud::Cloud;
+
+/// Which neighbours of a point span its normal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbours {
+    /// Angle to the left and right neighbours, rad. M takes five columns of an HDL-64E at 5 Hz, 0.45 degrees; with fewer
+    /// columns the nearest whole number of them, at least one, is taken.
+    pub angle: f32,
+    /// Rings to the upper and lower neighbours: two on an HDL-64E, whose two sides alternate.
+    pub rings: usize,
+    /// Greatest distance to a neighbour, m.
+    pub reach: f32,
+    /// Least distance from the sensor, m.
+    pub near: f32,
+    /// Greatest distance from the sensor, m.
+    pub far: f32,
+}
+
+impl Default for Neighbours {
+    fn default() -> Self {
+        Self { angle: 2.07_f32.to_radians(), rings: 2, reach: 3.0, near: 3.0, far: 50.0 }
+    }
+}
+
+/// Calls `take` with the vertical part of each normal, -1 to 1.
+pub fn vertical_parts(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut(f32)) {
+    let columns = cloud.columns();
+    let step = libm::roundf(neighbours.angle * columns as f32 / core::f32::consts::TAU).max(1.0) as usize;
+    if step >= columns {
+        return;
+    }
+    for ring in neighbours.rings..cloud.rings().saturating_sub(neighbours.rings) {
+        let (above, here, below) =
+            (cloud.ring(ring - neighbours.rings), cloud.ring(ring), cloud.ring(ring + neighbours.rings));
+        for (column, (point, (up, down))) in here.iter().zip(above.iter().zip(below)).enumerate() {
+            let (Some(point), Some(up), Some(down)) = (point, up, down) else { continue };
+            let squared = dot(*point, *point);
+            if squared < neighbours.near * neighbours.near || squared > neighbours.far * neighbours.far {
+                continue;
+            }
+            let left = if column < step { column + columns - step } else { column - step };
+            let right = if column + step >= columns { column + step - columns } else { column + step };
+            let (Some(Some(left)), Some(Some(right))) = (here.get(left), here.get(right)) else { continue };
+            let [right, up, left, down] = [right, up, left, down].map(|end| minus(*end, *point));
+            if [right, up, left, down].iter().any(|arm| dot(*arm, *arm) > neighbours.reach * neighbours.reach) {
+                continue;
+            }
+            let mut sum = [0.0; 3];
+            for (one, other) in [(right, up), (up, left), (left, down), (down, right)] {
+                let normal = cross(one, other);
+                let length = libm::sqrtf(dot(normal, normal));
+                if length > 0.0 {
+                    sum = [sum[0] + normal[0] / length, sum[1] + normal[1] / length, sum[2] + normal[2] / length];
+                }
+            }
+            let length = libm::sqrtf(dot(sum, sum));
+            if length > 0.0 {
+                take(sum[2] / length);
+            }
+        }
+    }
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
