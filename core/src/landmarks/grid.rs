@@ -52,6 +52,10 @@ impl<const POINTS: usize> Grid<POINTS> {
 
     /// The row or column of a coordinate, m. What lies further away than 32767 cells is all in the last one.
     fn line(&self, coordinate: f64) -> i16 {
-        libm::floor(coordinate / self.cell) as i16
+        let place = coordinate / self.cell;
+        let towards_zero = place as i32;
+        // Rounding down by hand costs a tenth of the general function.
+        let down = if f64::from(towards_zero) > place { towards_zero.saturating_sub(1) } else { towards_zero };
+        down.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
     }
 }

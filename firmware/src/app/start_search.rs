@@ -11,11 +11,17 @@ const WORDS: usize = 1024;
 /// Effort of a slice: about 0.1 ms at 480 MHz, so that events do not wait.
 const SLICE: u32 = 2_000;
 
+/// Effort that is spent in the time of one revolution at most: about 40 million instructions, 80 ms at 480 MHz. A search
+/// that needs more goes on in the next revolution.
+pub const EFFORT_A_REVOLUTION: u32 = 1_600_000;
+
 /// Searches among the reflectors of the map while the localiser has no pose.
 pub struct StartSearch {
     finder: StartFinder,
     index: ReflectorIndex<WORDS>,
     is_wanted: bool,
+    /// What is left of the effort of this revolution.
+    left: u32,
     state: controller::StartSearch,
 }
 
@@ -28,6 +34,7 @@ impl StartSearch {
             finder: StartFinder::new(*parameters, RelocalizationParameters::default()),
             index: ReflectorIndex::new(),
             is_wanted,
+            left: 0,
             state: controller::StartSearch::Idle,
         }
     }
@@ -49,6 +56,9 @@ impl StartSearch {
         if self.is_wanted && is_lost {
             let reflectors = IndexedReflectors { map: localizer.reflectors(), index: &self.index };
             self.finder.handle(event, &reflectors);
+            if matches!(event, Event::Reflectors(_) | Event::Scan(_)) {
+                self.left = EFFORT_A_REVOLUTION;
+            }
         } else if self.state != controller::StartSearch::Idle {
             self.finder.forget();
             self.state = controller::StartSearch::Idle;
@@ -57,6 +67,10 @@ impl StartSearch {
 
     /// Searches for a while. Whether there is more to do, and the pose if it is found.
     pub fn advance(&mut self, localizer: &Localizer) -> (bool, Option<PoseFix>) {
+        if self.left == 0 {
+            return (false, None);
+        }
+        self.left = self.left.saturating_sub(SLICE);
         let reflectors = IndexedReflectors { map: localizer.reflectors(), index: &self.index };
         let state = self.finder.search(&reflectors, SLICE);
         // While it searches anew, the last answer stands.

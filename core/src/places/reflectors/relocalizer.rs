@@ -75,6 +75,8 @@ pub struct ReflectorRelocalizer<const SEEN: usize = 64> {
     needed: usize,
     /// The mapped pair that is looked at next.
     at: (usize, usize),
+    /// Effort that was spent beyond what was allowed.
+    debt: i64,
     best: Vec<ReflectorFix, KEPT>,
 }
 
@@ -82,7 +84,15 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
     /// A relocaliser with nothing to do.
     #[must_use]
     pub const fn new(parameters: RelocalizationParameters) -> Self {
-        Self { parameters, seen: Vec::new(), sought: SoughtPairs::new(), needed: 0, at: (0, 1), best: Vec::new() }
+        Self {
+            parameters,
+            seen: Vec::new(),
+            sought: SoughtPairs::new(),
+            needed: 0,
+            at: (0, 1),
+            debt: 0,
+            best: Vec::new(),
+        }
     }
 
     /// Starts a search for the pose of the snapshot's frame; one that is under way is given up.
@@ -96,6 +106,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         self.sought.clear();
         self.best.clear();
         self.at = (0, 1);
+        self.debt = 0;
         let count = self.seen.len();
         self.needed = usize::from(self.parameters.fewest).max(count.div_ceil(2));
         if count >= self.needed {
@@ -103,7 +114,8 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         }
     }
 
-    /// Goes on with the search until about `effort` is spent: a look at a mapped pair is one, about 15 instructions.
+    /// Goes on with the search until `effort` is spent: a look at a mapped pair is one, about 15 instructions. What a last
+    /// piece of work takes beyond it is spent of the next call's.
     pub fn advance<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
         reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
@@ -112,11 +124,13 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         if self.seen.len() < self.needed || self.needed == 0 {
             return RelocalizationProgress::Done(ReflectorAnswer::TooFew);
         }
-        let mut left = i64::from(effort);
+        let mut left = i64::from(effort) - self.debt;
+        self.debt = 0;
         let landmarks = reflectors.map.landmarks();
         while let Some(first) = landmarks.get(self.at.0) {
             for second in landmarks.get(self.at.1..).unwrap_or_default() {
                 if left <= 0 {
+                    self.debt = -left;
                     return RelocalizationProgress::Searching;
                 }
                 left -= 1;
@@ -158,7 +172,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
                 let Some(transform) = Transform::between((a, b), mapped) else { continue };
                 if self.is_promising(reflectors, &transform) {
                     effort += VERIFICATION;
-                    if let Some(fix) = self.verify(reflectors, transform.pose()) {
+                    if let Some(fix) = self.verify(reflectors, transform.pose(), (a, b)) {
                         self.keep(fix);
                     }
                 }
@@ -227,28 +241,31 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         })
     }
 
-    /// Refines a pose by all reflectors that it explains. None if they are too few.
+    /// Refines a pose, which is that of two seen reflectors, by all reflectors that it explains. None if they are too few.
     #[inline(never)]
     fn verify<const REFLECTORS: usize, const WORDS: usize>(
         &self,
         reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
         start: Pose,
+        pair: (ScanPoint, ScanPoint),
     ) -> Option<ReflectorFix> {
         let mut pose = start;
         let mut covariance = nalgebra::Matrix3::zeros();
+        let most_misses = self.seen.len() - self.needed;
+        let middle = (pair.0 + pair.1) * 0.5;
+        let leverage = 2.0 / (pair.1 - pair.0).norm();
         for round in 0..ROUNDS {
             let transform = Transform::of(&pose);
-            // A pose from two reflectors errs; the gate narrows as more take part.
-            let slack = if round == 0 { FIRST_SLACK } else { SLACK };
             let mut pairs = Vec::<(ScanPoint, ScanPoint, f32), SEEN>::new();
-            for seen in &self.seen {
-                let reach = (self.parameters.gate * libm::sqrtf(2.0 * seen.variance) + slack).min(LARGEST_REACH);
-                if let Some(mapped) = reflectors.nearest(transform.apply(&seen.position), reach) {
+            for (number, seen) in self.seen.iter().enumerate() {
+                // The heading of two reflectors errs; the gate is narrower as soon as more take part.
+                let lever = if round == 0 { 1.0 + leverage * (seen.position - middle).norm() } else { 1.0 };
+                let reach = self.parameters.gate * lever * libm::sqrtf(2.0 * seen.variance) + SLACK;
+                if let Some(mapped) = reflectors.nearest(transform.apply(&seen.position), reach.min(LARGEST_REACH)) {
                     let _ = pairs.push((seen.position, mapped, 1.0 / seen.variance));
+                } else if number + 1 - pairs.len() > most_misses {
+                    return None;
                 }
-            }
-            if pairs.len() < self.needed {
-                return None;
             }
             let points = pairs.iter().map(|(seen, mapped, weight)| (seen.cast(), mapped.cast(), f64::from(*weight)));
             let alignment = align(points)?;
@@ -304,10 +321,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
     }
 }
 
-/// How far beyond the noise a reflector may lie from the map in the first round of refinement, m.
-const FIRST_SLACK: f32 = 0.3;
-
-/// The same in later rounds, m.
+/// How far beyond the noise a reflector may lie from the map while the pose is refined, m.
 const SLACK: f32 = 0.02;
 
 /// Farthest that a reflector is looked for, m.
