@@ -1,0 +1,10 @@
+//! Multi-beam lidars: where their packets come from, and whole revolutions of points.
+
+pub mod live;
+pub mod revolution;
+pub mod setup;
+pub mod survey;
+
+pub use revolution::{Revolution, Revolutions};
+pub use setup::{Setup, SetupError, SetupOptions};
+pub use survey::Survey;
