@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use agv_core::measurement::Time;
@@ -40,11 +41,14 @@ pub struct Seen {
     pub is_cut: bool,
 }
 
-/// Calls `take` with the time and the headers of each IP packet of a capture.
+/// Calls `take` with the time and the headers of each IP packet of a capture, until it breaks off.
 ///
 /// # Errors
 /// See [`PacketsError`]. A capture that is cut off is read up to there.
-pub fn for_each(path: &Path, mut take: impl FnMut(Time, LaxSlicedPacket<'_>)) -> Result<Seen, PacketsError> {
+pub fn for_each(
+    path: &Path,
+    mut take: impl FnMut(Time, LaxSlicedPacket<'_>) -> ControlFlow<()>,
+) -> Result<Seen, PacketsError> {
     let io = |source| PacketsError::Io { path: path.to_owned(), source };
     let foreign = || PacketsError::Foreign { path: path.to_owned() };
     let file = File::open(path).map_err(io)?;
@@ -56,8 +60,10 @@ pub fn for_each(path: &Path, mut take: impl FnMut(Time, LaxSlicedPacket<'_>)) ->
             Ok((length, block)) => {
                 if let Some((time, link, data)) = interfaces.packet(&block) {
                     seen.packets += 1;
-                    if let Some(packet) = slice(link, data) {
-                        take(time, packet);
+                    if let Some(packet) = slice(link, data)
+                        && take(time, packet).is_break()
+                    {
+                        break;
                     }
                 }
                 reader.consume(length);

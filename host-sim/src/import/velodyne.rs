@@ -1,5 +1,6 @@
 //! Packets of a multi-beam lidar in a network capture.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use agv_core::measurement::Time;
@@ -44,17 +45,31 @@ pub struct Seen {
 /// # Errors
 /// See [`VelodyneError`]. A capture that is cut off is read up to there.
 pub fn for_each(path: &Path, mut take: impl FnMut(Time, &Packet<'_>)) -> Result<Seen, VelodyneError> {
+    for_each_until(path, |time, packet| {
+        take(time, packet);
+        ControlFlow::Continue(())
+    })
+}
+
+/// As [`for_each`], until `take` breaks off.
+///
+/// # Errors
+/// See [`VelodyneError`].
+pub fn for_each_until(
+    path: &Path,
+    mut take: impl FnMut(Time, &Packet<'_>) -> ControlFlow<()>,
+) -> Result<Seen, VelodyneError> {
     let mut seen = Seen::default();
     let mut detail = String::new();
     let all = packets::for_each(path, |time, packet| {
-        let Some(TransportSlice::Udp(udp)) = packet.transport else { return };
+        let Some(TransportSlice::Udp(udp)) = packet.transport else { return ControlFlow::Continue(()) };
         if udp.destination_port() != PORT {
-            return;
+            return ControlFlow::Continue(());
         }
         match Packet::new(udp.payload()) {
             Ok(packet) => {
                 seen.packets += 1;
-                take(time, &packet);
+                return take(time, &packet);
             }
             Err(error) => {
                 seen.refused += 1;
@@ -63,6 +78,7 @@ pub fn for_each(path: &Path, mut take: impl FnMut(Time, &Packet<'_>)) -> Result<
                 }
             }
         }
+        ControlFlow::Continue(())
     })?;
     seen.other = all.packets - seen.packets - seen.refused;
     seen.is_cut = all.is_cut;

@@ -3,8 +3,10 @@
 pub mod live;
 pub mod revolution;
 pub mod setup;
+pub mod source;
 pub mod survey;
 
 pub use revolution::{Revolution, Revolutions};
 pub use setup::{Setup, SetupError, SetupOptions};
+pub use source::{OpenSource, Source, SourceError};
 pub use survey::Survey;

@@ -45,12 +45,14 @@ impl Revolution {
     }
 }
 
-/// Half a turn of the head, 0.01 degrees.
-const HALF_TURN: u16 = 18_000;
+/// Hundredths of a degree in a turn of the head.
+const TURN: u16 = 36_000;
 
 /// Puts packets together to revolutions. A revolution begins where the angle of the head passes zero.
 pub struct Revolutions {
     decoder: Decoder,
+    /// Angle at which a revolution begins, 0.01 degrees.
+    beginning: u16,
     current: Revolution,
     has_begun: bool,
     last: Option<u16>,
@@ -60,17 +62,24 @@ impl Revolutions {
     /// Of a sensor.
     #[must_use]
     pub fn new(setup: &Setup) -> Self {
-        Self { decoder: setup.decoder(), current: Revolution::default(), has_begun: false, last: None }
+        Self { decoder: setup.decoder(), current: Revolution::default(), has_begun: false, last: None, beginning: 0 }
+    }
+
+    /// Lets revolutions begin at that angle of the head, 0.01 degrees. There the next packet begins one.
+    pub fn begin_at(&mut self, azimuth: u16) {
+        self.beginning = azimuth % TURN;
+        self.has_begun = true;
     }
 
     /// Takes a packet; `take` is called with each revolution that it ends.
     pub fn packet(&mut self, time: Time, packet: &Packet<'_>, mut take: impl FnMut(Revolution)) {
-        let Self { decoder, current, has_begun, last } = self;
+        let Self { decoder, beginning, current, has_begun, last } = self;
         if current.points.is_empty() {
             current.start = time;
         }
         decoder.packet(packet, |point| {
-            if last.is_some_and(|last| last > point.azimuth && last - point.azimuth > HALF_TURN) {
+            let turned = (point.azimuth + TURN - *beginning) % TURN;
+            if last.is_some_and(|last| last > turned && last - turned > TURN / 2) {
                 let next = Revolution {
                     start: time,
                     points: Vec::with_capacity(current.points.len() + current.points.len() / 8),
@@ -81,7 +90,7 @@ impl Revolutions {
                 *has_begun = true;
                 take(whole);
             }
-            *last = Some(point.azimuth);
+            *last = Some(turned);
             current.points.push(point);
         });
     }

@@ -84,6 +84,12 @@ impl Surveyor {
         }
     }
 
+    /// The kind of sensor, as far as it is known.
+    #[must_use]
+    pub fn sensor(&self) -> Option<Sensor> {
+        self.survey.sensor
+    }
+
     /// What was found.
     #[must_use]
     pub fn finish(self) -> Survey {

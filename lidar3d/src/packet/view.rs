@@ -119,6 +119,17 @@ impl<'a> Packet<'a> {
         self.blocks.iter().map(|bytes| Block { bytes })
     }
 
+    /// The bytes themselves.
+    #[must_use]
+    pub fn bytes(&self) -> [u8; LENGTH] {
+        let mut bytes = [0; LENGTH];
+        for (target, block) in bytes.as_chunks_mut::<BLOCK_LENGTH>().0.iter_mut().zip(self.blocks) {
+            *target = *block;
+        }
+        bytes[LENGTH - 6..].copy_from_slice(&self.tail);
+        bytes
+    }
+
     /// Rotation angle of a block, 0.01 degrees.
     pub(super) fn azimuth(&self, block: usize) -> Option<u16> {
         self.blocks.get(block).map(|bytes| Block { bytes }.azimuth())

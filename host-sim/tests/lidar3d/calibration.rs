@@ -1,4 +1,4 @@
-//! Multi-beam lidars: parameters of a real sensor found back from simulated scans.
+//! Parameters of a real sensor found back from simulated scans.
 
 use agv_host_sim::data;
 use agv_host_sim::evaluate::lidar3d_calibration;
