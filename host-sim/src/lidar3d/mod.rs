@@ -2,8 +2,11 @@
 
 pub mod live;
 pub mod revolution;
+pub mod place_map;
 pub mod setup;
+pub mod signatures;
 pub mod source;
+pub mod stand;
 pub mod survey;
 
 pub use revolution::{Revolution, Revolutions};

@@ -102,12 +102,12 @@ impl Source {
         match self {
             Self::Capture(path) => {
                 let survey = Survey::of_capture(&path)?;
-                Ok(OpenSource { options: options.clone(), survey, packets: Packets::Capture(path) })
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Capture(path) })
             }
             Self::Images(path) => {
                 let images = RangeImages::open(&path)?;
                 let survey = Survey { sensor: Some(Sensor::Hdl64e), calibration: Some(images.calibration()), ..Survey::default() };
-                Ok(OpenSource { options: options.clone(), survey, packets: Packets::Images(images) })
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Images(images) })
             }
             Self::Live(port) => {
                 let network = |source| SourceError::Network { port, source };
@@ -132,7 +132,7 @@ impl Source {
                 }
                 let survey = surveyor.finish();
                 let packets = Packets::Live { port, listener, waiting };
-                Ok(OpenSource { options: options.clone(), survey, packets })
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
             }
         }
     }
@@ -147,6 +147,7 @@ enum Packets {
 /// A source that has been looked at.
 pub struct OpenSource {
     options: SetupOptions,
+    setup: Option<Setup>,
     /// What it says about itself.
     pub survey: Survey,
     packets: Packets,
@@ -158,7 +159,15 @@ impl OpenSource {
     /// # Errors
     /// See [`SetupError`].
     pub fn setup(&self) -> Result<Setup, SetupError> {
-        Setup::new(&self.options, &self.survey)
+        match &self.setup {
+            Some(setup) => Ok(setup.clone()),
+            None => Setup::new(&self.options, &self.survey),
+        }
+    }
+
+    /// Decodes with other parameters than those that were stated.
+    pub fn decode_with(&mut self, setup: Setup) {
+        self.setup = Some(setup);
     }
 
     /// How many revolutions there will be, if that is known.
