@@ -78,9 +78,7 @@ fn street() -> Vec<Option<[f32; 3]>> {
         let to_ground = if elevation < 0.0 { -1.7 / elevation.sin() } else { f32::MAX };
         let to_wall = 8.0 / (sin.abs() * elevation.cos()).max(1e-3);
         let range = to_ground.min(to_wall);
-        (range < 80.0).then(|| {
-            [range * cos * elevation.cos(), range * sin * elevation.cos(), range * elevation.sin()]
-        })
+        (range < 80.0).then(|| [range * cos * elevation.cos(), range * sin * elevation.cos(), range * elevation.sin()])
     };
     (0..RINGS).flat_map(|ring| (0..COLUMNS).map(move |column| at(ring, column))).collect()
 }

@@ -63,7 +63,9 @@ impl RingOrder {
         let mut order = Self { lasers: [(u8::MAX, 0); RINGS], rings: 0 };
         let used = |laser: &&Laser| laser.is_enabled;
         order.rings = lasers.iter().take(RINGS).filter(used).count();
-        for (number, (laser, target)) in lasers.iter().zip(&mut order.lasers).enumerate().filter(|(_, (l, _))| l.is_enabled) {
+        for (number, (laser, target)) in
+            lasers.iter().zip(&mut order.lasers).enumerate().filter(|(_, (l, _))| l.is_enabled)
+        {
             let is_above = |(other_number, other): &(usize, &Laser)| {
                 other.elevation > laser.elevation || (other.elevation == laser.elevation && *other_number < number)
             };

@@ -150,8 +150,10 @@ impl Test<'_> {
         let start = Instant::now();
         let mut answers: Vec<(f64, bool)> = Vec::new();
         for &query in self.queries {
-            let distances =
-                self.map.iter().map(|&node| (method.distance(&self.asked[query].signatures, &self.stored[node].signatures), node));
+            let distances = self
+                .map
+                .iter()
+                .map(|&node| (method.distance(&self.asked[query].signatures, &self.stored[node].signatures), node));
             if let Some((distance, node)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 answers.push((distance, self.apart(query, node) <= self.right));
             }

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 
 use agv_lidar3d::packet::Point;
 use pcd_rs::{DataKind, PcdSerialize, Schema, ValueKind, WriterInit};
-use ply_rs_bw::ply::{
-    Addable, ElementDef, Encoding, Ply, PropertyAccess, PropertyDef, PropertyType, ScalarType,
-};
+use ply_rs_bw::ply::{Addable, ElementDef, Encoding, Ply, PropertyAccess, PropertyDef, PropertyType, ScalarType};
 
 /// Length of a count of a coordinate in LAS, m.
 const LAS_RESOLUTION: f64 = 1e-4;
@@ -121,12 +119,7 @@ impl PcdSerialize for PcdPoint {
     }
 }
 
-fn write_pcd(
-    path: &Path,
-    points: impl Iterator<Item = PcdPoint>,
-    width: usize,
-    height: usize,
-) -> Result<(), String> {
+fn write_pcd(path: &Path, points: impl Iterator<Item = PcdPoint>, width: usize, height: usize) -> Result<(), String> {
     let init = WriterInit {
         width: width as u64,
         height: height as u64,

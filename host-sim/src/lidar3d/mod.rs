@@ -1,8 +1,8 @@
 //! Multi-beam lidars: where their packets come from, and whole revolutions of points.
 
 pub mod live;
-pub mod revolution;
 pub mod place_map;
+pub mod revolution;
 pub mod setup;
 pub mod signatures;
 pub mod source;

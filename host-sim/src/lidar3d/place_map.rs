@@ -63,11 +63,9 @@ impl PlaceMap {
     /// more than 30 m apart, or, if their poses are not known, more than 15 numbers. None if the map is too small for it.
     #[must_use]
     pub fn threshold(&self, method: Method) -> Option<f64> {
-        let distance = |one: usize, other: usize| {
-            method.distance(&self.places[one].signatures, &self.places[other].signatures)
-        };
-        let poses: Option<Vec<[f64; 2]>> =
-            self.places.iter().map(|place| place.pose.map(|[x, y, _]| [x, y])).collect();
+        let distance =
+            |one: usize, other: usize| method.distance(&self.places[one].signatures, &self.places[other].signatures);
+        let poses: Option<Vec<[f64; 2]>> = self.places.iter().map(|place| place.pose.map(|[x, y, _]| [x, y])).collect();
         match poses {
             Some(poses) => from_key_scans(&poses, APART, distance),
             None => {

@@ -31,12 +31,12 @@ pub enum SetupError {
     #[error(transparent)]
     File(#[from] TextFileError),
     /// The calibration file is none, or is of another sensor.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {problem}", path.display())]
     Calibration {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
-        source: CalibrationError,
+        problem: CalibrationError,
     },
     /// The packets do not state what sends them.
     #[error("the packets do not state which sensor sends them; name it with --sensor")]
@@ -72,7 +72,7 @@ pub struct Setup {
 /// See [`SetupError`].
 pub fn read_calibration(path: &Path) -> Result<Calibration, SetupError> {
     let text = text_file::read(path, "a calibration file (db.xml or YAML)")?;
-    Calibration::read(&text).map_err(|source| SetupError::Calibration { path: path.to_owned(), source })
+    Calibration::read(&text).map_err(|problem| SetupError::Calibration { path: path.to_owned(), problem })
 }
 
 impl Setup {
@@ -86,14 +86,11 @@ impl Setup {
         let lasers = match (&options.calibration, sensor.elevations()) {
             (Some(path), _) => {
                 let calibration = read_calibration(path)?.for_lasers(sensor.lasers());
-                calibration.map_err(|source| SetupError::Calibration { path: path.clone(), source })?.lasers
+                calibration.map_err(|problem| SetupError::Calibration { path: path.clone(), problem })?.lasers
             }
             (None, Some(elevations)) => {
-                let laser = |elevation: &f64| Laser {
-                    elevation: elevation.to_radians(),
-                    is_enabled: true,
-                    ..Laser::default()
-                };
+                let laser =
+                    |elevation: &f64| Laser { elevation: elevation.to_radians(), is_enabled: true, ..Laser::default() };
                 elevations.iter().map(laser).collect()
             }
             (None, None) => match &survey.calibration {

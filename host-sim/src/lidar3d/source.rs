@@ -35,12 +35,12 @@ pub enum SourceError {
     #[error(transparent)]
     Setup(#[from] SetupError),
     /// The network.
-    #[error("UDP port {port}: {source}")]
+    #[error("UDP port {port}: {problem}")]
     Network {
         /// The port.
         port: u16,
         /// What the operating system says.
-        source: io::Error,
+        problem: io::Error,
     },
     /// Nothing was received.
     #[error("nothing was received on UDP port {port}")]
@@ -106,11 +106,15 @@ impl Source {
             }
             Self::Images(path) => {
                 let images = RangeImages::open(&path)?;
-                let survey = Survey { sensor: Some(Sensor::Hdl64e), calibration: Some(images.calibration()), ..Survey::default() };
+                let survey = Survey {
+                    sensor: Some(Sensor::Hdl64e),
+                    calibration: Some(images.calibration()),
+                    ..Survey::default()
+                };
                 Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Images(images) })
             }
             Self::Live(port) => {
-                let network = |source| SourceError::Network { port, source };
+                let network = |problem| SourceError::Network { port, problem };
                 let mut listener = Listener::new(port).map_err(network)?;
                 let mut surveyor = Surveyor::default();
                 let mut waiting = Vec::new();
@@ -121,8 +125,7 @@ impl Source {
                             waiting.push((time, Box::new(packet.bytes())));
                         })
                         .map_err(network)?;
-                    let needs_calibration =
-                        options.calibration.is_none() && surveyor.sensor() == Some(Sensor::Hdl64e);
+                    let needs_calibration = options.calibration.is_none() && surveyor.sensor() == Some(Sensor::Hdl64e);
                     if waiting.len() >= (if needs_calibration { LONG_LOOK } else { LOOK }) {
                         break;
                     }
@@ -229,7 +232,7 @@ impl OpenSource {
                 while is_going.is_continue() && !stop.load(Ordering::Relaxed) {
                     listener
                         .receive(|time, packet| is_going = push(time, packet, &mut revolutions))
-                        .map_err(|source| SourceError::Network { port: *port, source })?;
+                        .map_err(|problem| SourceError::Network { port: *port, problem })?;
                 }
                 format!("UDP port {port}")
             }

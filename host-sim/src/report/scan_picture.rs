@@ -41,8 +41,7 @@ pub fn write(path: &Path, cloud: &[Option<[f32; 3]>], rings: usize, reach: f32) 
             pixels[(above + down as usize) * WIDTH + across as usize] = of_height(z);
         }
     }
-    let mut encoder =
-        png::Encoder::new(BufWriter::new(File::create(path)?), WIDTH as u32, (above + WIDTH) as u32);
+    let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), WIDTH as u32, (above + WIDTH) as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.write_header()?.write_image_data(pixels.as_flattened())?;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use agv_host_sim::import::velodyne;
 use agv_host_sim::data;
+use agv_host_sim::import::velodyne;
 use agv_lidar3d::calibration::Calibration;
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::{Decoder, Filter, Point, Sensor};

@@ -84,10 +84,7 @@ impl Direction {
 
     /// The sum of two angles.
     fn plus(self, other: Self) -> Self {
-        Self {
-            sin: self.sin * other.cos + self.cos * other.sin,
-            cos: self.cos * other.cos - self.sin * other.sin,
-        }
+        Self { sin: self.sin * other.cos + self.cos * other.sin, cos: self.cos * other.cos - self.sin * other.sin }
     }
 }
 

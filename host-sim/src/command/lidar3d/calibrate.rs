@@ -115,9 +115,8 @@ impl Calibrate {
         }
         let not_observed: Vec<usize> =
             (0..found.lasers.len()).filter(|laser| found.deviations[*laser].is_none()).collect();
-        let worst = |value: fn(&intrinsic::Deviation) -> f64| {
-            found.deviations.iter().flatten().map(value).fold(0.0, f64::max)
-        };
+        let worst =
+            |value: fn(&intrinsic::Deviation) -> f64| found.deviations.iter().flatten().map(value).fold(0.0, f64::max);
         let [distance, elevation, rotation] = [
             worst(|deviation| deviation.distance),
             worst(|deviation| deviation.elevation.to_degrees()),
@@ -147,10 +146,7 @@ impl Calibrate {
             ["noise".to_owned(), format!("{:.1} mm", 1000.0 * found.noise)],
             [
                 "standard deviations".to_owned(),
-                format!(
-                    "at most {:.2} mm, theta {elevation:.4} deg, alpha {rotation:.4} deg",
-                    1000.0 * distance
-                ),
+                format!("at most {:.2} mm, theta {elevation:.4} deg, alpha {rotation:.4} deg", 1000.0 * distance),
             ],
             ["walls".to_owned(), format!("{:.1} -> {:.1} mm thick", thickness(before), thickness(after))],
         ];
@@ -219,33 +215,31 @@ fn page(
             seen.map(|(seen, point)| (seen.laser as f64, 1000.0 * plane.distance_of(point))).collect()
         };
         let (before, after) = (off(start), off(&found.lasers));
-        let sets = [
-            PointSet { name: "before", points: &before },
-            PointSet { name: "after", points: &after },
-        ];
+        let sets = [PointSet { name: "before", points: &before }, PointSet { name: "after", points: &after }];
         let chart = scatter_chart(["number of the laser", "distance from the plane of best fit, mm"], &sets, None)?;
         page.figure(&chart, "Points of one wall, laser by laser, before and after.");
     }
     page.section("Lasers");
-    let rows = start.iter().zip(&found.lasers).zip(&found.deviations).enumerate().map(|(number, ((old, new), known))| {
-        let change = |old: f64, new: f64, scale: f64, digits: usize| format!("{:.digits$}", scale * (new - old));
-        let degrees = 1f64.to_degrees();
-        let mut row = vec![
-            number.to_string(),
-            change(old.distance, new.distance, 1000.0, 2),
-            change(old.elevation, new.elevation, degrees, 4),
-            change(old.rotation, new.rotation, degrees, 4),
-        ];
-        row.extend(match known {
-            Some(known) => [
-                format!("{:.2}", 1000.0 * known.distance),
-                format!("{:.4}", known.elevation.to_degrees()),
-                format!("{:.4}", known.rotation.to_degrees()),
-            ],
-            None => ["not observed".to_owned(), String::new(), String::new()],
+    let rows =
+        start.iter().zip(&found.lasers).zip(&found.deviations).enumerate().map(|(number, ((old, new), known))| {
+            let change = |old: f64, new: f64, scale: f64, digits: usize| format!("{:.digits$}", scale * (new - old));
+            let degrees = 1f64.to_degrees();
+            let mut row = vec![
+                number.to_string(),
+                change(old.distance, new.distance, 1000.0, 2),
+                change(old.elevation, new.elevation, degrees, 4),
+                change(old.rotation, new.rotation, degrees, 4),
+            ];
+            row.extend(match known {
+                Some(known) => [
+                    format!("{:.2}", 1000.0 * known.distance),
+                    format!("{:.4}", known.elevation.to_degrees()),
+                    format!("{:.4}", known.rotation.to_degrees()),
+                ],
+                None => ["not observed".to_owned(), String::new(), String::new()],
+            });
+            row
         });
-        row
-    });
     page.paragraph("Changes of the parameters, and the standard deviations of what was found.");
     page.table(&Table {
         heading: ["laser", "D mm", "theta deg", "alpha deg", "+- mm", "+- deg", "+- deg"].map(str::to_owned).to_vec(),

@@ -89,7 +89,11 @@ impl Decode {
                 return ControlFlow::Break(());
             }
             files += 1;
-            if self.count.is_some_and(|count| files >= count) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if self.count.is_some_and(|count| files >= count) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         })?;
         bar.finish_and_clear();
         if let Some(error) = failure {

@@ -82,7 +82,10 @@ impl Info {
         rows.extend(survey.version.map(|version| ["version".to_owned(), version]));
         if survey.packets > 0 {
             rows.push(["packets".to_owned(), survey.packets.to_string()]);
-            rows.push(["not of a sensor".to_owned(), format!("{} to the port, {} others", survey.refused, survey.other)]);
+            rows.push([
+                "not of a sensor".to_owned(),
+                format!("{} to the port, {} others", survey.refused, survey.other),
+            ]);
             rows.push(["turns".to_owned(), format!("{:.2} in {duration:.2} s, {rate:.2} a second", survey.turns)]);
         }
         if survey.is_cut {

@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use agv_host_sim::import::poses;
+use agv_host_sim::lidar3d::Source;
 use agv_host_sim::lidar3d::place_map::{self, PlaceMap, StoredPlace};
 use agv_host_sim::lidar3d::signatures::{Method, Signatures, sensor_height};
-use agv_host_sim::lidar3d::Source;
 use agv_lidar3d::cloud::{Cloud, RingOrder};
 use agv_lidar3d::place::KeySignatures;
 use anyhow::{Context, ensure};
@@ -158,9 +158,10 @@ impl Index {
                 },
             };
             let is_place = match pose {
-                Some([x, y, _]) => places.last().and_then(|place| place.pose).is_none_or(|last| {
-                    (x - last[0]).hypot(y - last[1]) >= self.shift
-                }),
+                Some([x, y, _]) => places
+                    .last()
+                    .and_then(|place| place.pose)
+                    .is_none_or(|last| (x - last[0]).hypot(y - last[1]) >= self.shift),
                 None => keys.is_key(&signatures.counts),
             };
             if is_place {
@@ -225,7 +226,10 @@ impl Find {
         let method = Method::from(self.method);
         let named = |path: &Path| path.display().to_string();
         let threshold = self.threshold.or_else(|| map.threshold(method)).with_context(|| {
-            format!("{}: the places are too few or too near to each other to learn a threshold; state --threshold", named(&self.places))
+            format!(
+                "{}: the places are too few or too near to each other to learn a threshold; state --threshold",
+                named(&self.places)
+            )
         })?;
         let mut answers = Vec::new();
         self.drive.for_each(Some(map.sensor_height), |scan, signatures| {
