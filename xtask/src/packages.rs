@@ -33,7 +33,11 @@ const REQUIREMENTS: [Requirement; 3] = [
 ];
 
 /// Packages of Python that Debian does not have, and the modules that they bring.
-const PYTHON_PACKAGES: [(&str, &str); 2] = [("cantools>=39,<50", "cantools"), ("canopen>=2.2,<3", "canopen")];
+const PYTHON_PACKAGES: [(&str, &str); 3] = [
+    ("cantools>=39,<50", "cantools"),
+    ("canopen>=2.2,<3", "canopen"),
+    ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
+];
 
 /// Puts the Python packages into `folder`. Returns what is still missing, one line each.
 pub fn prepare_python(folder: &Path) -> Vec<String> {
@@ -60,7 +64,7 @@ pub fn prepare_python(folder: &Path) -> Vec<String> {
         return Vec::new();
     }
     vec![format!(
-        "missing: the independent readers of agv.dbc and agv.eds; install them with `python3 -m pip install --target {} {}`",
+        "missing: the independent readers of agv.dbc, agv.eds and packets of lidars; install them with `python3 -m pip install --target {} {}`",
         folder.display(),
         packages.map(|package| format!("'{package}'")).join(" ")
     )]

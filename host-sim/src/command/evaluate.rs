@@ -12,6 +12,7 @@ mod places;
 mod slam;
 mod warehouse;
 
+pub use lidar3d_places::Lidar3dPlaces;
 pub use places::Places;
 
 /// A log of the thesis.

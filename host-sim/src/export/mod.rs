@@ -2,3 +2,5 @@
 
 pub mod candump;
 pub mod keypoints;
+pub mod point_cloud;
+pub mod velodyne;

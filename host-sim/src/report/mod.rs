@@ -3,6 +3,7 @@
 mod charts;
 mod figure;
 mod page;
+pub mod scan_picture;
 mod state_timeline;
 mod thinning;
 mod trajectories;
