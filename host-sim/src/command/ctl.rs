@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use agv_core::geometry::Pose;
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, Setting};
+use agv_host_sim::link::with_port;
 use agv_settings::leaf::Value;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
@@ -177,7 +178,7 @@ impl Ctl {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let key = self.key.as_deref().map(read_key).transpose()?;
-        let host = if self.host.contains(':') { self.host.clone() } else { format!("{}:{PORT}", self.host) };
+        let host = with_port(&self.host, PORT);
         let mut client = Client::connect(&host, key)?;
         match &self.action {
             Action::Version => {

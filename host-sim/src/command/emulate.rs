@@ -15,7 +15,7 @@ use super::output::print_rows;
 
 const HELP: &str = "\
 The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
-replayed here afterwards, and must give the same bits. In the repository, `cargo xtask emulate` builds the firmware first.
+replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that is printed. In the repository, `cargo xtask emulate` builds the firmware first.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
@@ -118,8 +118,9 @@ impl Emulate {
     }
 }
 
-/// Shows the pose while the vehicle drives, on a terminal only.
+/// Says where the drive can be seen, and shows the pose while the vehicle drives, on a terminal only.
 fn look(watch: &Watch) {
+    eprintln!("see it live: agv view --live 127.0.0.1:{}", watch.stream_port);
     let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
     let progress = ProgressBar::new_spinner().with_style(style);
     while !watch.is_over() {

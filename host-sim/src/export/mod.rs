@@ -1,4 +1,9 @@
 //! Files for other programs.
 
+pub mod answered;
 pub mod candump;
+pub mod csv;
 pub mod keypoints;
+pub mod mcap;
+pub mod rosbag2;
+pub mod tum;

@@ -9,6 +9,7 @@ pub mod packets;
 mod posed_scan;
 pub mod range_image;
 pub mod raw;
+pub mod ros;
 pub mod sapienza;
 mod scan_drive;
 mod scan_record;

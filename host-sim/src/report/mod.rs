@@ -2,6 +2,7 @@
 
 mod charts;
 mod figure;
+mod heat_map;
 mod page;
 mod state_timeline;
 mod thinning;
@@ -9,6 +10,7 @@ mod trajectories;
 
 pub use charts::{Bounds, LandmarkMark, landmark_timeline, line_chart, scatter_chart};
 pub use figure::{Figure, FigureError, PointSet, Series};
+pub use heat_map::{Cell, HeatMap, heat_map};
 pub use page::{Page, Table};
 pub use state_timeline::{StateSpan, state_timeline};
 pub use trajectories::{Map, trajectory_plot};

@@ -147,6 +147,7 @@ fn swatch(mark: Mark, RGBColor(red, green, blue): RGBColor) -> String {
         Mark::Dashes => {
             format!("<path d=\"M0 8H32\" stroke=\"{ink}\" stroke-width=\"3\" stroke-dasharray=\"8 4\"/>")
         }
+        Mark::Square => format!("<rect x=\"8\" y=\"1\" width=\"16\" height=\"14\" fill=\"{ink}\" stroke=\"#555\"/>"),
         Mark::Point(Shape::Disc) => format!("<circle cx=\"16\" cy=\"8\" r=\"5\" fill=\"{ink}\"/>"),
         Mark::Point(Shape::Cross) => {
             format!("<path d=\"M11 3L21 13M11 13L21 3\" stroke=\"{ink}\" stroke-width=\"2\"/>")
