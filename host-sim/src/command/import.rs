@@ -16,7 +16,9 @@ use indicatif::ProgressBar;
 
 use super::encoder_arguments::EncoderArguments;
 use super::like;
+use super::output::note;
 use super::pose_argument;
+use super::progress;
 use super::summary::Summary;
 
 const HELP: &str = "\
@@ -94,7 +96,7 @@ impl Import {
             stated => stated,
         };
         // Shown on a terminal only, and gone when an error is reported.
-        let progress = ProgressBar::new_spinner().with_message(format!("reading {}", self.input.display()));
+        let progress = progress::spinner().with_message(format!("reading {}", self.input.display()));
         progress.enable_steady_tick(Duration::from_millis(100));
         let recording = match format {
             Format::Candump => return self.import_raw(&progress, candump_bytes(&self.input)?),
@@ -133,13 +135,13 @@ impl Import {
         let found = capture::read(&self.input, &ports)?;
         let input = self.input.display();
         if found.lost > 0 {
-            eprintln!("agv: {input}: {} bytes of the connection were not captured", found.lost);
+            note(&format!("agv: {input}: {} bytes of the connection were not captured", found.lost));
         }
         if found.left_out > 0 {
-            eprintln!("agv: {input}: {} connections beside the main one are left out", found.left_out);
+            note(&format!("agv: {input}: {} connections beside the main one are left out", found.left_out));
         }
         if found.is_cut {
-            eprintln!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets);
+            note(&format!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets));
         }
         Ok(found.raw)
     }
@@ -147,7 +149,7 @@ impl Import {
     fn raw_drive(&self) -> anyhow::Result<Recording> {
         let (recording, damages) = raw::read_drive(&self.input, &self.encoders.nodes())?;
         for damage in &damages {
-            eprintln!("agv: {}: {damage}", self.input.display());
+            note(&format!("agv: {}: {damage}", self.input.display()));
         }
         if recording.events.is_empty() {
             bail!("{}: there are no raw bytes in the log that mean anything", self.input.display());

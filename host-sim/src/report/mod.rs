@@ -4,6 +4,7 @@ mod charts;
 mod figure;
 mod heat_map;
 mod page;
+mod pdf;
 mod state_timeline;
 mod thinning;
 mod trajectories;
@@ -12,5 +13,6 @@ pub use charts::{Bounds, LandmarkMark, landmark_timeline, line_chart, scatter_ch
 pub use figure::{Figure, FigureError, PointSet, Series};
 pub use heat_map::{Cell, HeatMap, heat_map};
 pub use page::{Page, Table};
+pub use pdf::{PdfError, write_pdf};
 pub use state_timeline::{StateSpan, state_timeline};
 pub use trajectories::{Map, trajectory_plot};

@@ -48,23 +48,35 @@ fn is_localised(mode: Mode) -> bool {
     matches!(mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
 }
 
-/// What a change from one mode to the next means; None if there is none.
-pub(super) fn of_modes(before: Option<(Mode, Reason)>, now: &PoseOutput) -> Option<(HappeningKind, String)> {
-    if before == Some((now.mode, now.reason)) {
-        return None;
+/// The mode as it was last said.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ModeMemory {
+    last: Option<(Mode, Reason)>,
+    /// Whether the vehicle has been lost, or never known where it is, since it last was localised.
+    was_lost: bool,
+}
+
+impl ModeMemory {
+    pub(super) const NEW: Self = Self { last: None, was_lost: true };
+
+    /// What the mode of an answer means; None if nothing has changed.
+    pub(super) fn take(&mut self, now: &PoseOutput) -> Option<(HappeningKind, String)> {
+        let before = self.last.replace((now.mode, now.reason));
+        if before == self.last {
+            return None;
+        }
+        let kind = if now.mode == Mode::Lost && before.is_none_or(|(mode, _)| mode != Mode::Lost) {
+            HappeningKind::Lost
+        } else if is_localised(now.mode) && self.was_lost {
+            HappeningKind::Relocalised
+        } else {
+            HappeningKind::Mode
+        };
+        self.was_lost = now.mode == Mode::Lost || (self.was_lost && !is_localised(now.mode));
+        let reason = reason_name(now.reason);
+        let name = mode_name(now.mode);
+        Some((kind, if reason.is_empty() { name.to_owned() } else { format!("{name}: {reason}") }))
     }
-    let mode = before.map(|(mode, _)| mode);
-    let kind = if now.mode == Mode::Lost && mode != Some(Mode::Lost) {
-        HappeningKind::Lost
-    } else if is_localised(now.mode) && mode.is_none_or(|mode| matches!(mode, Mode::Lost | Mode::NotLocalised)) {
-        HappeningKind::Relocalised
-    } else {
-        HappeningKind::Mode
-    };
-    let reason = reason_name(now.reason);
-    let text =
-        if reason.is_empty() { mode_name(now.mode).to_owned() } else { format!("{}: {reason}", mode_name(now.mode)) };
-    Some((kind, text))
 }
 
 /// What became of the encoders.

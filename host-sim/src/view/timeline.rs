@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::localizer::{Event, LandmarkUse, Mode, Parameters, PoseOutput, Reason};
+use agv_core::localizer::{Event, LandmarkUse, Mode, Parameters, PoseOutput};
 use agv_core::measurement::{EncoderFaults, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::record::{Damage, DamageReason, Output, Record};
 use serde::Serialize;
 
-use super::happening::{self, Happening, HappeningKind};
+use super::happening::{self, Happening, HappeningKind, ModeMemory};
 use super::hits::Hits;
 use super::scans::Scans;
 use crate::evaluate::drive::parameter_rows;
@@ -51,7 +51,7 @@ pub struct Timeline {
     pub(super) laser: Vec<Time>,
     pub(super) happenings: Vec<Happening>,
     span: Option<(Time, Time)>,
-    mode: Option<(Mode, Reason)>,
+    mode: ModeMemory,
     asked: Asked,
     /// Share of the work that is done, 0 to 1.
     pub(super) progress: f64,
@@ -135,7 +135,7 @@ impl Timeline {
             laser: Vec::new(),
             happenings: Vec::new(),
             span: None,
-            mode: None,
+            mode: ModeMemory::NEW,
             asked: Asked::Other,
             progress: 0.0,
             is_live: false,
@@ -289,10 +289,9 @@ impl Timeline {
     pub(super) fn take_replayed(&mut self, asked: Asked, pose: &PoseOutput, uses: &[LandmarkUse]) {
         let beginning = self.span.map(|(start, _)| start).unwrap_or_default();
         let time = if pose.mode == Mode::NotLocalised { beginning } else { pose.time };
-        if let Some((kind, text)) = happening::of_modes(self.mode, pose) {
+        if let Some((kind, text)) = self.mode.take(pose) {
             self.happen(time, kind, text);
         }
-        self.mode = Some((pose.mode, pose.reason));
         if pose.mode == Mode::NotLocalised {
             return;
         }
