@@ -16,7 +16,8 @@ use super::progress;
 
 const HELP: &str = "\
 The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
-replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that is printed. In the repository, `cargo xtask emulate` builds the firmware first.
+replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that
+is printed. In the repository, `cargo xtask emulate` builds the firmware first.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle

@@ -110,7 +110,7 @@ pub fn read(path: &Path, choice: &Choice) -> Result<Recording, RosImportError> {
     // Recorders store messages as they come, but not always one topic in the order of the other.
     heard.sort_by_key(|(time, _)| *time);
     let first = heard.iter().map(|(_, message)| message.stamp().nanoseconds()).min().unwrap_or_default();
-    let clock = |stamp: Stamp| Time::from_micros((stamp.nanoseconds() - first).max(0).unsigned_abs() / 1000);
+    let clock = |stamp: Stamp| Time::from_micros(((stamp.nanoseconds() - first).max(0).unsigned_abs() + 500) / 1000);
     let laser = match choice.laser {
         Some(stated) => stated,
         None => laser_pose(path, &heard, &transforms)?,

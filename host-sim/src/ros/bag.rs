@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use mcap::sans_io::linear_reader::LinearReaderOptions;
 use rusqlite::{Connection, OpenFlags};
 use serde::Deserialize;
 
@@ -93,6 +94,9 @@ struct Information {
     compression_format: String,
 }
 
+/// Longest record or chunk of an MCAP file, bytes; a longer one is damage.
+const LARGEST_RECORD: usize = 1 << 28;
+
 const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
 
 impl Bag {
@@ -160,7 +164,11 @@ fn storage(path: &Path) -> Result<Storage, BagError> {
 
 fn read_mcap(path: &Path, take: &mut impl FnMut(&BagMessage)) -> Result<(), BagError> {
     let file = File::open(path).map_err(|source| io_error(path, source))?;
-    for (number, message) in (0..).zip(mcap::io::MessageReader::new(BufReader::new(file))) {
+    // Nothing is believed before its checksum is.
+    let options =
+        LinearReaderOptions::default().with_prevalidate_chunk_crcs(true).with_record_length_limit(LARGEST_RECORD);
+    let reader = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
+    for (number, message) in (0..).zip(reader) {
         let message = message.map_err(|source| BagError::Mcap { path: path.to_owned(), message: number, source })?;
         // Messages in other encodings are none of ROS 2.
         let Some(schema) = message.channel.schema.as_ref().filter(|_| message.channel.message_encoding == "cdr") else {

@@ -76,18 +76,18 @@ fn what_is_no_layout_is_refused() {
 fn a_check_warns_and_draws() {
     let files = Files::new();
     // Two rows along an aisle, mirror images of each other, and one reflector beside another.
-    let mut text: String = (0..12)
+    let mut lines: String = (0..12)
         .flat_map(|number| [(number, 0), (number, 1)])
         .map(|(number, side)| {
             let x = number * 4000 + (number * number * 173) % 1500;
             format!("{} {x} {} 1 2 80 0\n", number * 2 + side, side * 6000)
         })
         .collect();
-    text.push_str("90 200 0 1 2 80 0\n");
-    let layout = files.write("aisle.imk", text.as_bytes());
+    lines.push_str("90 200 0 1 2 80 0\n");
+    let layout = files.write("aisle.imk", lines.as_bytes());
     let report = files.path("report");
     let run = agv(&["layout", "check", &layout, "--report", &report, "--json"]);
-    assert!(run.status.success(), "{}", text_of(&run));
+    assert!(run.status.success(), "{}", text(&run.stderr));
     let check: Value = serde_json::from_slice(&run.stdout).unwrap();
     assert_eq!(check["close_pairs"][0]["reflectors"], serde_json::json!([0, 24]));
     let mirror = &check["mirrors"][0];
@@ -106,8 +106,4 @@ fn a_check_warns_and_draws() {
     let run = agv(&["layout", "check", &layout]);
     let said = text(&run.stdout);
     assert!(said.contains("0.20 m apart") && said.contains("mirror images"), "{said}");
-}
-
-fn text_of(run: &std::process::Output) -> String {
-    text(&run.stderr).to_owned()
 }
