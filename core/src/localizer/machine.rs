@@ -166,6 +166,12 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
         self.maps.dynamic.landmarks()
     }
 
+    /// The map of the reflectors.
+    #[must_use]
+    pub fn reflectors(&self) -> &FixedMap<REFLECTORS> {
+        &self.maps.reflectors
+    }
+
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {

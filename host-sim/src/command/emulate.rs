@@ -22,6 +22,7 @@ is printed. In the repository, `cargo xtask emulate` builds the firmware first.
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
   agv emulate --image vehicle --scenario host-sim/scenarios/warehouse_hall.toml --seconds 30 --json
+  agv emulate --image vehicle --untold --seconds 10
   agv emulate --image vehicle --folder /tmp/vehicle && defmt-print -e vehicle < /tmp/vehicle/defmt.bin";
 
 /// Drive a vehicle whose controller runs the firmware in emulation
@@ -40,6 +41,9 @@ pub struct Emulate {
     /// Folder for the board's files: flash.bin, defmt.bin, stream.agvlog. A temporary one if absent.
     #[arg(long)]
     folder: Option<PathBuf>,
+    /// Do not tell the vehicle where it is: it finds itself by its reflectors.
+    #[arg(long)]
+    untold: bool,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -68,7 +72,8 @@ impl Emulate {
         let folder = self.folder.clone().unwrap_or_else(|| temporary.clone());
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let folder = folder.canonicalize()?;
-        let options = VehicleOptions { image: &image, folder: &folder, key: None, provision: true };
+        let options =
+            VehicleOptions { image: &image, folder: &folder, key: None, provision: true, is_told: !self.untold };
         let outcome = self.drive(&recording, &options);
         if self.folder.is_none() {
             // What cannot be removed is left to the system.

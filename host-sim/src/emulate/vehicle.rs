@@ -95,6 +95,8 @@ pub struct VehicleOptions<'a> {
     pub key: Option<[u8; KEY]>,
     /// Whether the flash begins with settings. If not, the controller finds the file `flash.bin` that is there.
     pub provision: bool,
+    /// Whether the controller is told where it is when it starts. If not, it has to find out.
+    pub is_told: bool,
 }
 
 /// Standard deviations of the pose that the controller is told, m and rad.
@@ -223,7 +225,15 @@ pub fn drive(
     let (trouble, is_laser_on) = (BusTrouble::default(), AtomicBool::new(true));
     let (is_streaming, stopped) = (AtomicBool::new(false), Arc::new(AtomicBool::new(false)));
     let ports = board.ports;
-    let stage = Stage { recording, settings: &settings, sensor: &sensor, heard: &heard, trouble: &trouble, first };
+    let stage = Stage {
+        recording,
+        settings: &settings,
+        sensor: &sensor,
+        heard: &heard,
+        trouble: &trouble,
+        first,
+        is_told: options.is_told,
+    };
     let stream_host = format!("127.0.0.1:{}", ports.log);
     let relay = Relay::bind()?;
     let stream_port = relay.port()?;
@@ -296,6 +306,7 @@ struct Stage<'a> {
     heard: &'a Mutex<Heard>,
     trouble: &'a BusTrouble,
     first: Time,
+    is_told: bool,
 }
 
 impl Stage<'_> {
@@ -366,7 +377,7 @@ impl Stage<'_> {
                 pair.begin(now().offset(LEAD.as_secs_f64() + shift));
                 self.heard().begin = Some(begin);
                 end = Some(begin + Duration::from_secs_f64(seconds.min(pair.duration())));
-            } else if pair.are_operational() && last_order.elapsed() > Duration::from_millis(500) {
+            } else if self.is_told && pair.are_operational() && last_order.elapsed() > Duration::from_millis(500) {
                 last_order = Instant::now();
                 orders = (orders + 1) % 16;
                 for frame in self.initial_pose(controller, orders) {
