@@ -8,14 +8,16 @@ use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
 use anyhow::{Context, bail};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressStyle;
 use serde::Serialize;
 
-use super::output::print_rows;
+use super::output::{note, print_rows};
+use super::progress;
 
 const HELP: &str = "\
 The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
-replayed here afterwards, and must give the same bits. In the repository, `cargo xtask emulate` builds the firmware first.
+replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that
+is printed. In the repository, `cargo xtask emulate` builds the firmware first.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
@@ -123,10 +125,11 @@ impl Emulate {
     }
 }
 
-/// Shows the pose while the vehicle drives, on a terminal only.
+/// Says where the drive can be seen, and shows the pose while the vehicle drives, on a terminal only.
 fn look(watch: &Watch) {
+    note(&format!("see it live: agv view --live 127.0.0.1:{}", watch.stream_port));
     let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
-    let progress = ProgressBar::new_spinner().with_style(style);
+    let progress = progress::spinner().with_style(style);
     while !watch.is_over() {
         let driven = watch.driven().map_or(0.0, |time| time.as_secs_f64());
         let line = watch.pose().map_or_else(

@@ -17,7 +17,7 @@ use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::{output, progress};
+use super::{output, pose_argument, progress};
 
 const HELP: &str = "\
 Examples:
@@ -90,13 +90,8 @@ fn start(text: &str) -> Result<Start, String> {
     if text == "recorded" {
         return Ok(Start::Recorded);
     }
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse::<f64>()).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, heading]) if [x, y, heading].iter().all(|value| value.is_finite()) => {
-            Ok(Start::Given(Pose::new(x, y, heading.to_radians())))
-        }
-        _ => Err("three numbers, or 'recorded', are expected".to_owned()),
-    }
+    let problem = || "three numbers X,Y,HEADING, or 'recorded', are expected".to_owned();
+    pose_argument::pose(text).map(Start::Given).map_err(|_| problem())
 }
 
 #[derive(Serialize)]
