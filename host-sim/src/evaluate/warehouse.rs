@@ -29,6 +29,8 @@ pub enum Map {
     Static,
     /// Features found while driving, Algorithm 1 (K 5.4.1).
     Dynamic,
+    /// Features found while driving, in the state of the filter.
+    Slam,
     /// Surveyed reflectors and features mapped on another path.
     Mixed,
 }
@@ -69,7 +71,7 @@ const PRINTED_DEVIATION: f64 = 0.034;
 
 impl Method {
     /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::mended("odometry", Map::Odometry),
         Self::mended("reflectors", Map::Reflectors),
         Self::mended("static", Map::Static),
@@ -80,6 +82,7 @@ impl Method {
             added_deviation: PRINTED_DEVIATION,
         },
         Self::mended("dynamic", Map::Dynamic),
+        Self::mended("slam", Map::Slam),
         Self::mended("mixed", Map::Mixed),
     ];
 
@@ -191,6 +194,7 @@ pub fn prepare(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Sim
         reflectors: method.map.uses_reflectors(),
         features: method.map.has_static_features(),
         dynamic: method.map == Map::Dynamic,
+        slam: method.map == Map::Slam,
     };
     if method.map.has_static_features() {
         let mapping = scenario(BlockStoragePath::Mapping, method.map, seed, seed ^ MAPPING_SEED_BIT);
