@@ -12,7 +12,7 @@ use agv_host_sim::{data, log, replay};
 fn images(test: &str) -> Option<PathBuf> {
     let target = "../target/firmware/an500/thumbv7em-none-eabihf/firmware";
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(target);
-    if ["replay", "measure", "latency", "restart"].iter().any(|image| !folder.join(image).exists()) {
+    if ["calibrate", "replay", "measure", "latency", "restart"].iter().any(|image| !folder.join(image).exists()) {
         data::skip(test, "the firmware is not built; cargo xtask firmware build");
         return None;
     }
@@ -115,6 +115,23 @@ fn no_prediction_waits_for_a_scan() {
     let instructions = latest * 1000 / 64;
     assert!(instructions <= LATEST_PREDICTION, "{instructions} instructions");
     assert_eq!(lost, 0);
+}
+
+#[test]
+fn the_emulated_controller_calibrates_to_the_same_bits() {
+    let Some(images) = images("the_emulated_controller_calibrates_to_the_same_bits") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    run(&images.join("calibrate"), folder.path(), &["-icount", "shift=6,sleep=off"]);
+    let found = std::fs::read_to_string(folder.path().join("calibration.txt")).unwrap();
+    println!("{found}");
+    let (cost, bits) = found.split_once('\n').unwrap();
+    let numbers: Vec<usize> = cost.split(' ').filter_map(|word| word.parse().ok()).collect();
+    // The sums of a whole drive; and all that this drive took, its own sums included, as they are on the stack.
+    let [sums, stack, _] = numbers[..] else { panic!("{cost}") };
+    assert!(sums <= 2048 && stack <= 2048, "{cost}");
+    let expected = agv_core::calibration::reference_drive_bits().unwrap();
+    let expected: Vec<String> = expected.iter().map(|number| format!("{number:016x}")).collect();
+    assert_eq!(bits.lines().collect::<Vec<_>>(), expected);
 }
 
 #[test]
