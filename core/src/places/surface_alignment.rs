@@ -1,6 +1,7 @@
 //! The pose under which a scan lies on the surfaces of an earlier one: points to planes, iterated, robustly weighted.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::SurfaceScan;
 use super::correspondence::Transform;
@@ -9,7 +10,8 @@ use crate::features::PointScan;
 use crate::geometry::{Pose, ScanPoint, wrap};
 
 /// How a scan is aligned to surfaces.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SurfaceAlignmentParameters {
     /// Returns further from a piece of surface than this are not on it, m.
     pub reach: f32,

@@ -1,11 +1,11 @@
 //! A scan as pieces of surface, looked up by direction: what later scans are aligned to.
 
-use crate::features::PointScan;
-use crate::features::line::Moments;
-use crate::geometry::ScanPoint;
+use serde::{Deserialize, Serialize};
 
 use super::correspondence::Transform;
-use crate::geometry::Pose;
+use crate::features::PointScan;
+use crate::features::line::Moments;
+use crate::geometry::{Pose, ScanPoint};
 
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,8 @@ impl Surface {
 }
 
 /// How pieces of surface are found.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SurfaceParameters {
     /// Points within this radius are of one piece, m.
     pub radius: f32,

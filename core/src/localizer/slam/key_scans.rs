@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use crate::features::PointScan;
 use crate::filter::{Augmented, RelativePose};
 use crate::geometry::{Pose, difference};
-use crate::places::{SurfaceAlignmentParameters, SurfaceParameters, SurfaceScan, align_to_surfaces};
+use crate::places::{SurfaceScan, align_to_surfaces};
 
 use super::KeyScanParameters;
 
@@ -44,8 +44,7 @@ impl<const KEYS: usize> KeyScans<KEYS> {
         for (key, surfaces) in self.surfaces.iter().enumerate() {
             let Some(expected) = filter.expected_relative_pose(key, laser) else { continue };
             let start = expected.compose(&from_place);
-            let how = SurfaceAlignmentParameters::default();
-            let Some(found) = align_to_surfaces(points, surfaces, &start, &how) else { continue };
+            let Some(found) = align_to_surfaces(points, surfaces, &start, &parameters.alignment) else { continue };
             if f64::from(found.points) < parameters.least_share * returns as f64 {
                 continue;
             }
@@ -89,7 +88,7 @@ impl<const KEYS: usize> KeyScans<KEYS> {
         }
         let next = if self.newest + 1 < KEYS { self.newest + 1 } else { 0 };
         if let Some(surfaces) = self.surfaces.get_mut(next) {
-            surfaces.set(points, place, &SurfaceParameters::default());
+            surfaces.set(points, place, &parameters.surfaces);
             filter.remember_pose(next);
             self.newest = next;
         }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::filter::BiasDeviations;
+use crate::places::{SurfaceAlignmentParameters, SurfaceParameters};
 
 /// How the pose, the calibration and the landmarks that are found while driving are estimated together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,6 +53,10 @@ pub struct KeyScanParameters {
     pub spacing: f64,
     /// Turn after which it does, rad.
     pub turn: f64,
+    /// How a key scan's surfaces are found.
+    pub surfaces: SurfaceParameters,
+    /// How scans are aligned to them.
+    pub alignment: SurfaceAlignmentParameters,
     /// Least share of a scan's returns that must lie on a key scan's surfaces.
     pub least_share: f64,
     /// By what the covariance of an alignment is multiplied that takes returns as independent.
@@ -70,6 +75,8 @@ impl Default for KeyScanParameters {
         Self {
             spacing: 2.0,
             turn: 0.35,
+            surfaces: SurfaceParameters::default(),
+            alignment: SurfaceAlignmentParameters::default(),
             least_share: 0.25,
             inflation: 12.0,
             position_floor: 0.5e-3,
