@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use agv_core::geometry::{Point, Pose};
+use agv_core::landmarks::{FixedMap, Landmark, MapError};
 use agv_core::places::{
-    ReflectorAnswer, ReflectorIndex, ReflectorIndexError, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
+    IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
 };
 use rayon::prelude::*;
@@ -94,15 +95,19 @@ pub struct Check {
 ///
 /// # Errors
 /// If there are too many reflectors, or one is nowhere.
-pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, ReflectorIndexError> {
-    let mut index = Box::new(ReflectorIndex::<REFLECTORS, 60_000>::new());
-    index.build(positions.iter().copied(), (2.0 * options.farthest) as f32)?;
+pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, MapError> {
+    let (mut map, mut index) = (Box::new(FixedMap::new()), Box::new(ReflectorIndex::new()));
+    let reflectors: Vec<Landmark> =
+        (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.0)).collect();
+    map.extend(&reflectors)?;
+    index.build(&map);
+    let map = IndexedReflectors { map: &map, index: &index };
     let places = grid(positions, options.spacing);
     let looked: Vec<CheckedPlace> = places
         .par_iter()
         .map_init(
             || Box::new(ReflectorRelocalizer::<64>::new(RelocalizationParameters::default())),
-            |relocalizer, place| look(place, positions, options, &index, relocalizer),
+            |relocalizer, place| look(place, positions, options, &map, relocalizer),
         )
         .collect();
     let share = |is: fn(&Finding) -> bool| {
@@ -139,7 +144,7 @@ fn look(
     place: &Point,
     positions: &[Point],
     options: &CheckOptions,
-    index: &ReflectorIndex<REFLECTORS, 60_000>,
+    map: &IndexedReflectors<REFLECTORS, 4096>,
     relocalizer: &mut ReflectorRelocalizer<64>,
 ) -> CheckedPlace {
     let mut near: Vec<_> = positions
@@ -153,9 +158,9 @@ fn look(
     for (distance, position) in &near {
         snapshot.see(&(*position - place), *distance, &ReflectorNoise::default());
     }
-    relocalizer.begin(&snapshot, index);
+    relocalizer.begin(&snapshot, map);
     let answer = loop {
-        if let RelocalizationProgress::Done(answer) = relocalizer.advance(index, u32::MAX) {
+        if let RelocalizationProgress::Done(answer) = relocalizer.advance(map, u32::MAX) {
             break answer;
         }
     };

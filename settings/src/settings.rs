@@ -15,6 +15,8 @@ pub struct Settings {
     pub encoder_period: u16,
     /// Who is who on the network.
     pub network: Network,
+    /// Whether a vehicle that does not know where it is searches its pose among the reflectors of its map.
+    pub start_search: bool,
 }
 
 /// Numbers of the nodes on the CAN bus, 1 to 127.
@@ -81,6 +83,7 @@ impl Settings {
                 log_port: 5350,
                 service_port: 5351,
             },
+            start_search: true,
         }
     }
 }

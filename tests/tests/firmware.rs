@@ -54,11 +54,13 @@ fn the_emulated_controller_says_the_same_bits() {
 }
 
 /// Most instructions that a piece of work may take: with 480 MHz, the scan cycle ends in about 10 ms.
-const BUDGETS: [(&str, u64); 4] = [
+const BUDGETS: [(&str, u64); 6] = [
     ("prediction", 4_000),
     ("one reflector update", 25_000),
     ("falko on 1440 beams", 3_000_000),
     ("scan cycle", 5_000_000),
+    ("a revolution's search among 60 reflectors", 1_000_000),
+    ("a revolution's search among 1000 reflectors", 50_000_000),
 ];
 
 #[test]
@@ -78,7 +80,7 @@ fn work_costs_the_instructions_that_it_did() {
     for (work, budget) in BUDGETS {
         let row = rows.iter().find(|row| row[0] == work).unwrap();
         let most: u64 = row[3].parse().unwrap();
-        assert!(row[1].parse::<u64>().unwrap() > 10, "{row:?}");
+        assert!(row[1].parse::<u64>().unwrap() >= 10, "{row:?}");
         assert!(most <= budget, "{work} takes {most} instructions, {budget} are allowed");
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/instructions.csv");

@@ -49,7 +49,7 @@ impl<const LANDMARKS: usize> FixedMap<LANDMARKS> {
             }
             self.landmarks.push(*landmark).map_err(|_| MapError::Full)
         });
-        self.grid.build(self.landmarks.iter().map(|landmark| Point::new(landmark.x, landmark.y)));
+        self.grid.build(self.landmarks.iter().map(Landmark::position));
         outcome
     }
 
@@ -63,6 +63,21 @@ impl<const LANDMARKS: usize> FixedMap<LANDMARKS> {
     #[must_use]
     pub fn landmarks(&self) -> &[Landmark] {
         &self.landmarks
+    }
+
+    /// The landmark nearest to `point` and the squared distance, m^2; none beyond `radius` (m, at most three cells of 2 m).
+    #[must_use]
+    pub fn nearest(&self, point: Point, radius: f64) -> Option<(&Landmark, f64)> {
+        let mut limit = radius * radius;
+        let mut best = None;
+        for landmark in self.grid.near(point, radius).filter_map(|index| self.landmarks.get(index)) {
+            let square = (landmark.position() - point).norm_squared();
+            if square <= limit {
+                limit = square;
+                best = Some((landmark, square));
+            }
+        }
+        best
     }
 
     /// The landmarks within `radius` (m, at most three cells of 2 m) of `point`.

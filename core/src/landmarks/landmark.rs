@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::Point;
+
 /// What a landmark is; an observation is only compared with landmarks of its own kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -27,4 +29,18 @@ pub struct Landmark {
     pub y: f64,
     /// Standard deviation of the position along each axis, m.
     pub deviation: f32,
+}
+
+impl Landmark {
+    /// A reflector at `position` (W, m), surveyed with that deviation, m.
+    #[must_use]
+    pub fn reflector(id: u16, position: Point, deviation: f32) -> Self {
+        Self { id, kind: LandmarkKind::Reflector, x: position.x, y: position.y, deviation }
+    }
+
+    /// Position in W, m.
+    #[must_use]
+    pub fn position(&self) -> Point {
+        Point::new(self.x, self.y)
+    }
 }

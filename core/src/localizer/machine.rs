@@ -185,6 +185,12 @@ impl<
         self.maps.dynamic.landmarks()
     }
 
+    /// The map of the reflectors.
+    #[must_use]
+    pub fn reflectors(&self) -> &FixedMap<REFLECTORS> {
+        &self.maps.reflectors
+    }
+
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {

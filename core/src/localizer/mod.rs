@@ -16,7 +16,7 @@ pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
 
 pub use slam::{KeyScanParameters, SLAM_ENTRIES, SLAM_STATES, SlamParameters};
-pub use start_finder::{HYPOTHESES, StartFinder, StartState};
+pub use start_finder::{StartFinder, StartState};
 
 pub use crate::measurement::PoseFix;
 pub use crate::state::{Mode, PoseOutput, Reason};

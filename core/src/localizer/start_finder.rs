@@ -11,7 +11,7 @@ use crate::geometry::{Point, Pose};
 use crate::measurement::{ReflectorObservation, Time};
 use crate::odometry::{Motion, Odometer, OdometryError};
 use crate::places::{
-    ReflectorAnswer, ReflectorFix, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
+    IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
 };
 
@@ -20,7 +20,7 @@ use crate::places::{
 pub enum StartState {
     /// No revolution has been seen since the last answer.
     Waiting,
-    /// The search goes on in the next revolution.
+    /// The search is to go on.
     Searching,
     /// The vehicle is here.
     Found(PoseFix),
@@ -38,9 +38,6 @@ const OBSERVATIONS: usize = 64;
 /// Way after which what was seen before is forgotten, m: the odometry has then carried it too far.
 const LONGEST_WAY: f64 = 10.0;
 
-/// Hypotheses tried in one revolution unless stated otherwise.
-pub const HYPOTHESES: u32 = 20_000;
-
 /// A found pose is not surer than this, m and rad: reflectors are passed by a moving vehicle.
 const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 
@@ -56,14 +53,13 @@ pub struct StartFinder<const SEEN: usize = 64> {
     /// Motion since the search began; none if no search is under way.
     since: Option<Pose>,
     way: f64,
-    hypotheses: u32,
     found: Vec<ReflectorObservation, OBSERVATIONS>,
 }
 
 impl<const SEEN: usize> StartFinder<SEEN> {
-    /// A finder that has seen nothing; tries `hypotheses` in each revolution.
+    /// A finder that has seen nothing.
     #[must_use]
-    pub fn new(parameters: Parameters, search: RelocalizationParameters, hypotheses: u32) -> Self {
+    pub fn new(parameters: Parameters, search: RelocalizationParameters) -> Self {
         let (vehicle, noise) = (parameters.vehicle, parameters.odometry_noise);
         Self {
             odometer: Odometer::new(vehicle, noise, parameters.integration, parameters.limits.fastest),
@@ -72,50 +68,47 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             relocalizer: ReflectorRelocalizer::new(search),
             since: None,
             way: 0.0,
-            hypotheses,
             found: Vec::new(),
             parameters,
         }
     }
 
-    /// Takes one event. `index` is the map of the reflectors.
-    pub fn handle<const REFLECTORS: usize, const PAIRS: usize>(
+    /// Takes one event. A revolution begins a search unless one is under way.
+    pub fn handle<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
         event: &Event,
-        index: &ReflectorIndex<REFLECTORS, PAIRS>,
-    ) -> StartState {
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
+    ) {
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
-                self.travel(motion)
+                self.travel(motion);
             }
             Event::Speed(sample) => {
                 let motion = self.odometer.speed(sample);
-                self.travel(motion)
+                self.travel(motion);
             }
             Event::Increment(increment) => {
                 let motion = self.odometer.increment(increment);
-                self.travel(motion)
+                self.travel(motion);
             }
-            Event::Reflectors(reflectors) => return self.revolution(reflectors.observations, index),
+            Event::Reflectors(seen) => self.revolution(seen.observations, reflectors),
             Event::Scan(scan) => {
                 if let Some(detection) = self.parameters.reflectors.detection
                     && !scan.intensities.is_empty()
                 {
                     let mut found = core::mem::take(&mut self.found);
                     detect_reflectors(scan, &detection, &mut found);
-                    let state = self.revolution(&found, index);
+                    self.revolution(&found, reflectors);
                     self.found = found;
-                    return state;
                 }
             }
             Event::EncoderFaults(_) | Event::SetPose(_) => self.forget(),
         }
-        StartState::Waiting
     }
 
-    /// Forgets what was seen.
-    fn forget(&mut self) {
+    /// Forgets what was seen; a search that is under way is given up.
+    pub fn forget(&mut self) {
         self.snapshot.clear();
         self.since = None;
         self.way = 0.0;
@@ -140,18 +133,27 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         }
     }
 
-    fn revolution<const REFLECTORS: usize, const PAIRS: usize>(
+    fn revolution<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
         observations: &[ReflectorObservation],
-        index: &ReflectorIndex<REFLECTORS, PAIRS>,
-    ) -> StartState {
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
+    ) {
         self.see(observations);
         if self.since.is_none() {
-            self.relocalizer.begin(&self.snapshot, index);
+            self.relocalizer.begin(&self.snapshot, reflectors);
             self.since = Some(Pose::default());
         }
-        let since = self.since.unwrap_or_default();
-        let answer = match self.relocalizer.advance(index, self.hypotheses) {
+    }
+
+    /// Goes on with the search that is under way, if one is, until about `effort` is spent: see
+    /// [`ReflectorRelocalizer::advance`].
+    pub fn search<const REFLECTORS: usize, const WORDS: usize>(
+        &mut self,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
+        effort: u32,
+    ) -> StartState {
+        let Some(since) = self.since else { return StartState::Waiting };
+        let answer = match self.relocalizer.advance(reflectors, effort) {
             RelocalizationProgress::Searching => return StartState::Searching,
             RelocalizationProgress::Done(answer) => answer,
         };

@@ -30,8 +30,8 @@ pub use place_index::{Candidate, PlaceIndex};
 pub use random_sample::{RandomSample, RandomSampleParameters};
 pub use recognition::{PlaceView, Recognition, RecognitionParameters, Recognizer};
 pub use reflectors::{
-    PairIndex, ReflectorAnswer, ReflectorFix, ReflectorIndex, ReflectorIndexError, ReflectorNoise,
-    ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters, RelocalizationProgress, SeenReflector,
+    IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer,
+    ReflectorSnapshot, RelocalizationParameters, RelocalizationProgress, SeenReflector,
 };
 pub use scan_alignment::{ScanAlignment, ScanAlignmentParameters, align_scans};
 pub use scan_overlap::{Overlap, OverlapParameters, overlap};

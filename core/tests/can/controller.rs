@@ -6,8 +6,8 @@ use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{
-    Content, ControllerError, Health, LaserHealth, Order, OrderReceiver, PosePublisher, PoseReceiver, WantedMode,
-    contents,
+    Content, ControllerError, Health, LaserHealth, Order, OrderReceiver, PosePublisher, PoseReceiver, StartSearch,
+    WantedMode, contents,
 };
 use agv_core::wire::can::frame::{Frame, standard_id};
 use proptest::prelude::*;
@@ -32,7 +32,13 @@ fn pose() -> PoseOutput {
 }
 
 fn health() -> Health {
-    Health { drive: None, steering: Some(EncoderFault::Frozen), laser: LaserHealth::Sound, layer: 3 }
+    Health {
+        drive: None,
+        steering: Some(EncoderFault::Frozen),
+        laser: LaserHealth::Sound,
+        layer: 3,
+        start_search: StartSearch::TooFew,
+    }
 }
 
 #[test]
@@ -46,8 +52,8 @@ fn literal_frames() {
     // 10 mm is 40 steps, 20 mm 80, 1 mrad 10; correlations 0.15, 0.2, -0.2 are 8, 10, -10.
     let payload = 40 | 80 << 13 | 10 << 26 | 8 << 39 | 10 << 46 | (-10i64 as u64 & 0x7F) << 53 | 5 << 60;
     assert_eq!(covariance, Frame::of(standard_id(0x390), u64::to_le_bytes(payload)));
-    // Mode 3, reason 0, 87 %, 43 steps, steering frozen (3), laser sound (1), layer 3.
-    let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 3 << 37 | 5u64 << 60;
+    // Mode 3, reason 0, 87 %, 43 steps, steering frozen (3), laser sound (1), layer 3, too few reflectors (3).
+    let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 3 << 37 | 3 << 53 | 5u64 << 60;
     assert_eq!(status, Frame::of(standard_id(0x490), payload.to_le_bytes()));
 }
 

@@ -72,7 +72,8 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
         }
         let (output, laser) = exchange::output();
         let Some(output) = output else { continue };
-        let health = Health { drive: faults.drive, steering: faults.steering, laser, layer: 0 };
+        let start_search = exchange::start_search();
+        let health = Health { drive: faults.drive, steering: faults.steering, laser, layer: 0, start_search };
         if let Some(frames) = publisher.poll(time, &output, &health) {
             for frame in &frames {
                 port.send(frame);

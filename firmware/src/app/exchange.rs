@@ -5,7 +5,7 @@ use core::cell::RefCell;
 use agv_core::localizer::{OutputPredictor, PoseFix};
 use agv_core::measurement::{EncoderFaults, EncoderSample, Time};
 use agv_core::state::PoseOutput;
-use agv_core::wire::can::controller::LaserHealth;
+use agv_core::wire::can::controller::{LaserHealth, StartSearch};
 use agv_core::wire::nav350::Revolution;
 use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -45,6 +45,7 @@ struct Published {
     /// Events that the localiser was too slow for.
     lost_events: u32,
     are_settings_sound: bool,
+    start_search: StartSearch,
     latest_prediction: u32,
 }
 
@@ -55,6 +56,7 @@ static PUBLISHED: Mutex<RefCell<Published>> = Mutex::new(RefCell::new(Published 
     stand: None,
     lost_events: 0,
     are_settings_sound: true,
+    start_search: StartSearch::Idle,
     latest_prediction: 0,
 }));
 
@@ -143,6 +145,17 @@ pub fn laser_has_measured() {
         published.last_revolution = Some(now());
         published.has_laser_failed = false;
     });
+}
+
+/// How far the search for a pose has come.
+pub fn set_start_search(state: StartSearch) {
+    with(|published| published.start_search = state);
+}
+
+/// How far the search for a pose has come.
+#[must_use]
+pub fn start_search() -> StartSearch {
+    with(|published| published.start_search)
 }
 
 /// The laser cannot be reached.

@@ -10,8 +10,10 @@ use core::panic::PanicInfo;
 use agv_core::localizer::{Event, Localizer, OutputPredictor};
 use agv_core::measurement::{EncoderSample, Scan};
 use agv_core::record::Record;
+use agv_firmware::app::exchange;
+use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogWriter};
-use agv_firmware::app::{exchange, localize};
+use agv_firmware::app::start_search::StartSearch;
 use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
 use agv_firmware::board::an500::log_file::LogBuffer;
@@ -32,6 +34,7 @@ defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
+static SEARCH: StaticCell<StartSearch> = StaticCell::new();
 static FRAME: ConstStaticCell<[u8; LONGEST]> = ConstStaticCell::new([0; LONGEST]);
 
 /// Ticks between samples, and the time between them: no multiple of anything, so that they meet a scan's work everywhere.
@@ -63,39 +66,43 @@ async fn encoders() {
 fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().expect("the program begins once");
     let mut file = HostFile::open(c"drive.agvlog").expect("there is a drive");
-    let mut log = LogWriter::new(FRAME.take(), 0);
-    let mut localizer: Option<&'static mut Localizer> = None;
+    let mut log = Some(LogWriter::new(FRAME.take(), 0));
+    let mut localization: Option<Localization> = None;
     let mut scans = 0;
     time_driver::start();
     uart::start();
     interrupts::enable(&mut core.NVIC);
     let outcome = BUFFER.take().for_each(&mut file, |record| match record {
-        Record::Header(header) if localizer.is_none() => {
+        Record::Header(header) if localization.is_none() => {
             let mut parameters = *header.parameters;
             parameters.maps.dynamic = true;
             exchange::start(OutputPredictor::new(&parameters));
-            localizer = Some(LOCALIZER.init_with(|| Localizer::new(parameters)));
+            localization = log.take().map(|log| Localization {
+                localizer: LOCALIZER.init_with(|| Localizer::new(parameters)),
+                search: SEARCH.init_with(|| StartSearch::new(&parameters, false)),
+                log,
+            });
             BUS_TASKS.start(Interrupt::BusTasks).spawn(encoders().expect("the task runs once"));
         }
         Record::Landmarks(piece) => {
-            if let Some(localizer) = &mut localizer {
+            if let Some(Localization { localizer, .. }) = &mut localization {
                 localizer.add_landmarks(piece).expect("the map has room");
             }
         }
         Record::Event(event) if scans < SCANS => {
-            let Some(localizer) = &mut localizer else { return };
-            while localize::take_bus_event(localizer, &mut log) {}
+            let Some(localization) = &mut localization else { return };
+            while localization.take_bus_event() {}
             match event {
                 Event::SetPose(fix) => {
                     let fix = agv_core::localizer::PoseFix { time: exchange::now(), ..*fix };
-                    localize::handle(localizer, &Event::SetPose(fix), &mut log);
+                    localization.handle(&Event::SetPose(fix));
                 }
                 Event::Scan(scan) => {
                     // It is true at the time of this program.
                     let length = scan.beam_interval * scan.ranges.len() as f64;
                     let scan = Scan { start: exchange::now().offset(-length), ..*scan };
                     IS_BUSY.store(1, Ordering::Relaxed);
-                    localize::handle(localizer, &Event::Scan(scan), &mut log);
+                    localization.handle(&Event::Scan(scan));
                     IS_BUSY.store(0, Ordering::Relaxed);
                     scans += 1;
                 }

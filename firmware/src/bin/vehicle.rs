@@ -8,10 +8,12 @@ use agv_core::localizer::{Localizer, OutputPredictor, Parameters};
 use agv_core::wire::nav350::Revolution;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
+use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
+use agv_firmware::app::start_search::StartSearch;
 use agv_firmware::app::throttle::Throttle;
-use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, supervision};
+use agv_firmware::app::{bus, exchange, laser, log_stream, service, settings, supervision};
 use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, Watchdog};
 use agv_firmware::board::{retained, stack};
 use agv_settings::Settings;
@@ -37,6 +39,7 @@ const CONNECTIONS: usize = 2;
 static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
 static SETTINGS: StaticCell<Settings> = StaticCell::new();
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
+static SEARCH: StaticCell<StartSearch> = StaticCell::new();
 static REVOLUTIONS: ConstStaticCell<[Revolution; 1]> = ConstStaticCell::new([Revolution::new()]);
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
 static LASER: StaticCell<LaserMemory> = StaticCell::new();
@@ -105,9 +108,8 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
 
 /// What the loop works with.
 struct Vehicle {
-    localizer: &'static mut Localizer,
+    localization: Localization,
     revolutions: RevolutionReceiver,
-    log: LogWriter,
     watchdog: Watchdog,
 }
 
@@ -116,6 +118,11 @@ struct Vehicle {
 #[inline(never)]
 fn build_localizer(parameters: &Parameters) -> &'static mut Localizer {
     LOCALIZER.init_with(|| Localizer::new(*parameters))
+}
+
+#[inline(never)]
+fn build_search(parameters: &Parameters, is_wanted: bool) -> &'static mut StartSearch {
+    SEARCH.init_with(|| StartSearch::new(parameters, is_wanted))
 }
 
 #[inline(never)]
@@ -137,6 +144,8 @@ fn start() -> Vehicle {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
         exchange::set_settings_sound(false);
     }
+    let search = build_search(&settings.parameters, settings.start_search);
+    search.index(localizer);
     exchange::start(OutputPredictor::new(&settings.parameters));
     exchange::update(&localizer.outputs().pose);
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
@@ -147,15 +156,15 @@ fn start() -> Vehicle {
     board::bus_tasks().spawn(bus_task(can, settings, has_panicked).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
     board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
-    Vehicle { localizer, revolutions, log, watchdog }
+    Vehicle { localization: Localization { localizer, search, log }, revolutions, watchdog }
 }
 
 #[inline(never)]
 fn run(vehicle: Vehicle) -> ! {
-    let Vehicle { localizer, mut revolutions, mut log, mut watchdog } = vehicle;
+    let Vehicle { mut localization, mut revolutions, mut watchdog } = vehicle;
     let mut deepest = 0;
     loop {
-        if localize::step(localizer, &mut revolutions, &mut log) {
+        if localization.step(&mut revolutions) {
             continue;
         }
         if supervision::have_all_run() {

@@ -4,9 +4,9 @@
 use std::path::Path;
 
 use agv_core::geometry::difference;
-use agv_core::landmarks::LandmarkKind;
-use agv_core::localizer::{HYPOTHESES, Localizer, Mode, PoseOutput, StartFinder, StartState};
-use agv_core::places::{ReflectorIndex, RelocalizationParameters};
+use agv_core::landmarks::{FixedMap, Landmark, LandmarkKind};
+use agv_core::localizer::{Localizer, Mode, PoseOutput, StartFinder, StartState};
+use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
 use serde::Serialize;
 
 use super::accuracy::truth_at;
@@ -63,16 +63,18 @@ pub fn run(folder: &Path, starts: usize, seed: u64) -> Result<Outcome, CarparkEr
     let mut recording = carpark::read(folder, &carpark::WINDOW)?;
     recording.parameters = parameters(&recording.parameters, Noise::Nominal);
     let truth = carpark::read_batch_solution(folder)?;
-    let reflectors = recording.landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
-    let mut index = Box::new(ReflectorIndex::<1024, 60_000>::new());
+    let is_reflector = |landmark: &&Landmark| landmark.kind == LandmarkKind::Reflector;
+    let reflectors: Vec<Landmark> = recording.landmarks.iter().filter(is_reflector).copied().collect();
+    let (mut map, mut index) = (FixedMap::new(), Box::new(ReflectorIndex::new()));
     // The survey has fifteen reflectors, all finite: reading it has made sure.
-    let _ =
-        index.build(reflectors.map(|landmark| agv_core::geometry::Point::new(landmark.x, landmark.y)), f32::INFINITY);
+    let _ = map.extend(&reflectors);
+    index.build(&map);
+    let map = IndexedReflectors { map: &map, index: &index };
     let mut random = Random::new(seed, Stream::Kidnapping);
     let window = (*carpark::WINDOW.start(), *carpark::WINDOW.end() - LAST_START);
     let mut times: Vec<f64> = (0..starts).map(|_| random.between(window.0, window.1)).collect();
     times.sort_by(f64::total_cmp);
-    let each: Vec<Start> = times.into_iter().map(|time| start(&recording, &truth, &index, time)).collect();
+    let each: Vec<Start> = times.into_iter().map(|time| start(&recording, &truth, &map, time)).collect();
     let is_right = |start: &&Start| {
         start.position_error_m.is_some_and(|error| error < RIGHT.0)
             && start.heading_error_deg.is_some_and(|error| error.abs() < RIGHT.1)
@@ -82,12 +84,13 @@ pub fn run(folder: &Path, starts: usize, seed: u64) -> Result<Outcome, CarparkEr
     Ok(Outcome { starts: each.len(), right, not_localised, wrong: each.len() - right - not_localised, each })
 }
 
-fn start(recording: &Recording, truth: &[Truth], index: &ReflectorIndex<1024, 60_000>, at: f64) -> Start {
+type Surveyed<'a> = IndexedReflectors<'a, 32, 4096>;
+
+fn start(recording: &Recording, truth: &[Truth], map: &Surveyed, at: f64) -> Start {
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
     // The map of the recording fits the localiser, as the experiment beside this one shows.
     let _ = localizer.add_landmarks(&recording.landmarks);
-    let mut finder =
-        Box::new(StartFinder::<64>::new(recording.parameters, RelocalizationParameters::default(), HYPOTHESES));
+    let mut finder = Box::new(StartFinder::<64>::new(recording.parameters, RelocalizationParameters::default()));
     let mut start = Start { at_s: at, found_after_s: None, position_error_m: None, heading_error_deg: None };
     let (mut moving, mut last) = (0.0, None);
     for event in recording.events.iter().filter(|event| event.time().is_some_and(|time| time.seconds() >= at)) {
@@ -103,7 +106,8 @@ fn start(recording: &Recording, truth: &[Truth], index: &ReflectorIndex<1024, 60
             break;
         }
         localizer.handle(&event.view());
-        if let StartState::Found(fix) = finder.handle(&event.view(), index) {
+        finder.handle(&event.view(), map);
+        if let StartState::Found(fix) = finder.search(map, u32::MAX) {
             let pose = localizer.handle(&agv_core::localizer::Event::SetPose(fix)).pose;
             judge(&mut start, &pose, truth, recording);
             start.found_after_s = Some(moving);

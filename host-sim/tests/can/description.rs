@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use agv_core::localizer::{Mode, Reason};
 use agv_core::measurement::EncoderFault;
 use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::controller::{Content, Health, LaserHealth, WantedMode};
+use agv_core::wire::can::controller::{Content, Health, LaserHealth, StartSearch, WantedMode};
 use agv_core::wire::can::frame::{Frame, Id};
 use agv_host_sim::data;
 use serde_json::Value;
@@ -115,17 +115,20 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Some(HeartbeatLost),
     ];
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
+    let searches =
+        [StartSearch::Idle, StartSearch::Searching, StartSearch::Ambiguous, StartSearch::TooFew, StartSearch::Unknown];
     (0..9)
         .map(|index| {
             let (mode, reason) = (modes[index % 7], reasons[index]);
             let (drive, steering, laser) = (faults[index % 8], faults[(15 - index) % 8], lasers[index % 4]);
+            let start_search = searches[index % 5];
             let fault = |fault: Option<EncoderFault>| fault.map_or("None".to_owned(), |fault| format!("{fault:?}"));
             let status = Content::Status {
                 mode,
                 reason,
                 acceptance: 0.5,
                 normalised_square: 2.0,
-                health: Health { drive, steering, laser, layer: 40_000 },
+                health: Health { drive, steering, laser, layer: 40_000, start_search },
             };
             let names = BTreeMap::from([
                 ("Mode", format!("{mode:?}")),
@@ -134,6 +137,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 ("SteeringFault", fault(steering)),
                 ("Laser", format!("{laser:?}")),
                 ("Layer", "40000".to_owned()),
+                ("StartSearch", format!("{start_search:?}")),
             ]);
             (status, names)
         })

@@ -2,15 +2,12 @@
 
 use crate::geometry::ScanPoint;
 
-/// Words of the bitmap: 16 kB.
-const WORDS: usize = 4096;
-
 /// Smallest edge of a cell, m.
 const SMALLEST_CELL: f32 = 0.25;
 
 /// A bitmap over the area of the map; a set bit says that a reflector may be within the reach of a point in the cell.
 #[derive(Clone, Debug)]
-pub(super) struct Occupancy {
+pub(super) struct Occupancy<const WORDS: usize> {
     corner: ScanPoint,
     per_metre: f32,
     columns: u32,
@@ -18,20 +15,20 @@ pub(super) struct Occupancy {
     bits: [u32; WORDS],
 }
 
-impl Occupancy {
+impl<const WORDS: usize> Occupancy<WORDS> {
     pub(super) const fn new() -> Self {
         Self { corner: ScanPoint::new(0.0, 0.0), per_metre: 1.0, columns: 0, rows: 0, bits: [0; WORDS] }
     }
 
     /// Marks what lies within `reach` (m) of the points.
-    pub(super) fn build(&mut self, points: &[ScanPoint], reach: f32) {
+    pub(super) fn build(&mut self, points: impl Iterator<Item = ScanPoint> + Clone, reach: f32) {
         self.bits.fill(0);
         (self.columns, self.rows) = (0, 0);
-        let Some(first) = points.first() else { return };
-        let (mut low, mut high) = (*first, *first);
-        for point in points {
-            low = low.inf(point);
-            high = high.sup(point);
+        let Some(first) = points.clone().next() else { return };
+        let (mut low, mut high) = (first, first);
+        for point in points.clone() {
+            low = low.inf(&point);
+            high = high.sup(&point);
         }
         let margin = ScanPoint::repeat(2.0 * reach);
         let size = high - low + 2.0 * margin;

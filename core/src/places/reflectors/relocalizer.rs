@@ -1,14 +1,18 @@
 //! The search: complete, bounded, and able to pause.
 //!
 //! An answer must explain at least half of the reflectors seen. Of n reflectors of which k are explained, split into k - 1
-//! groups, two explained ones share a group: it suffices to look up the pairs within groups, about n / 2 of them. Every
-//! pose that explains k is found so, the best and the runner-up alike, and only a clear gap between the two makes an
-//! answer.
+//! groups, two explained ones share a group: it suffices to look for the pairs within groups, about n / 2 of them. One
+//! pass over all pairs of the map finds what they may be. Every pose that explains k is found so, the best and the
+//! runner-up alike, and only a clear gap between the two makes an answer.
 
 use heapless::Vec;
 
-use super::{ReflectorAnswer, ReflectorFix, ReflectorIndex, ReflectorSnapshot, SeenReflector};
+use super::distance_histogram::DistanceHistogram;
+use super::groups::Groups;
+use super::sought_pairs::{SoughtPair, SoughtPairs};
+use super::{IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorSnapshot, SeenReflector};
 use crate::geometry::{Pose, ScanPoint, difference};
+use crate::landmarks::Landmark;
 use crate::places::align;
 use crate::places::correspondence::Transform;
 
@@ -43,9 +47,6 @@ pub enum RelocalizationProgress {
     Done(ReflectorAnswer),
 }
 
-/// Pairs of seen reflectors that are looked up.
-const PAIRS: usize = 96;
-
 /// Poses that are kept for the comparison.
 const KEPT: usize = 8;
 
@@ -55,6 +56,12 @@ const SHORT_BASELINE: f32 = 4.0;
 /// Lookups that a short baseline may save to be preferred all the same.
 const SHORT_PENALTY: f32 = 40.0;
 
+/// What a hypothesis costs, in looks at a mapped pair.
+const HYPOTHESIS: i64 = 16;
+
+/// What a hypothesis costs that enough reflectors may agree with.
+const VERIFICATION: i64 = 2048;
+
 /// Rounds of refinement of a pose.
 const ROUNDS: usize = 3;
 
@@ -63,217 +70,202 @@ const ROUNDS: usize = 3;
 pub struct ReflectorRelocalizer<const SEEN: usize = 64> {
     parameters: RelocalizationParameters,
     seen: Vec<SeenReflector, SEEN>,
-    pairs: Vec<SeenPair, PAIRS>,
+    sought: SoughtPairs,
     /// Reflectors that an answer must explain.
     needed: usize,
-    /// Where the search stands: number of the pair, position in its range, and whether the pair is turned around.
-    at: (usize, u32, bool),
+    /// The mapped pair that is looked at next.
+    at: (usize, usize),
+    /// Effort that was spent beyond what was allowed.
+    debt: i64,
     best: Vec<ReflectorFix, KEPT>,
-}
-
-/// A pair of seen reflectors and the range of mapped pairs like it.
-#[derive(Clone, Debug)]
-struct SeenPair {
-    first: u8,
-    second: u8,
-    mapped: core::ops::Range<u32>,
 }
 
 impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
     /// A relocaliser with nothing to do.
     #[must_use]
     pub const fn new(parameters: RelocalizationParameters) -> Self {
-        Self { parameters, seen: Vec::new(), pairs: Vec::new(), needed: 0, at: (0, 0, false), best: Vec::new() }
+        Self {
+            parameters,
+            seen: Vec::new(),
+            sought: SoughtPairs::new(),
+            needed: 0,
+            at: (0, 1),
+            debt: 0,
+            best: Vec::new(),
+        }
     }
 
     /// Starts a search for the pose of the snapshot's frame; one that is under way is given up.
-    pub fn begin<const REFLECTORS: usize, const INDEXED: usize>(
+    pub fn begin<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
         snapshot: &ReflectorSnapshot<SEEN>,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
     ) {
         self.seen.clear();
         self.seen.extend(snapshot.reflectors().iter().copied());
-        self.pairs.clear();
+        self.sought.clear();
         self.best.clear();
-        self.at = (0, 0, false);
+        self.at = (0, 1);
+        self.debt = 0;
         let count = self.seen.len();
         self.needed = usize::from(self.parameters.fewest).max(count.div_ceil(2));
-        if count < self.needed {
-            return;
+        if count >= self.needed {
+            self.choose_pairs(reflectors);
         }
-        self.choose_pairs(index);
-        self.at.1 = self.pairs.first().map_or(0, |pair| pair.mapped.start);
     }
 
-    /// Goes on with the search for at most `most_hypotheses` hypotheses.
-    pub fn advance<const REFLECTORS: usize, const INDEXED: usize>(
+    /// Goes on with the search until `effort` is spent: a look at a mapped pair is one, about 15 instructions. What a last
+    /// piece of work takes beyond it is spent of the next call's.
+    pub fn advance<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
-        most_hypotheses: u32,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
+        effort: u32,
     ) -> RelocalizationProgress {
         if self.seen.len() < self.needed || self.needed == 0 {
             return RelocalizationProgress::Done(ReflectorAnswer::TooFew);
         }
-        for _ in 0..most_hypotheses {
-            let (number, position, is_turned) = self.at;
-            let Some(pair) = self.pairs.get(number) else {
-                return RelocalizationProgress::Done(self.answer());
-            };
-            if position >= pair.mapped.end {
-                let next = self.pairs.get(number + 1).map_or(0, |pair| pair.mapped.start);
-                self.at = (number + 1, next, false);
+        let mut left = i64::from(effort) - self.debt;
+        self.debt = 0;
+        let landmarks = reflectors.map.landmarks();
+        while let Some(first) = landmarks.get(self.at.0) {
+            for second in landmarks.get(self.at.1..).unwrap_or_default() {
+                if left <= 0 {
+                    self.debt = -left;
+                    return RelocalizationProgress::Searching;
+                }
+                left -= 1;
+                self.at.1 += 1;
+                let (x, y) = (second.x - first.x, second.y - first.y);
+                let square = (x * x + y * y) as f32;
+                if self.sought.may_hold(square) {
+                    left -= self.try_pair(reflectors, first, second, square);
+                }
+            }
+            self.at = (self.at.0 + 1, self.at.0 + 2);
+        }
+        RelocalizationProgress::Done(self.answer())
+    }
+
+    /// Tries what a mapped pair may be, either way around, and returns the effort.
+    #[inline(never)]
+    fn try_pair<const REFLECTORS: usize, const WORDS: usize>(
+        &mut self,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
+        first: &Landmark,
+        second: &Landmark,
+        square: f32,
+    ) -> i64 {
+        let origin = reflectors.origin();
+        let from_origin = |landmark: &Landmark| (landmark.position() - origin).cast();
+        let (p, q): (ScanPoint, ScanPoint) = (from_origin(first), from_origin(second));
+        let mut effort = 0;
+        for number in 0..self.sought.pairs().len() {
+            let Some(pair) = self.sought.pairs().get(number).copied() else { break };
+            effort += 1;
+            if !(pair.least..=pair.largest).contains(&square) {
                 continue;
             }
-            let (first, second) = (usize::from(pair.first), usize::from(pair.second));
-            self.at = if is_turned { (number, position + 1, false) } else { (number, position, true) };
-            let Some((one, other)) = index.pairs.pair(position) else { continue };
-            let (one, other) = if is_turned { (other, one) } else { (one, other) };
-            if let Some(transform) = self.hypothesis(index, (first, second), (one, other))
-                && self.is_promising(index, &transform)
-                && let Some(fix) = self.verify(index, transform.pose())
-            {
-                self.keep(fix);
+            let position = |number: u8| self.seen.get(usize::from(number)).map(|seen| seen.position);
+            let (Some(a), Some(b)) = (position(pair.first), position(pair.second)) else { continue };
+            for mapped in [(p, q), (q, p)] {
+                effort += HYPOTHESIS;
+                let Some(transform) = Transform::between((a, b), mapped) else { continue };
+                if self.is_promising(reflectors, &transform) {
+                    effort += VERIFICATION;
+                    if let Some(fix) = self.verify(reflectors, transform.pose(), (a, b)) {
+                        self.keep(fix);
+                    }
+                }
             }
         }
-        RelocalizationProgress::Searching
+        effort
     }
 
     /// Splits the seen reflectors into groups, cheapest pairs first, and notes the pairs within groups.
-    fn choose_pairs<const REFLECTORS: usize, const INDEXED: usize>(
+    fn choose_pairs<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
     ) {
-        let groups = self.needed - 1;
-        let mut group_of = [u8::MAX; SEEN];
-        let mut opened = 0_usize;
-        // Disjoint pairs open the groups; a reflector is never left over while a group is still to be opened.
-        while opened < groups {
-            let mut cheapest: Option<(f32, usize, usize)> = None;
-            for second in 1..self.seen.len() {
-                for first in 0..second {
-                    let is_free = |number: usize| group_of.get(number).is_some_and(|group| *group == u8::MAX);
-                    if is_free(first) && is_free(second) {
-                        let cost = self.cost(index, first, second);
-                        if cheapest.is_none_or(|(least, _, _)| cost < least) {
-                            cheapest = Some((cost, first, second));
-                        }
-                    }
+        let groups = {
+            let mut costs = [[0.0; SEEN]; SEEN];
+            for (first, row) in costs.iter_mut().enumerate().take(self.seen.len()) {
+                for (second, cost) in row.iter_mut().enumerate().take(self.seen.len()) {
+                    *cost = self.cost(&reflectors.index.distances, first, second);
                 }
             }
-            let Some((_, first, second)) = cheapest else { break };
-            for number in [first, second] {
-                if let Some(group) = group_of.get_mut(number) {
-                    *group = opened as u8;
-                }
-            }
-            opened += 1;
-        }
-        // A last single one is a group of its own if one may still be opened, else it joins the cheapest group.
-        for number in 0..self.seen.len() {
-            if group_of.get(number).is_none_or(|group| *group != u8::MAX) {
-                continue;
-            }
-            let mut joined = opened as u8;
-            if opened < groups {
-                opened += 1;
-            } else {
-                let mut least = f32::INFINITY;
-                for group in 0..opened as u8 {
-                    let members = group_of.iter().enumerate().filter(|(_, of)| **of == group);
-                    let cost: f32 = members.map(|(member, _)| self.cost(index, member, number)).sum();
-                    if cost < least || joined == opened as u8 {
-                        (least, joined) = (cost, group);
-                    }
-                }
-            }
-            if let Some(group) = group_of.get_mut(number) {
-                *group = joined;
-            }
-        }
+            Groups::new(&costs, self.seen.len(), self.needed - 1)
+        };
         for second in 1..self.seen.len() {
             for first in 0..second {
-                if group_of.get(first) == group_of.get(second)
-                    && let Some(mapped) = self.like(index, first, second)
+                if groups.are_together(first, second)
+                    && let Some((distance, tolerance)) = self.distance(first, second)
                 {
-                    let _ = self.pairs.push(SeenPair { first: first as u8, second: second as u8, mapped });
+                    let least = (distance - tolerance).max(0.0);
+                    let largest = distance + tolerance;
+                    self.sought.push(SoughtPair {
+                        first: first as u8,
+                        second: second as u8,
+                        least: least * least,
+                        largest: largest * largest,
+                    });
                 }
             }
         }
     }
-
-    /// Mapped pairs that have the distance of a seen pair.
-    fn like<const REFLECTORS: usize, const INDEXED: usize>(
-        &self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
-        first: usize,
-        second: usize,
-    ) -> Option<core::ops::Range<u32>> {
+    /// Distance of two seen reflectors, and by how much that of the mapped ones may differ, m.
+    fn distance(&self, first: usize, second: usize) -> Option<(f32, f32)> {
         let (a, b) = (self.seen.get(first)?, self.seen.get(second)?);
-        let tolerance = self.parameters.gate * libm::sqrtf(a.variance + b.variance);
-        index.pairs.range((a.position - b.position).norm(), tolerance)
+        Some(((a.position - b.position).norm(), self.parameters.gate * libm::sqrtf(a.variance + b.variance)))
     }
 
-    /// What it costs to look up a pair.
-    fn cost<const REFLECTORS: usize, const INDEXED: usize>(
-        &self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
-        first: usize,
-        second: usize,
-    ) -> f32 {
+    /// About how many mapped pairs are like a seen one; those that say little of the heading cost more.
+    fn cost(&self, distances: &DistanceHistogram, first: usize, second: usize) -> f32 {
         let (Some(a), Some(b)) = (self.seen.get(first), self.seen.get(second)) else { return f32::INFINITY };
-        let Some(mapped) = self.like(index, first, second) else { return 1e9 };
-        let is_short = (a.position - b.position).norm() < SHORT_BASELINE;
-        mapped.len() as f32 + if is_short { SHORT_PENALTY } else { 0.0 }
-    }
-
-    /// The pose that puts two seen reflectors on two mapped ones.
-    fn hypothesis<const REFLECTORS: usize, const INDEXED: usize>(
-        &self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
-        seen: (usize, usize),
-        mapped: (u16, u16),
-    ) -> Option<Transform> {
-        let (a, b) = (self.seen.get(seen.0)?.position, self.seen.get(seen.1)?.position);
-        let (p, q) = (index.points.get(usize::from(mapped.0))?, index.points.get(usize::from(mapped.1))?);
-        Transform::between((a, b), (*p, *q))
+        let square = (a.position - b.position).norm_squared();
+        let deviation = self.parameters.gate * libm::sqrtf(square * (a.variance + b.variance));
+        let penalty = if square < SHORT_BASELINE * SHORT_BASELINE { SHORT_PENALTY } else { 0.0 };
+        distances.count(square, 2.0 * deviation) + penalty
     }
 
     /// Whether enough of the seen reflectors may have one of the map near them.
-    fn is_promising<const REFLECTORS: usize, const INDEXED: usize>(
+    fn is_promising<const REFLECTORS: usize, const WORDS: usize>(
         &self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
         transform: &Transform,
     ) -> bool {
         let mut misses = 0;
         let most = self.seen.len() - self.needed;
         self.seen.iter().all(|seen| {
-            misses += usize::from(!index.occupancy.is_near(transform.apply(&seen.position)));
+            misses += usize::from(!reflectors.may_be_near(transform.apply(&seen.position)));
             misses <= most
         })
     }
 
-    /// Refines a pose by all reflectors that it explains. None if they are too few.
-    fn verify<const REFLECTORS: usize, const INDEXED: usize>(
+    /// Refines a pose, which is that of two seen reflectors, by all reflectors that it explains. None if they are too few.
+    #[inline(never)]
+    fn verify<const REFLECTORS: usize, const WORDS: usize>(
         &self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
+        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
         start: Pose,
+        pair: (ScanPoint, ScanPoint),
     ) -> Option<ReflectorFix> {
         let mut pose = start;
         let mut covariance = nalgebra::Matrix3::zeros();
+        let most_misses = self.seen.len() - self.needed;
+        let middle = (pair.0 + pair.1) * 0.5;
+        let leverage = 2.0 / (pair.1 - pair.0).norm();
         for round in 0..ROUNDS {
             let transform = Transform::of(&pose);
-            // A pose from two reflectors errs; the gate narrows as more take part.
-            let slack = if round == 0 { FIRST_SLACK } else { SLACK };
             let mut pairs = Vec::<(ScanPoint, ScanPoint, f32), SEEN>::new();
-            for seen in &self.seen {
-                let reach = (self.parameters.gate * libm::sqrtf(2.0 * seen.variance) + slack).min(LARGEST_REACH);
-                if let Some(mapped) = self.mapped(index, &transform, seen, reach) {
+            for (number, seen) in self.seen.iter().enumerate() {
+                // The heading of two reflectors errs; the gate is narrower as soon as more take part.
+                let lever = if round == 0 { 1.0 + leverage * (seen.position - middle).norm() } else { 1.0 };
+                let reach = self.parameters.gate * lever * libm::sqrtf(2.0 * seen.variance) + SLACK;
+                if let Some(mapped) = reflectors.nearest(transform.apply(&seen.position), reach.min(LARGEST_REACH)) {
                     let _ = pairs.push((seen.position, mapped, 1.0 / seen.variance));
+                } else if number + 1 - pairs.len() > most_misses {
+                    return None;
                 }
-            }
-            if pairs.len() < self.needed {
-                return None;
             }
             let points = pairs.iter().map(|(seen, mapped, weight)| (seen.cast(), mapped.cast(), f64::from(*weight)));
             let alignment = align(points)?;
@@ -284,25 +276,16 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         let (mut matched, mut log_likelihood) = (0, 0.0);
         for seen in &self.seen {
             let reach = (self.parameters.gate * libm::sqrtf(seen.variance)).min(LARGEST_REACH);
-            let Some(mapped) = self.mapped(index, &transform, seen, reach) else { continue };
+            let Some(mapped) = reflectors.nearest(transform.apply(&seen.position), reach) else { continue };
             let square = (mapped - transform.apply(&seen.position)).norm_squared() / seen.variance;
             let area = core::f32::consts::TAU * seen.variance;
             matched += 1;
             log_likelihood += -libm::logf(self.parameters.false_density * area) - 0.5 * square;
         }
         let is_enough = usize::from(matched) >= self.needed;
+        let origin = reflectors.origin();
+        let pose = Pose::new(origin.x + pose.x, origin.y + pose.y, pose.theta);
         is_enough.then_some(ReflectorFix { pose, covariance, matched, log_likelihood })
-    }
-
-    fn mapped<const REFLECTORS: usize, const INDEXED: usize>(
-        &self,
-        index: &ReflectorIndex<REFLECTORS, INDEXED>,
-        transform: &Transform,
-        seen: &SeenReflector,
-        reach: f32,
-    ) -> Option<ScanPoint> {
-        let (number, _) = index.nearest(transform.apply(&seen.position), reach)?;
-        index.points.get(usize::from(number)).copied()
     }
 
     /// Keeps a pose among the best distinct ones.
@@ -338,10 +321,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
     }
 }
 
-/// How far beyond the noise a reflector may lie from the map in the first round of refinement, m.
-const FIRST_SLACK: f32 = 0.3;
-
-/// The same in later rounds, m.
+/// How far beyond the noise a reflector may lie from the map while the pose is refined, m.
 const SLACK: f32 = 0.02;
 
 /// Farthest that a reflector is looked for, m.

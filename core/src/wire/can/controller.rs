@@ -9,7 +9,7 @@
 //! | position | 180h + node | x, y: 30 bits, 0.1 mm |
 //! | heading | 280h + node | heading: 24 bits, 1 urad; time: 16 bits, ms; dead-reckoning distance: 16 bits, 1 cm |
 //! | covariance | 380h + node | deviations: 13 bits, 0.25 mm and 0.1 mrad; correlations: 7 bits, 0.02 |
-//! | status | 480h + node | mode, reason, acceptance, innovations, faults, layer |
+//! | status | 480h + node | mode, reason, acceptance, innovations, faults, layer, search |
 //! | initial position | 200h + node | x, y as above |
 //! | initial heading | 300h + node | heading as above; deviations: 16 bits, 1 mm and 0.1 mrad |
 //! | command | 400h + node | mode, layer, standstill |
@@ -116,6 +116,7 @@ const DRIVE_FAULT: Field = Field::unsigned(27, 4, 1.0);
 const STEERING_FAULT: Field = Field::unsigned(31, 4, 1.0);
 const LASER: Field = Field::unsigned(35, 2, 1.0);
 const LAYER: Field = Field::unsigned(37, 16, 1.0);
+const START_SEARCH: Field = Field::unsigned(53, 3, 1.0);
 const INITIAL_POSITION_DEVIATION: Field = Field::unsigned(24, 16, 1e-3);
 const INITIAL_HEADING_DEVIATION: Field = Field::unsigned(40, 16, 1e-4);
 const WANTED_MODE: Field = Field::unsigned(0, 4, 1.0);
@@ -174,6 +175,30 @@ pub enum LaserHealth {
 const LASERS: [(u64, LaserHealth); 4] =
     [(0, LaserHealth::Unknown), (1, LaserHealth::Sound), (2, LaserHealth::Silent), (3, LaserHealth::Faulty)];
 
+/// How far a vehicle that does not know where it is has come with finding out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartSearch {
+    /// It knows, or it does not try.
+    #[default]
+    Idle,
+    /// It searches.
+    Searching,
+    /// Two poses fit what it sees equally.
+    Ambiguous,
+    /// It sees too few reflectors.
+    TooFew,
+    /// No place of the map looks like what it sees.
+    Unknown,
+}
+
+const START_SEARCHES: [(u64, StartSearch); 5] = [
+    (0, StartSearch::Idle),
+    (1, StartSearch::Searching),
+    (2, StartSearch::Ambiguous),
+    (3, StartSearch::TooFew),
+    (4, StartSearch::Unknown),
+];
+
 /// What the controller is told to localise by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WantedMode {
@@ -221,6 +246,8 @@ pub struct Health {
     pub laser: LaserHealth,
     /// Number of the map layer in use; 65535 if there is none.
     pub layer: u16,
+    /// The search for a pose.
+    pub start_search: StartSearch,
 }
 
 /// The content of one frame. Numbers that the sender does not know are NaN.
@@ -259,7 +286,7 @@ pub enum Content {
         acceptance: f64,
         /// Mean normalised squared innovation of late.
         normalised_square: f64,
-        /// State of encoders and laser.
+        /// State of encoders, laser and search.
         health: Health,
     },
     /// Position where the vehicle shall believe to be.
@@ -344,7 +371,8 @@ impl Content {
                 let payload = DRIVE_FAULT.put_raw(payload, fault(health.drive, DRIVE_FAULT));
                 let payload = STEERING_FAULT.put_raw(payload, fault(health.steering, STEERING_FAULT));
                 let payload = LASER.put_raw(payload, number_of(&LASERS, &health.laser, LASER));
-                LAYER.put_raw(payload, u64::from(health.layer))
+                let payload = LAYER.put_raw(payload, u64::from(health.layer));
+                START_SEARCH.put_raw(payload, number_of(&START_SEARCHES, &health.start_search, START_SEARCH))
             }
             Self::InitialHeading { heading, position_deviation, heading_deviation } => {
                 let payload = HEADING.put(payload, heading);
@@ -394,6 +422,7 @@ impl Content {
                     steering: fault_of(STEERING_FAULT.take_raw(payload))?,
                     laser: value_of(&LASERS, LASER.take_raw(payload))?,
                     layer: LAYER.take_raw(payload) as u16,
+                    start_search: value_of(&START_SEARCHES, START_SEARCH.take_raw(payload))?,
                 },
             },
             (None, Some(1)) => Self::InitialPosition { x: X.take(payload), y: Y.take(payload) },

@@ -58,20 +58,20 @@ impl Kidnapping {
             return Ok(());
         }
         println!(
-            "case                   starts  right within 1, 2, 3 revolutions  wrong  ambiguous  blind  seen  hypotheses, most"
+            "case                   starts  right within 1, 2, 3 revolutions  wrong  ambiguous  blind  seen  effort, most"
         );
         for outcome in outcomes {
             let [one, two, three] = outcome.right.map(|share| 100.0 * share);
             println!(
-                "{:<22} {:>6} {one:>11.2} {two:>9.2} {three:>9.2} %  {:>5} {:>8.2} % {:>6}  {:>4.1} {:>10.0} {:>7}",
+                "{:<22} {:>6} {one:>11.2} {two:>9.2} {three:>9.2} %  {:>5} {:>8.2} % {:>6}  {:>4.1} {:>10.0} {:>9}",
                 outcome.case,
                 outcome.starts,
                 outcome.wrong,
                 100.0 * outcome.ambiguous,
                 outcome.blind,
                 outcome.seen,
-                outcome.hypotheses.0,
-                outcome.hypotheses.1
+                outcome.effort.0,
+                outcome.effort.1
             );
         }
         Ok(())

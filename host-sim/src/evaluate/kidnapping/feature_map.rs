@@ -5,13 +5,13 @@
 
 use agv_core::features::falko::Detector;
 use agv_core::features::{Keypoint, PointScan};
-use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::LandmarkKind;
+use agv_core::geometry::Pose;
+use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::Parameters;
-use agv_core::places::{ReflectorIndex, ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters};
+use agv_core::places::{ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters};
 use rayon::prelude::*;
 
-use super::{Outcome, REVOLUTIONS, Start, outcome, search};
+use super::{Outcome, REVOLUTIONS, SearchedMap, Start, outcome, search};
 use crate::evaluate::falko::{BEAMS, KEYPOINTS};
 use crate::evaluate::warehouse::{Map, Method, PATHS, WarehouseError, prepare};
 use crate::evaluate::warehouse_disturbance::Disturbance;
@@ -27,11 +27,6 @@ const STARTS_A_STORAGE: u64 = 20;
 /// A vehicle may stand beside its path, m, and askew, rad; half of them face the other way.
 const BESIDE: f64 = 0.15;
 const ASKEW: f64 = 0.1;
-
-/// Pairs of landmarks further apart than this are not seen together, m.
-const FARTHEST_PAIR: f32 = 40.0;
-
-type Index = ReflectorIndex<1024, 60_000>;
 
 /// When a pose among features is believed: many landmarks are seen together, and many of those that are seen are not in
 /// the map.
@@ -51,9 +46,9 @@ pub fn run(
     done: impl Fn() + Sync,
 ) -> Result<Outcome, WarehouseError> {
     let method = Method::ALL.into_iter().find(|method| method.map == Map::Static);
-    let Some(method) = method else { return Ok(outcome("block storage, features", Vec::new(), 0)) };
+    let Some(method) = method else { return Ok(outcome("block storage, features", Vec::new())) };
     let storages = starts.div_ceil(STARTS_A_STORAGE);
-    let results: Vec<(Vec<Start>, usize)> = (0..storages)
+    let results: Vec<Vec<Start>> = (0..storages)
         .into_par_iter()
         .map(|number| {
             let seed = seed.wrapping_mul(1_000_003).wrapping_add(number);
@@ -62,8 +57,7 @@ pub fn run(
             Ok(run_storage(&simulation, seed, count, parameters, &done))
         })
         .collect::<Result<_, WarehouseError>>()?;
-    let pairs = results.iter().map(|(_, pairs)| *pairs).max().unwrap_or(0);
-    Ok(outcome("block storage, features", results.into_iter().flat_map(|(starts, _)| starts).collect(), pairs))
+    Ok(outcome("block storage, features", results.into_iter().flatten().collect()))
 }
 
 fn run_storage(
@@ -72,17 +66,16 @@ fn run_storage(
     starts: u64,
     parameters: &RelocalizationParameters,
     done: &(impl Fn() + Sync),
-) -> (Vec<Start>, usize) {
+) -> Vec<Start> {
     let recording = &simulation.recording;
-    let features = recording.landmarks.iter().filter(|landmark| landmark.kind != LandmarkKind::Reflector);
-    let mut index = Box::new(Index::new());
-    // A storage has fewer features than there is room for.
-    let _ = index.build(features.map(|landmark| Point::new(landmark.x, landmark.y)), FARTHEST_PAIR);
+    let is_feature = |landmark: &&Landmark| landmark.kind != LandmarkKind::Reflector;
+    let features: Vec<Landmark> = recording.landmarks.iter().filter(is_feature).copied().collect();
+    let map = SearchedMap::new(&features);
     let caster = RayCaster::new(&simulation.world);
     let mut random = Random::new(seed, Stream::Kidnapping);
     let mut sensor = Sensor::new(&recording.parameters, simulation.true_laser, &caster);
     let mut relocalizer = Box::new(ReflectorRelocalizer::<64>::new(*parameters));
-    let starts = (0..starts)
+    (0..starts)
         .map(|_| {
             let truth = anywhere(&mut random);
             let mut snapshot = ReflectorSnapshot::<64>::new();
@@ -92,15 +85,14 @@ fn run_storage(
                 if revolution == 0 {
                     start.seen = seen;
                 }
-                if search(&mut start, revolution, &truth, &snapshot, &index, &mut relocalizer, true) {
+                if search(&mut start, revolution, &truth, &snapshot, &map.view(), &mut relocalizer, true) {
                     break;
                 }
             }
             done();
             start
         })
-        .collect();
-    (starts, index.pairs().len())
+        .collect()
 }
 
 /// A pose on or beside one of the paths.

@@ -7,9 +7,10 @@ pub mod feature_map;
 mod halls;
 
 use agv_core::geometry::{Point, Pose};
+use agv_core::landmarks::{FixedMap, Landmark};
 use agv_core::places::{
-    ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters,
-    RelocalizationProgress,
+    IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
+    RelocalizationParameters, RelocalizationProgress,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -72,10 +73,8 @@ pub struct Outcome {
     pub blind: usize,
     /// Mean number of reflectors seen in a revolution, false ones included.
     pub seen: f64,
-    /// Hypotheses tried in a revolution: mean, and largest.
-    pub hypotheses: (f64, u32),
-    /// Pairs in the index.
-    pub pairs: usize,
+    /// Effort of a revolution's search in looks at mapped pairs: mean, and largest.
+    pub effort: (f64, u32),
 }
 
 /// Revolutions after which a start is given up.
@@ -83,6 +82,9 @@ pub const REVOLUTIONS: usize = 3;
 
 /// Starts in one hall.
 const STARTS_A_HALL: u64 = 100;
+
+/// Stated error of the survey on each axis, m.
+const SURVEY_DEVIATION: f32 = 0.002;
 
 /// Farthest reflector that is seen, m.
 const FARTHEST: f64 = 30.0;
@@ -92,8 +94,8 @@ const BEARING_NOISE: f64 = 0.05 * std::f64::consts::PI / 180.0;
 /// An answer with a larger error of position (m) or heading (rad) is wrong.
 const RIGHT: (f64, f64) = (0.1, std::f64::consts::PI / 180.0);
 
-/// Hypotheses between two looks at the counter.
-const SLICE: u32 = 16;
+/// Effort between two looks at the counter.
+const SLICE: u32 = 64;
 
 /// What happened at one start.
 #[derive(Default)]
@@ -103,7 +105,7 @@ struct Start {
     is_ambiguous: bool,
     is_blind: bool,
     seen: usize,
-    hypotheses: [u32; REVOLUTIONS],
+    effort: [u32; REVOLUTIONS],
 }
 
 /// Simulates `starts` starts of a case from a seed on; `done` is called after each.
@@ -116,7 +118,7 @@ pub fn run(
     done: impl Fn() + Sync,
 ) -> Outcome {
     let halls = starts.div_ceil(STARTS_A_HALL);
-    let results: Vec<(Vec<Start>, usize)> = (0..halls)
+    let results: Vec<Vec<Start>> = (0..halls)
         .into_par_iter()
         .map(|number| {
             let hall_seed = seed.wrapping_mul(1_000_003).wrapping_add(number);
@@ -124,19 +126,17 @@ pub fn run(
             run_hall(case, hall_seed, count, parameters, &done)
         })
         .collect();
-    let pairs = results.iter().map(|(_, pairs)| *pairs).max().unwrap_or(0);
-    let all: Vec<Start> = results.into_iter().flat_map(|(starts, _)| starts).collect();
-    outcome(case.name, all, pairs)
+    outcome(case.name, results.into_iter().flatten().collect())
 }
 
 /// Sums up starts.
-fn outcome(case: &'static str, all: Vec<Start>, pairs: usize) -> Outcome {
+fn outcome(case: &'static str, all: Vec<Start>) -> Outcome {
     let count = all.len().max(1) as f64;
     let right_within = |revolutions: usize| {
         let is_right = |start: &&Start| start.answered.is_some_and(|(at, is_right)| is_right && at < revolutions);
         all.iter().filter(is_right).count() as f64 / count
     };
-    let hypotheses = all.iter().flat_map(|start| start.hypotheses).filter(|count| *count > 0);
+    let effort = all.iter().flat_map(|start| start.effort).filter(|effort| *effort > 0);
     Outcome {
         case,
         starts: all.len(),
@@ -145,11 +145,10 @@ fn outcome(case: &'static str, all: Vec<Start>, pairs: usize) -> Outcome {
         ambiguous: all.iter().filter(|start| start.is_ambiguous).count() as f64 / count,
         blind: all.iter().filter(|start| start.is_blind).count(),
         seen: all.iter().map(|start| start.seen as f64).sum::<f64>() / count,
-        hypotheses: (
-            hypotheses.clone().map(f64::from).sum::<f64>() / hypotheses.clone().count().max(1) as f64,
-            hypotheses.max().unwrap_or(0),
+        effort: (
+            effort.clone().map(f64::from).sum::<f64>() / effort.clone().count().max(1) as f64,
+            effort.max().unwrap_or(0),
         ),
-        pairs,
     }
 }
 
@@ -159,35 +158,59 @@ fn run_hall(
     starts: u64,
     parameters: &RelocalizationParameters,
     done: &(impl Fn() + Sync),
-) -> (Vec<Start>, usize) {
+) -> Vec<Start> {
     let hall = Hall::new(case.layout, seed);
-    let mut index = Box::new(ReflectorIndex::<1024, 60_000>::new());
     let mapped = match case.layout {
         Layout::TwinHall => Hall::new(case.layout, seed ^ (1 << 40)).positions(),
         _ => hall.positions(),
     };
-    // Halls have no more reflectors than there is room for.
-    let _ = index.build(mapped.iter().copied(), (2.0 * FARTHEST) as f32);
+    let reflector = |(id, position): (u16, &Point)| Landmark::reflector(id, *position, SURVEY_DEVIATION);
+    let mapped: Vec<Landmark> = (0..).zip(&mapped).map(reflector).collect();
+    let map = SearchedMap::new(&mapped);
     let caster = RayCaster::new(&hall.world);
     let mut random = Random::new(seed, Stream::Kidnapping);
     let mut relocalizer = Box::new(ReflectorRelocalizer::<64>::new(*parameters));
-    let results = (0..starts)
+    (0..starts)
         .map(|_| {
             let truth = hall.free_pose(&mut random);
-            let start = run_start(case, &hall, &caster, &truth, &index, &mut relocalizer, &mut random);
+            let start = run_start(case, &hall, &caster, &truth, &map.view(), &mut relocalizer, &mut random);
             done();
             start
         })
-        .collect();
-    (results, index.pairs().len())
+        .collect()
 }
+
+/// Landmarks that all look alike, and their index.
+struct SearchedMap {
+    map: Box<FixedMap<LANDMARKS>>,
+    index: Box<ReflectorIndex>,
+}
+
+/// Most landmarks of a hall or a storage.
+const LANDMARKS: usize = 1024;
+
+impl SearchedMap {
+    fn new(landmarks: &[Landmark]) -> Self {
+        let (mut map, mut index) = (Box::new(FixedMap::new()), Box::new(ReflectorIndex::new()));
+        // Halls and storages have no more landmarks than there is room for.
+        let _ = map.extend(landmarks);
+        index.build(&map);
+        Self { map, index }
+    }
+
+    fn view(&self) -> View<'_> {
+        IndexedReflectors { map: &self.map, index: &self.index }
+    }
+}
+
+type View<'a> = IndexedReflectors<'a, LANDMARKS, 4096>;
 
 fn run_start(
     case: &Case,
     hall: &Hall,
     caster: &RayCaster,
     truth: &Pose,
-    index: &ReflectorIndex<1024, 60_000>,
+    map: &View,
     relocalizer: &mut ReflectorRelocalizer<64>,
     random: &mut Random,
 ) -> Start {
@@ -204,7 +227,7 @@ fn run_start(
             snapshot.see(&position, range, &ReflectorNoise::default());
         }
         let can_be_right = case.layout != Layout::TwinHall;
-        if search(&mut start, revolution, truth, &snapshot, index, relocalizer, can_be_right) {
+        if search(&mut start, revolution, truth, &snapshot, map, relocalizer, can_be_right) {
             break;
         }
     }
@@ -217,15 +240,15 @@ fn search(
     revolution: usize,
     truth: &Pose,
     snapshot: &ReflectorSnapshot<64>,
-    index: &ReflectorIndex<1024, 60_000>,
+    map: &View,
     relocalizer: &mut ReflectorRelocalizer<64>,
     can_be_right: bool,
 ) -> bool {
-    relocalizer.begin(snapshot, index);
+    relocalizer.begin(snapshot, map);
     let answer = loop {
-        match relocalizer.advance(index, SLICE) {
+        match relocalizer.advance(map, SLICE) {
             RelocalizationProgress::Done(answer) => break answer,
-            RelocalizationProgress::Searching => start.hypotheses[revolution] += SLICE,
+            RelocalizationProgress::Searching => start.effort[revolution] += SLICE,
         }
     };
     match answer {

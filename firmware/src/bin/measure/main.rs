@@ -3,6 +3,8 @@
 #![no_std]
 #![no_main]
 
+mod search;
+
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
@@ -116,7 +118,8 @@ fn main() -> ! {
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
     let Counts { prediction, reflector, scan, falko, association, map_update } = counts;
-    for count in [prediction, reflector, association, falko, map_update, scan, decode(&stopwatch)] {
+    let [few, many] = search::count(&stopwatch, map);
+    for count in [prediction, reflector, association, falko, map_update, scan, decode(&stopwatch), few, many] {
         let mean = count.total / count.runs.max(1);
         writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");
     }
