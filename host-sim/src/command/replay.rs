@@ -77,6 +77,8 @@ enum Landmarks {
     Features,
     /// Natural features that are found while driving.
     Dynamic,
+    /// Natural features that are found on the way, in the state of the filter.
+    Slam,
 }
 
 /// Where the vehicle is at the start.
@@ -187,6 +189,7 @@ impl Replay {
             reflectors: has(Landmarks::Reflectors),
             features: has(Landmarks::Features),
             dynamic: has(Landmarks::Dynamic),
+            slam: has(Landmarks::Slam),
         })
     }
 
