@@ -4,8 +4,8 @@ use std::f32::consts::TAU;
 
 use agv_lidar3d::cloud::Cloud;
 use agv_lidar3d::place::{
-    BINS, Enriched, Histogram, KeySignatures, Limits, Neighbours, Orientation, chi_square, from_key_scans,
-    loop_closure, normalised_chi_square, normalised_sorensen, sorensen, vertical_parts,
+    BINS, Enriched, Facing, Histogram, KeySignatures, Limits, Neighbours, Orientation, chi_square, from_key_scans,
+    loop_closure, normalised_chi_square, normalised_sorensen, relative_turn, sorensen, vertical_parts,
 };
 use proptest::prelude::*;
 
@@ -32,7 +32,7 @@ fn turned(points: &[Option<[f32; 3]>], columns: usize) -> Vec<Option<[f32; 3]>> 
     let (sin, cos) = (-(columns as f32) * TAU / COLUMNS as f32).sin_cos();
     let turn = |[x, y, z]: [f32; 3]| [x * cos - y * sin, x * sin + y * cos, z];
     let mut turned: Vec<_> = points.iter().map(|point| point.map(turn)).collect();
-    for ring in turned.chunks_exact_mut(COLUMNS) {
+    for ring in turned.as_chunks_mut::<COLUMNS>().0 {
         ring.rotate_right(columns);
     }
     turned
@@ -77,6 +77,22 @@ proptest! {
         let found = orientation(&points).turn(&orientation(&turned(&points, columns)));
         let off = (found - columns as f32 * TAU / 360.0 + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
         prop_assert!(off.abs() < 1.5_f32.to_radians(), "{}", off.to_degrees());
+    }
+
+    #[test]
+    fn walls_tell_the_turn_from_another_stand_too(
+        walls in walls(), columns in 0..COLUMNS, ahead in -1.5_f32..1.5, left in -1.5_f32..1.5,
+    ) {
+        prop_assume!((walls[0] - walls[2]).abs() > 6.0 && (walls[1] - walls[3]).abs() > 6.0);
+        let moved = [walls[0] - ahead, walls[1] - left, walls[2] + ahead, walls[3] + left];
+        let (there, back) = (yard(walls), turned(&yard(moved), columns));
+        let facing = |points: &[Option<[f32; 3]>]| {
+            Facing::new(&Cloud::new(points, RINGS).unwrap(), &Neighbours::default())
+        };
+        let found = relative_turn((&orientation(&there), &facing(&there)), (&orientation(&back), &facing(&back)));
+        let off = (found - columns as f32 * TAU / 360.0 + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+        prop_assert!(off.abs() < 1.5_f32.to_radians(), "{}", off.to_degrees());
+        prop_assert!(facing(&there).distance(&facing(&there)) < 1e-4);
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod convert;
 mod decode;
 mod info;
 mod places;
+pub mod relocalise;
 mod view;
 
 /// Multi-beam lidars: look at, decode, convert and calibrate, and recognise places.

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::from_key_scans;
+use agv_lidar3d::place::{DIRECTIONS, from_key_scans};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -111,10 +111,10 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
             (0..keys.len()).step_by(spacing).filter(|index| keys[*index].travelled <= 150.0).collect();
         let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
         for half_columns in [false, true] {
-            for method in Method::ALL {
+            for (method, is_checked) in experiments() {
                 let asked = if half_columns { &half } else { &whole };
                 let test = Test { keys: &keys, map: &map, queries: &queries, stored: &whole, asked, right };
-                let mut outcome = test.run(method);
+                let mut outcome = test.run(method, is_checked);
                 outcome.protocol = protocol;
                 outcome.half_columns = half_columns;
                 outcome.orientation_within_2_deg = orientation(&test, &asked_turn, &turns);
@@ -123,6 +123,12 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
         }
     }
     Ok(outcomes)
+}
+
+/// All methods, and those of the thesis with the check of the walls against look-alike places.
+fn experiments() -> impl Iterator<Item = (Method, bool)> {
+    let checked = Method::ALL.into_iter().filter(|method| *method != Method::Enriched);
+    Method::ALL.into_iter().map(|method| (method, false)).chain(checked.map(|method| (method, true)))
 }
 
 struct Test<'a> {
@@ -146,21 +152,35 @@ impl Test<'_> {
         nearest.filter(|node| self.apart(query, *node) <= self.right)
     }
 
-    fn run(&self, method: Method) -> Outcome {
+    fn run(&self, method: Method, is_checked: bool) -> Outcome {
+        let places: Vec<[f64; 2]> = self.map.iter().map(|node| self.keys[*node].position).collect();
+        let facing = |one: usize, other: usize| {
+            let [one, other] = [one, other].map(|place| &self.stored[self.map[place]].signatures.facing);
+            f64::from(one.distance(other))
+        };
+        let check = if is_checked { from_key_scans(&places, APART, facing).unwrap_or(0.0) } else { f64::MAX };
         let start = Instant::now();
-        let mut answers: Vec<(f64, bool)> = Vec::new();
+        let mut found = Vec::new();
         for &query in self.queries {
             let distances = self
                 .map
                 .iter()
                 .map(|&node| (method.distance(&self.asked[query].signatures, &self.stored[node].signatures), node));
             if let Some((distance, node)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                answers.push((distance, self.apart(query, node) <= self.right));
+                found.push((distance, query, node));
             }
         }
         let compare_us = start.elapsed().as_secs_f64() * 1e6 / (self.queries.len() * self.map.len()) as f64;
         let answerable = self.queries.iter().filter(|query| self.truth(**query).is_some()).count();
-        let places: Vec<[f64; 2]> = self.map.iter().map(|node| self.keys[*node].position).collect();
+        let is_like = |query: usize, node: usize| {
+            let [one, other] = [&self.asked[query], &self.stored[node]].map(|described| &described.signatures.facing);
+            !is_checked || f64::from(one.distance(other)) < check
+        };
+        let mut answers: Vec<(f64, bool)> = found
+            .into_iter()
+            .filter(|(_, query, node)| is_like(*query, *node))
+            .map(|(distance, query, node)| (distance, self.apart(query, node) <= self.right))
+            .collect();
         let threshold = from_key_scans(&places, APART, |one, other| {
             method.distance(&self.stored[self.map[one]].signatures, &self.stored[self.map[other]].signatures)
         })
@@ -190,7 +210,7 @@ impl Test<'_> {
         let mut seconds: Vec<f64> = self.asked.iter().map(|described| described.seconds[part]).collect();
         seconds.sort_by(f64::total_cmp);
         Outcome {
-            method: method.name(),
+            method: if is_checked { method.checked_name() } else { method.name() },
             protocol: "",
             half_columns: false,
             recall_at_full_precision,
@@ -200,7 +220,7 @@ impl Test<'_> {
             signature_ms: 1e3 * seconds[seconds.len() / 2],
             compare_us,
             orientation_within_2_deg: 0.0,
-            bytes: method.bytes(),
+            bytes: method.bytes() + if is_checked { DIRECTIONS } else { 0 },
             queries: self.queries.len(),
             answerable,
         }
@@ -212,7 +232,7 @@ fn orientation(test: &Test<'_>, turned: &[Signatures], turns: &[f64]) -> f64 {
     let pairs: Vec<(usize, usize)> =
         test.queries.iter().filter_map(|query| Some((*query, test.truth(*query)?))).collect();
     let found = pairs.iter().filter(|(query, node)| {
-        let found = f64::from(test.stored[*node].signatures.orientation.turn(&turned[*query].orientation));
+        let found = turned[*query].turn_since(&test.stored[*node].signatures);
         let truth = test.keys[*query].heading - test.keys[*node].heading - turns[*query];
         let error = (found - truth + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
         error.abs() <= 2f64.to_radians()

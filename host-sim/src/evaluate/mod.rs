@@ -12,6 +12,7 @@ pub mod halting_points;
 pub mod kidnapping;
 pub mod lidar3d_calibration;
 pub mod lidar3d_places;
+pub mod lidar3d_sharpness;
 pub mod places;
 pub mod repeatability;
 pub mod slam;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use agv_lidar3d::place::{BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Histogram, Orientation, from_key_scans};
+use agv_lidar3d::place::{BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, from_key_scans};
 use serde::{Deserialize, Serialize};
 
 use super::signatures::{Method, Signatures};
@@ -12,6 +12,9 @@ use crate::text_file::TextFileError;
 pub const APART: f64 = 30.0;
 /// Key scans so many numbers apart are of different places where no poses are known (M 5.2.1: 15).
 const NUMBERS_APART: usize = 15;
+
+/// Places from which the greatest difference of the walls is learned, at the most: it takes a tenth of a millisecond a pair.
+const LEARNING_PLACES: usize = 128;
 
 /// First bytes of a file of places: of this program, and their version.
 const MAGIC: [u8; 8] = *b"AGVP3D\x01\n";
@@ -36,6 +39,15 @@ pub struct PlaceMap {
     pub places: Vec<StoredPlace>,
 }
 
+/// When an answer is believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Greatest distance of the signatures.
+    pub distance: f64,
+    /// Greatest difference of the directions in which the walls face; None if that is not asked.
+    pub facing: Option<f64>,
+}
+
 /// Where a scan was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
@@ -52,29 +64,56 @@ pub struct Answer {
 impl PlaceMap {
     /// The place that a scan looks most like. None if there are no places.
     #[must_use]
-    pub fn find(&self, method: Method, threshold: f64, query: &Signatures) -> Option<Answer> {
+    pub fn find(&self, method: Method, limits: &Limits, query: &Signatures) -> Option<Answer> {
         let distances = self.places.iter().map(|place| method.distance(query, &place.signatures)).enumerate();
         let (place, distance) = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let turn = f64::from(self.places[place].signatures.orientation.turn(&query.orientation));
-        Some(Answer { place, distance, is_believed: distance < threshold, turn })
+        let stored = &self.places[place].signatures;
+        let faces_alike = |limit: f64| f64::from(stored.facing.distance(&query.facing)) < limit;
+        let is_believed = distance < limits.distance && limits.facing.is_none_or(faces_alike);
+        Some(Answer { place, distance, is_believed, turn: query.turn_since(stored) })
     }
 
-    /// The threshold of a method, learned from the map: 0.8 times the least distance between two of its places that are
-    /// more than 30 m apart, or, if their poses are not known, more than 15 numbers. None if the map is too small for it.
+    /// The greatest distance at which a method is believed, learned from the map: 0.8 times the least one between two of
+    /// its places that are more than 30 m apart, or, if their poses are not known, more than 15 numbers. None if the map is
+    /// too small for it.
     #[must_use]
     pub fn threshold(&self, method: Method) -> Option<f64> {
-        let distance =
-            |one: usize, other: usize| method.distance(&self.places[one].signatures, &self.places[other].signatures);
-        let poses: Option<Vec<[f64; 2]>> = self.places.iter().map(|place| place.pose.map(|[x, y, _]| [x, y])).collect();
+        self.learn(1, |one, other| method.distance(one, other))
+    }
+
+    /// The same of the directions in which walls face, from some of the places of a large map.
+    #[must_use]
+    pub fn facing_threshold(&self) -> Option<f64> {
+        let step = self.places.len().div_ceil(LEARNING_PLACES).max(1);
+        self.learn(step, |one, other| f64::from(one.facing.distance(&other.facing)))
+    }
+
+    fn learn(&self, step: usize, distance: impl Fn(&Signatures, &Signatures) -> f64) -> Option<f64> {
+        let places: Vec<&StoredPlace> = self.places.iter().step_by(step).collect();
+        let distance = |one: usize, other: usize| distance(&places[one].signatures, &places[other].signatures);
+        let poses: Option<Vec<[f64; 2]>> = places.iter().map(|place| place.pose.map(|[x, y, _]| [x, y])).collect();
         match poses {
             Some(poses) => from_key_scans(&poses, APART, distance),
             None => {
-                let numbers: Vec<[f64; 2]> = (0..self.places.len()).map(|number| [number as f64, 0.0]).collect();
+                let numbers: Vec<[f64; 2]> = (0..places.len()).map(|number| [(step * number) as f64, 0.0]).collect();
                 from_key_scans(&numbers, NUMBERS_APART as f64, distance)
             }
         }
     }
+
+    /// Distance from a place to the next one, m, at the median; None if no two of them have poses.
+    #[must_use]
+    pub fn spacing(&self) -> Option<f64> {
+        let pairs = self.places.iter().zip(self.places.iter().skip(1));
+        let apart = pairs.filter_map(|(one, other)| Some((one.pose?, other.pose?)));
+        let mut apart: Vec<f64> = apart.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).collect();
+        apart.sort_by(f64::total_cmp);
+        apart.get(apart.len() / 2).copied()
+    }
 }
+
+/// What stands for a share of one.
+const FACING_SCALE: f32 = 65_535.0;
 
 #[derive(Serialize, Deserialize)]
 struct File {
@@ -90,6 +129,8 @@ struct Entry {
     enriched: Vec<i8>,
     /// Distances by direction, cm.
     orientation: Vec<u16>,
+    /// Walls by direction, in 1/65535.
+    facing: Vec<u16>,
 }
 
 /// Writes places; an older file of that name is replaced.
@@ -103,6 +144,7 @@ pub fn write(path: &Path, map: &PlaceMap) -> Result<(), TextFileError> {
         histogram: place.signatures.counts.0.iter().map(|count| *count as u32).collect(),
         enriched: place.signatures.enriched.0.to_vec(),
         orientation: place.signatures.orientation.0.iter().map(|range| (100.0 * range).round() as u16).collect(),
+        facing: place.signatures.facing.0.iter().map(|share| (FACING_SCALE * share).round() as u16).collect(),
     });
     let file = File { sensor_height: map.sensor_height, places: places.collect() };
     let failed = |reason: String| TextFileError::of_system(path, std::io::Error::other(reason));
@@ -131,6 +173,7 @@ fn place(entry: &Entry) -> Option<StoredPlace> {
     let histogram: [u32; BINS] = entry.histogram.as_slice().try_into().ok()?;
     let enriched: [i8; ENRICHED_LENGTH] = entry.enriched.as_slice().try_into().ok()?;
     let orientation: [u16; DIRECTIONS] = entry.orientation.as_slice().try_into().ok()?;
+    let facing: [u16; DIRECTIONS] = entry.facing.as_slice().try_into().ok()?;
     if entry.pose.is_some_and(|pose| !pose.iter().all(|value| value.is_finite())) {
         return None;
     }
@@ -140,6 +183,7 @@ fn place(entry: &Entry) -> Option<StoredPlace> {
         counts,
         enriched: Enriched(enriched),
         orientation: Orientation(orientation.map(|range| 0.01 * f32::from(range))),
+        facing: Facing(facing.map(|share| f32::from(share) / FACING_SCALE)),
     };
     Some(StoredPlace { scan: entry.scan as usize, pose: entry.pose, signatures })
 }

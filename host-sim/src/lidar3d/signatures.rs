@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use agv_lidar3d::cloud::Cloud;
 use agv_lidar3d::place::{
-    BINS, ENRICHED_LENGTH, Enriched, Histogram, Neighbours, Orientation, chi_square, normalised_chi_square,
-    normalised_sorensen, sorensen,
+    BINS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Neighbours, Orientation, chi_square, normalised_chi_square,
+    normalised_sorensen, relative_turn, sorensen,
 };
 
 /// Height of the points that the orientation is determined from, above the sensor, m, and their reach, m.
@@ -44,6 +44,18 @@ impl Method {
         }
     }
 
+    /// The same where an answer is given only if the walls face the same way.
+    #[must_use]
+    pub fn checked_name(self) -> &'static str {
+        match self {
+            Self::ChiSquare => "thesis chi-square, checked",
+            Self::Sorensen => "thesis Sorensen, checked",
+            Self::NormalisedChiSquare => "normalised chi-square, checked",
+            Self::NormalisedSorensen => "normalised Sorensen, checked",
+            Self::Enriched => "enriched, checked",
+        }
+    }
+
     /// Size of a signature, bytes.
     #[must_use]
     pub fn bytes(self) -> usize {
@@ -74,6 +86,8 @@ pub struct Signatures {
     pub enriched: Enriched,
     /// Distances by direction.
     pub orientation: Orientation,
+    /// Walls by the direction in which they face.
+    pub facing: Facing,
 }
 
 impl Signatures {
@@ -93,7 +107,14 @@ impl Signatures {
         let both = start.elapsed().as_secs_f64();
         let [low, high] = ORIENTATION_HEIGHTS;
         let orientation = Orientation::of_heights(cloud, low, high, ORIENTATION_REACH);
-        (Self { shares: counts.normalised(), counts, enriched, orientation }, [histogram, both])
+        let facing = Facing::new(cloud, &Neighbours::default());
+        (Self { shares: counts.normalised(), counts, enriched, orientation, facing }, [histogram, both])
+    }
+
+    /// The angle by which the sensor has turned to the left since `other`, rad, -pi to pi.
+    #[must_use]
+    pub fn turn_since(&self, other: &Self) -> f64 {
+        f64::from(relative_turn((&other.orientation, &other.facing), (&self.orientation, &self.facing)))
     }
 }
 

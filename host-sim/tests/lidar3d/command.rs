@@ -323,6 +323,30 @@ fn places_of_a_street_are_found_again() {
 }
 
 #[test]
+fn the_place_found_starts_the_localiser() {
+    const STREET: &str = "lidar3d/moosmann/MuehlburgerTor";
+    let Some(folder) = real(STREET) else { return };
+    let files = Files::new();
+    let (map, log) = (files.path("street.places3d"), files.path("drive.agvlog"));
+    let (scans, poses) = (folder.join("velodyne_dist"), folder.join("kiss_icp_poses_derived.txt"));
+    let (scans, poses) = (scans.to_str().unwrap(), poses.to_str().unwrap());
+    results(&["lidar3d", "places", "index", scans, "--poses", poses, "--shift", "4", "-o", &map, "--json"]);
+    // A drive that does not say where it begins.
+    let carmen: String =
+        (0..5).map(|step| format!("FLASER 2 5.0 5.0 {0} 0 0 {0} 0 0 {0} host {0}\n", f64::from(step))).collect();
+    let carmen = files.write("drive.log", carmen.as_bytes());
+    assert!(agv(&["import", "carmen", &carmen, "-o", &log]).status.success());
+    assert_eq!(results(&["replay", &log, "--json"])["poses"], 0);
+    let wanted = ["--relocalise", "lidar3d", "--places", &map, "--scans", scans];
+    assert!(results(&[&["replay", &log, "--json"], &wanted[..]].concat())["poses"].as_u64() > Some(0));
+    // A map of places without poses cannot say where.
+    let without = files.path("without.places3d");
+    results(&["lidar3d", "places", "index", scans, "-o", &without, "--json"]);
+    let complaint = refusal(&["replay", &log, "--relocalise", "lidar3d", "--places", &without, "--scans", scans]);
+    assert!(complaint.contains("have no poses"), "{complaint}");
+}
+
+#[test]
 fn a_live_sensor_is_decoded_like_its_capture() {
     let files = Files::new();
     let packets = turns(2000);

@@ -1,6 +1,7 @@
 //! Qualitative localisation: has this place been seen (M chapter 5)?
 
 mod enriched;
+mod facing;
 mod histogram;
 mod key_signatures;
 mod loop_closure;
@@ -9,6 +10,7 @@ mod orientation;
 mod threshold;
 
 pub use enriched::{ENRICHED_LENGTH, Enriched};
+pub use facing::{Facing, relative_turn};
 pub use histogram::{BINS, Histogram, chi_square, normalised_chi_square, normalised_sorensen, sorensen};
 pub use key_signatures::KeySignatures;
 pub use loop_closure::{Limits, loop_closure};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use agv_host_sim::import::poses;
 use agv_host_sim::lidar3d::Source;
-use agv_host_sim::lidar3d::place_map::{self, PlaceMap, StoredPlace};
+use agv_host_sim::lidar3d::place_map::{self, Limits, PlaceMap, StoredPlace};
 use agv_host_sim::lidar3d::signatures::{Method, Signatures, sensor_height};
 use agv_lidar3d::cloud::{Cloud, RingOrder};
 use agv_lidar3d::place::KeySignatures;
@@ -69,18 +69,19 @@ impl From<MethodName> for Method {
 
 /// The source of the scans of a drive.
 #[derive(clap::Args)]
-struct Drive {
+pub struct Drive {
     /// Capture, folder of range images, or udp[:PORT].
     #[arg(value_name = "SOURCE", value_parser = Source::parse)]
-    source: Source,
+    pub source: Source,
+    /// The sensor and its parameters.
     #[command(flatten)]
-    sensor: SensorArguments,
+    pub sensor: SensorArguments,
 }
 
 impl Drive {
     /// Calls `take` with the number and the signatures of each whole revolution. The height of the sensor is that of
     /// `height`, or is determined from the first revolution. Returns it.
-    fn for_each(
+    pub fn for_each(
         self,
         height: Option<f32>,
         mut take: impl FnMut(usize, Signatures) -> ControlFlow<()>,
@@ -212,6 +213,9 @@ struct Find {
     /// Answers at a greater distance are unsure; learned from the places if absent.
     #[arg(long)]
     threshold: Option<f64>,
+    /// Believe an answer only if the walls face the same way as well, against places that look alike.
+    #[arg(long)]
+    check: bool,
     /// Only every so many scans.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -231,10 +235,11 @@ impl Find {
                 named(&self.places)
             )
         })?;
+        let limits = Limits { distance: threshold, facing: if self.check { map.facing_threshold() } else { None } };
         let mut answers = Vec::new();
         self.drive.for_each(Some(map.sensor_height), |scan, signatures| {
             if scan % self.every as usize == 0
-                && let Some(answer) = map.find(method, threshold, &signatures)
+                && let Some(answer) = map.find(method, &limits, &signatures)
             {
                 answers.push((scan, answer));
             }
