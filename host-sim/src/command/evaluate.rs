@@ -11,6 +11,7 @@ mod lidar3d_places;
 mod places;
 mod slam;
 mod warehouse;
+mod windows;
 
 pub use places::Places;
 
@@ -50,6 +51,7 @@ enum Experiment {
     Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Warehouse(warehouse::Warehouse),
+    Windows(windows::Windows),
 }
 
 impl Evaluate {
@@ -67,6 +69,7 @@ impl Evaluate {
             Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
+            Experiment::Windows(experiment) => experiment.run(),
         }
     }
 }

@@ -157,7 +157,7 @@ fn for_slam(parameters: &mut Parameters) {
     // No return is so near.
     parameters.features.detector.farthest = 0.0;
     // A car whose wheel slips and whose steering angle is that of a wheel which does not exist.
-    parameters.slam.biases = BiasDeviations { scale: 0.05, steering: 0.03, laser_yaw: 0.01 };
+    parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 3e-3 };
     // Without a map the uncertainty of the start remains, and grows with the distance from it.
     parameters.limits.largest_position_deviation = 10.0;
     parameters.limits.largest_heading_deviation = 1.0;

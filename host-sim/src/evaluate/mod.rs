@@ -17,3 +17,4 @@ pub mod repeatability;
 pub mod slam;
 pub mod warehouse;
 pub mod warehouse_disturbance;
+pub mod windows;
