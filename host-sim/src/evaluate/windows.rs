@@ -6,7 +6,7 @@
 use agv_core::features::falko;
 use agv_core::filter::BiasDeviations;
 use agv_core::geometry::{Pose, difference};
-use agv_core::localizer::{MapUse, Parameters, PoseFix};
+use agv_core::localizer::{MapUse, Mode, Parameters, PoseFix};
 use agv_core::measurement::PoseIncrement;
 use agv_core::odometry::{OdometryNoise, Vehicle};
 use rayon::prelude::*;
@@ -69,6 +69,9 @@ impl Candidate {
             OdometryNoise { slip: 0.03, side_slip: 0.01, yaw: 0.02, ..OdometryNoise::default() };
         parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 1e-6 };
         parameters.limits.longest_extrapolation = 1.0;
+        // Nothing tells the vehicle where it is, so it may grow uncertain.
+        parameters.limits.largest_heading_deviation = 1.0;
+        parameters.limits.largest_position_deviation = 10.0;
         if !self.has_key_scans {
             parameters.slam.key_scans = None;
         }
@@ -104,6 +107,8 @@ pub struct Drift {
     pub odometry: &'static str,
     /// Number of windows.
     pub windows: usize,
+    /// Share of the windows at whose end the localiser said that it was lost.
+    pub lost_share: f64,
     /// Distance from the corrected pose at the end, m.
     pub position_m: Spread,
     /// Difference from its heading, deg.
@@ -129,13 +134,22 @@ fn windows(drive: &OfficeDrive, length: f64) -> Vec<(usize, usize)> {
     }
 }
 
-/// Error of one candidate at the end of one window: m and rad.
+/// The end of one window.
+struct End {
+    /// Distance from the corrected pose, m.
+    position: f64,
+    /// Heading minus the corrected one, rad.
+    heading: f64,
+    is_lost: bool,
+}
+
+/// One candidate in one window.
 fn run(
     drive: &OfficeDrive,
     (first, last): (usize, usize),
     candidate: &Candidate,
     worsening: &Worsening,
-) -> Result<(f64, f64), ReplayError> {
+) -> Result<End, ReplayError> {
     let mut random = Random::new(first as u64, Stream::Odometry);
     let start = &drive.scans[first];
     let fix =
@@ -161,8 +175,13 @@ fn run(
         references: Vec::new(),
     };
     let replay = replay(&recording, |_| {})?;
-    let (truth, found) = (drive.truth[last], replay.poses.last().map_or(Pose::default(), |pose| pose.pose));
-    Ok(((found.position() - truth.position()).norm(), difference(found.theta, truth.theta)))
+    let truth = drive.truth[last];
+    let found = replay.poses.last().map_or(Pose::default(), |pose| pose.pose);
+    Ok(End {
+        position: (found.position() - truth.position()).norm(),
+        heading: difference(found.theta, truth.theta),
+        is_lost: replay.poses.last().is_some_and(|pose| pose.mode == Mode::Lost),
+    })
 }
 
 /// Drift of a candidate over all windows of `length` (m).
@@ -175,15 +194,16 @@ pub fn drift(
     candidate: &Candidate,
     worsening: &Worsening,
 ) -> Result<Drift, ReplayError> {
-    let errors: Vec<(f64, f64)> = windows(drive, length)
+    let ends: Vec<End> = windows(drive, length)
         .into_par_iter()
         .map(|window| run(drive, window, candidate, worsening))
         .collect::<Result<_, _>>()?;
     Ok(Drift {
         candidate: candidate.name,
         odometry: worsening.name,
-        windows: errors.len(),
-        position_m: Spread::of(errors.iter().map(|error| error.0)),
-        heading_deg: Spread::of(errors.iter().map(|error| error.1.abs().to_degrees())),
+        windows: ends.len(),
+        lost_share: ends.iter().filter(|end| end.is_lost).count() as f64 / ends.len() as f64,
+        position_m: Spread::of(ends.iter().map(|end| end.position)),
+        heading_deg: Spread::of(ends.iter().map(|end| end.heading.abs().to_degrees())),
     })
 }

@@ -34,13 +34,13 @@ impl Windows {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         anyhow::ensure!(self.length > 0.0, "--length must be more than 0 m");
-        let log = match self.log {
-            Some(log) => log,
-            None => data::folder()
-                .context("set AGV_DATA to the folder of recordings")?
-                .join("scans2d/freiburg-079-corrected.log.gz"),
+        let drive = match self.log {
+            Some(log) => OfficeDrive::of_carmen(&log)?,
+            None => {
+                let folder = data::folder().context("set AGV_DATA to the folder of recordings")?.join("scans2d");
+                OfficeDrive::of_graph(&folder.join("fr079.log"), &folder.join("freiburg-079-corrected.log.gz"))?
+            }
         };
-        let drive = OfficeDrive::of_carmen(&log)?;
         let bar = progress::bar("driving", (Candidate::ALL.len() * Worsening::ALL.len()) as u64);
         let mut drifts = Vec::new();
         for worsening in &Worsening::ALL {
@@ -55,14 +55,18 @@ impl Windows {
             println!("{}", serde_json::to_string_pretty(&drifts)?);
             return Ok(());
         }
-        println!("{:<28} {:<8} {:>7}   {:<22} {:<22}", "", "odometry", "windows", "m median, 95 %, max", "deg");
+        println!(
+            "{:<28} {:<8} {:>7} {:>5}   {:<22} {:<22}",
+            "", "odometry", "windows", "lost", "m median, 95 %, max", "deg"
+        );
         for drift in &drifts {
             let (position, heading) = (drift.position_m, drift.heading_deg);
             println!(
-                "{:<28} {:<8} {:>7} {:>7.3} {:>6.3} {:>6.3}   {:>7.2} {:>6.2} {:>6.2}",
+                "{:<28} {:<8} {:>7} {:>4.0}% {:>7.3} {:>6.3} {:>6.3}   {:>7.2} {:>6.2} {:>6.2}",
                 drift.candidate,
                 drift.odometry,
                 drift.windows,
+                100.0 * drift.lost_share,
                 position.median,
                 position.p95,
                 position.max,
