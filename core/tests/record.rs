@@ -130,8 +130,9 @@ fn landmark_kind() -> impl Strategy<Value = LandmarkKind> {
 fn pose_output() -> impl Strategy<Value = PoseOutput> {
     let mode = prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Lost)];
     let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible), Just(Reason::SteeringEncoder)];
-    let numbers = prop::array::uniform9(number());
-    (time(), pose(), mode, reason, numbers).prop_map(|(time, pose, mode, reason, [a, b, c, d, e, f, g, h, i])| {
+    let numbers = prop::array::uniform10(number());
+    (time(), [pose(), pose()], mode, reason, numbers).prop_map(|(time, [pose, smooth], mode, reason, numbers)| {
+        let [a, b, c, d, e, f, g, h, i, correction] = numbers;
         PoseOutput {
             time,
             pose,
@@ -139,6 +140,8 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
             mode,
             reason,
             dead_reckoning_distance: g,
+            correction,
+            smooth,
             acceptance: h,
             normalised_square: i,
         }

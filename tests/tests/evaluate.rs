@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use agv_core::geometry::{Point, Pose};
 use agv_host_sim::data;
-use agv_host_sim::evaluate::carpark::{self, Noise};
+use agv_host_sim::evaluate::carpark::{self, Knowledge, Noise};
 use agv_host_sim::evaluate::warehouse::{Map, Method, PATHS, experiment};
 use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
 
@@ -19,7 +19,7 @@ fn carpark_folder(test: &str) -> Option<PathBuf> {
 #[test]
 fn the_car_park_is_localised_to_seven_centimetres() {
     let Some(folder) = carpark_folder("the_car_park_is_localised_to_seven_centimetres") else { return };
-    let (outcome, recording, replay) = carpark::run(&folder, Noise::Nominal).unwrap();
+    let (outcome, recording, replay) = carpark::run(&folder, Noise::Nominal, Knowledge::Map).unwrap();
     println!("{outcome:?}");
     assert!(outcome.rmse_m <= 0.070, "{} m", outcome.rmse_m);
     assert!(outcome.max_m < 0.4 && outcome.heading_rmse_deg < 0.5);
@@ -43,7 +43,7 @@ fn the_car_park_is_localised_to_seven_centimetres() {
 #[test]
 fn a_localiser_too_sure_of_itself_says_that_it_is_lost() {
     let Some(folder) = carpark_folder("a_localiser_too_sure_of_itself_says_that_it_is_lost") else { return };
-    let (outcome, _, _) = carpark::run(&folder, Noise::Tight).unwrap();
+    let (outcome, _, _) = carpark::run(&folder, Noise::Tight, Knowledge::Map).unwrap();
     println!("{outcome:?}");
     if let Some(wrong) = outcome.wrong_at_s {
         let lost = outcome.lost_at_s.expect("it was wrong and did not say so");

@@ -6,6 +6,7 @@ use nalgebra::Matrix2;
 use super::maps::{Association, Maps};
 use super::output::OBSERVATIONS;
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Seen, Slam, cartesian};
+use super::smooth_pose::SmoothPose;
 use super::{Event, LandmarkSource, LandmarkUse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, detect_reflectors, falko};
 use crate::filter::{Cartesian, Consistency, Ekf, Observation, RangeBearing, Timeline};
@@ -43,6 +44,7 @@ pub struct Localizer<
     lost: Option<Reason>,
     blindness: Option<Blindness>,
     distance: DistanceSince,
+    smooth: SmoothPose,
     workspace: Workspace<BEAMS>,
     outputs: Outputs,
 }
@@ -122,6 +124,8 @@ impl<
             mode: Mode::NotLocalised,
             reason: Reason::NoPose,
             dead_reckoning_distance: 0.0,
+            correction: 0.0,
+            smooth: Pose::default(),
             acceptance: 1.0,
             normalised_square: 2.0,
         };
@@ -143,6 +147,7 @@ impl<
             lost: None,
             blindness: None,
             distance: DistanceSince::NEVER,
+            smooth: SmoothPose::default(),
             workspace: Workspace {
                 points: PointScan::new(),
                 path: SensorPath::default(),
@@ -189,6 +194,11 @@ impl<
     #[must_use]
     pub fn reflectors(&self) -> &FixedMap<REFLECTORS> {
         &self.maps.reflectors
+    }
+
+    /// The landmarks in the state of the filter, those too that were given: kind and position in W, m.
+    pub fn state_landmarks(&self) -> impl Iterator<Item = (LandmarkKind, Point)> + '_ {
+        self.slam.landmarks()
     }
 
     /// What the last event gave.
@@ -239,6 +249,7 @@ impl<
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state);
+        self.smooth = SmoothPose::new(fix.time, fix.pose);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
         self.blindness =
@@ -450,6 +461,8 @@ impl<
     /// Fuses the sightings of the workspace at the filter's time; its path begins at `start`.
     fn fuse_by_slam(&mut self, start: Time) {
         let (mut expected, mut accepted, mut used, mut square_sum) = (0, 0, 0, 0.0);
+        // A vehicle without a map of reflectors finds them on its way.
+        let reflectors_are_given = !self.maps.reflectors.landmarks().is_empty();
         let now = self.slam.time().since(start);
         let path = &self.workspace.path;
         for sighting in &mut self.workspace.sightings {
@@ -460,7 +473,8 @@ impl<
             let is_reflector = sighting.kind == LandmarkKind::Reflector;
             let is_accepted = fate.verdict == Verdict::Accepted;
             let is_fixed = fate.landmark.is_none_or(|(source, ..)| source == LandmarkSource::Fixed);
-            if is_fixed && fate.verdict != Verdict::Ambiguous && (is_reflector || fate.landmark.is_some()) {
+            let is_expected = is_reflector && reflectors_are_given;
+            if is_fixed && fate.verdict != Verdict::Ambiguous && (is_expected || fate.landmark.is_some()) {
                 expected += 1;
                 accepted += usize::from(is_accepted);
             }
@@ -493,8 +507,8 @@ impl<
         }
         // What fits no landmark is new, once the whole scan has corrected the pose.
         for sighting in &self.workspace.sightings {
-            if sighting.kind != LandmarkKind::Reflector && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated)
-            {
+            let may_be_new = sighting.kind != LandmarkKind::Reflector || !reflectors_are_given;
+            if may_be_new && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
                 let mut seen = cartesian(&sighting.observation);
                 seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
                 let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
@@ -533,6 +547,7 @@ impl<
             return;
         };
         let state = timeline.state();
+        let correction = self.smooth.follow(timeline, &state.pose);
         let limits = &self.parameters.limits;
         let distance = self.distance;
         if self.lost.is_none() {
@@ -561,6 +576,8 @@ impl<
             mode,
             reason,
             dead_reckoning_distance: distance.any(),
+            correction,
+            smooth: self.smooth.pose(),
             acceptance: self.consistency.acceptance(),
             normalised_square: self.consistency.mean_normalised_square(),
         };

@@ -100,6 +100,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         Some(PoseOutput {
             time: newest.map_or(base.time, |motion| motion.end),
             pose: self.state.pose,
+            smooth: base.smooth.compose(&base.pose.between(&self.state.pose)),
             covariance: self.state.covariance_entries(),
             mode,
             reason,

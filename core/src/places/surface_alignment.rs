@@ -19,7 +19,7 @@ pub struct SurfaceAlignmentParameters {
     pub tolerance: f32,
     /// Number of iterations.
     pub iterations: u8,
-    /// Every so many beams are looked at.
+    /// Every so many beams are looked at before the last iteration, in which all are.
     pub every: u8,
     /// Standard deviation of a range, m.
     pub range_deviation: f32,
@@ -29,7 +29,7 @@ pub struct SurfaceAlignmentParameters {
 
 impl Default for SurfaceAlignmentParameters {
     fn default() -> Self {
-        Self { reach: 0.15, tolerance: 0.03, iterations: 4, every: 1, range_deviation: 0.01, surface_deviation: 0.004 }
+        Self { reach: 0.15, tolerance: 0.03, iterations: 3, every: 4, range_deviation: 0.01, surface_deviation: 0.004 }
     }
 }
 
@@ -54,11 +54,13 @@ pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
     let noise = parameters.range_deviation * parameters.range_deviation;
     let floor = parameters.surface_deviation * parameters.surface_deviation;
     let tolerance = 1.0 / (parameters.tolerance * parameters.tolerance);
-    for _ in 0..parameters.iterations.max(1) {
+    let iterations = parameters.iterations.max(1);
+    for iteration in 1..=iterations {
+        let every = if iteration < iterations { parameters.every.max(1) } else { 1 };
         let transform = Transform::of(&pose);
         let (mut information, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         let (mut squares, mut count) = (0.0_f32, 0);
-        let returns = source.points.iter().zip(&source.ranges).step_by(usize::from(parameters.every.max(1)));
+        let returns = source.points.iter().zip(&source.ranges).step_by(usize::from(every));
         for (point, range) in returns.filter(|(_, range)| **range > 0.0) {
             let moved = transform.apply(point);
             let Some((surface, square)) = target.nearest(&moved, BESIDE) else { continue };
@@ -79,7 +81,7 @@ pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
             squares += weight * distance * distance;
             count += 1;
         }
-        if count < FEWEST {
+        if count * u32::from(every) < FEWEST {
             return None;
         }
         let step = information.cholesky()?.solve(&gradient);

@@ -26,13 +26,15 @@ impl Surface {
 pub struct SurfaceParameters {
     /// Points within this radius are of one piece, m.
     pub radius: f32,
+    /// What is added to the radius for each metre of distance.
+    pub growth: f32,
     /// Largest root mean square distance of the points from the piece, m.
     pub residual: f32,
 }
 
 impl Default for SurfaceParameters {
     fn default() -> Self {
-        Self { radius: 0.12, residual: 0.015 }
+        Self { radius: 0.12, growth: 0.02, residual: 0.015 }
     }
 }
 
@@ -113,9 +115,11 @@ fn surface_at<const BEAMS: usize>(
     parameters: &SurfaceParameters,
 ) -> Option<Surface> {
     let centre = *scan.points.get(index)?;
-    if *scan.ranges.get(index)? <= 0.0 {
+    let range = *scan.ranges.get(index)?;
+    if range <= 0.0 {
         return None;
     }
+    let radius = parameters.radius + parameters.growth * range;
     let count = scan.ranges.len();
     let mut moments = Moments::default();
     for step in 0..=2 * BESIDE {
@@ -130,7 +134,7 @@ fn surface_at<const BEAMS: usize>(
         };
         let (Some(point), Some(range)) = (scan.points.get(beam), scan.ranges.get(beam)) else { continue };
         let relative = point - centre;
-        if is_inside && *range > 0.0 && relative.norm_squared() <= parameters.radius * parameters.radius {
+        if is_inside && *range > 0.0 && relative.norm_squared() <= radius * radius {
             moments.add(relative);
         }
     }

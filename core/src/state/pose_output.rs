@@ -21,8 +21,29 @@ pub struct PoseOutput {
     pub reason: Reason,
     /// Way since a landmark last corrected the pose, m.
     pub dead_reckoning_distance: f64,
+    /// By how far landmarks have moved the position since the output before, m.
+    pub correction: f64,
+    /// Pose of R in a frame that coincides with W when a pose is given and drifts with the odometry: it has no steps.
+    pub smooth: Pose,
     /// Share of the observations of fixed landmarks that were accepted lately, 0 to 1.
     pub acceptance: f64,
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
+}
+
+impl PoseOutput {
+    /// A correction that a controller had better know of, m.
+    pub const NOTABLE_CORRECTION: f64 = 0.01;
+
+    /// Whether landmarks have moved the position by more than [`Self::NOTABLE_CORRECTION`] since the output before.
+    #[must_use]
+    pub fn has_jumped(&self) -> bool {
+        self.correction > Self::NOTABLE_CORRECTION
+    }
+
+    /// The frame of the smooth pose in W.
+    #[must_use]
+    pub fn smooth_offset(&self) -> Pose {
+        self.pose.compose(&self.smooth.inverse())
+    }
 }

@@ -26,6 +26,8 @@ fn pose() -> PoseOutput {
         mode: Mode::Mixed,
         reason: Reason::None,
         dead_reckoning_distance: 1.234,
+        correction: 0.002,
+        smooth: Pose { x: 12.3, y: -7.1, theta: -1.23 },
         acceptance: 0.87,
         normalised_square: 2.15,
     }

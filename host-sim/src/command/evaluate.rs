@@ -12,6 +12,7 @@ mod lidar3d_sharpness;
 mod places;
 mod slam;
 mod warehouse;
+mod windows;
 
 pub use lidar3d_places::Lidar3dPlaces;
 pub use places::Places;
@@ -53,6 +54,7 @@ enum Experiment {
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Lidar3dSharpness(lidar3d_sharpness::Lidar3dSharpness),
     Warehouse(warehouse::Warehouse),
+    Windows(windows::Windows),
 }
 
 impl Evaluate {
@@ -71,6 +73,7 @@ impl Evaluate {
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Lidar3dSharpness(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
+            Experiment::Windows(experiment) => experiment.run(),
         }
     }
 }

@@ -6,8 +6,9 @@
 use std::path::Path;
 
 use agv_core::features::ReflectorDetection;
+use agv_core::filter::BiasDeviations;
 use agv_core::geometry::{Pose, difference};
-use agv_core::landmarks::{LandmarkKind, Verdict};
+use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{MapUse, Mode, Parameters, PoseFix, PoseOutput};
 use agv_core::measurement::Time;
 use agv_core::odometry::OdometryNoise;
@@ -27,6 +28,16 @@ pub enum Noise {
     Nominal,
     /// 0.1 m/s and 1 degree: too sure of itself.
     Tight,
+}
+
+/// What the localiser knows of the reflectors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Knowledge {
+    /// Where all of them are.
+    #[default]
+    Map,
+    /// Nothing: it finds them on its way and keeps them in the state of its filter.
+    Slam,
 }
 
 /// What came out.
@@ -50,9 +61,18 @@ pub struct Outcome {
     pub accepted: usize,
     /// Observations that did not.
     pub rejected: usize,
+    /// Reflectors that were found on the way and kept; none if they were given.
+    pub landmarks: usize,
+    /// Root mean square distance of those from the nearest surveyed one, of those that have one within a metre, m.
+    pub map_error_m: Option<f64>,
+    /// How many have none within a metre.
+    pub landmarks_elsewhere: usize,
     /// Recorded time by processor time.
     pub realtime_factor: f64,
 }
+
+/// A landmark that is further from every surveyed reflector, m, is none of them.
+const ELSEWHERE: f64 = 1.0;
 
 /// Why the experiment cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -99,22 +119,63 @@ pub fn parameters(imported: &Parameters, noise: Noise) -> Parameters {
 ///
 /// # Errors
 /// See [`CarparkError`].
-pub fn run(folder: &Path, noise: Noise) -> Result<(Outcome, Recording, Replay), CarparkError> {
+pub fn run(folder: &Path, noise: Noise, knowledge: Knowledge) -> Result<(Outcome, Recording, Replay), CarparkError> {
     let mut recording = carpark::read(folder, &carpark::WINDOW)?;
     recording.parameters = parameters(&recording.parameters, noise);
+    let survey = recording.landmarks.clone();
+    if knowledge == Knowledge::Slam {
+        recording.landmarks.clear();
+        for_slam(&mut recording.parameters);
+    }
     let headings = carpark::read_batch_solution(folder)?;
     let first = recording.references.first().ok_or(CarparkError::NoReference)?;
-    let laser = Pose::new(first.x, first.y, FIRST_HEADING);
+    let given = match knowledge {
+        Knowledge::Map => None,
+        // Nothing on the way tells the angle of a map that begins here, so the start must.
+        Knowledge::Slam => headings.first().map(|first| first.pose.theta + recording.parameters.laser.theta),
+    };
+    let laser = Pose::new(first.x, first.y, given.unwrap_or(FIRST_HEADING));
     let fix = PoseFix {
         time: first.time,
         pose: laser.compose(&recording.parameters.laser.inverse()),
         position_deviation: 0.3,
-        heading_deviation: 5.0_f64.to_radians(),
+        heading_deviation: given.map_or(5.0_f64, |_| 1.0).to_radians(),
     };
     recording.events.insert(0, RecordedEvent::SetPose(fix));
     let replay = replay(&recording, |_| {})?;
-    let outcome = judge(&recording, &replay, &headings);
+    let mut outcome = judge(&recording, &replay, &headings);
+    if knowledge == Knowledge::Slam {
+        judge_map(&mut outcome, &replay, &survey);
+    }
     Ok((outcome, recording, replay))
+}
+
+/// Reflectors in the state, and nothing else: there are no walls to align to, and no pallets.
+fn for_slam(parameters: &mut Parameters) {
+    parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: true };
+    parameters.slam.key_scans = None;
+    // No return is so near.
+    parameters.features.detector.farthest = 0.0;
+    // A car whose wheel slips and whose steering angle is that of a wheel which does not exist.
+    parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 3e-3 };
+    // Without a map the uncertainty of the start remains, and grows with the distance from it.
+    parameters.limits.largest_position_deviation = 10.0;
+    parameters.limits.largest_heading_deviation = 1.0;
+}
+
+/// How far the found reflectors are from the surveyed ones. Nothing is aligned: the start pose fixes the map.
+fn judge_map(outcome: &mut Outcome, replay: &Replay, survey: &[Landmark]) {
+    let nearest: Vec<f64> = replay
+        .dynamic_landmarks
+        .iter()
+        .map(|&[x, y]| {
+            survey.iter().map(|landmark| (landmark.x - x).hypot(landmark.y - y)).fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let found: Vec<f64> = nearest.iter().copied().filter(|distance| *distance <= ELSEWHERE).collect();
+    outcome.landmarks = nearest.len();
+    outcome.landmarks_elsewhere = nearest.len() - found.len();
+    outcome.map_error_m = (!found.is_empty()).then(|| root_mean_square(found.into_iter()));
 }
 
 fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome {
@@ -149,6 +210,9 @@ fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome 
         wrong_at_s: errors.iter().find(|error| error.1 > WRONG).map(|error| error.0.seconds()),
         accepted,
         rejected: seen - accepted,
+        landmarks: 0,
+        map_error_m: None,
+        landmarks_elsewhere: 0,
         realtime_factor: recorded / replay.elapsed.as_secs_f64(),
     }
 }

@@ -21,10 +21,11 @@ const DRIVE: &str = include_str!("../../scenarios/block_storage_p1.toml");
 const MAPPING: &str = include_str!("../../scenarios/block_storage_mapping.toml");
 
 /// What the localiser may use in each replay of the drive; the last one uses everything.
-const METHODS: [(&str, MapUse); 4] = [
+const METHODS: [(&str, MapUse); 5] = [
     ("odometry alone", MapUse { reflectors: false, features: false, dynamic: false, slam: false }),
     ("reflectors", MapUse { reflectors: true, features: false, dynamic: false, slam: false }),
     ("static features", MapUse { reflectors: false, features: true, dynamic: false, slam: false }),
+    ("features found on the way", MapUse { reflectors: false, features: false, dynamic: false, slam: true }),
     ("mixed", MapUse { reflectors: true, features: true, dynamic: false, slam: false }),
 ];
 

@@ -18,3 +18,4 @@ pub mod repeatability;
 pub mod slam;
 pub mod warehouse;
 pub mod warehouse_disturbance;
+pub mod windows;

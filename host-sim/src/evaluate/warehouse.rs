@@ -86,6 +86,9 @@ const MENDED_DEVIATION: f64 = 0.01;
 /// The same for FALKO as printed: scatter and median drift that the feasibility study found, m.
 const PRINTED_DEVIATION: f64 = 0.034;
 
+/// Side slip of a vehicle whose lasting errors are estimated, m for a square root of a metre.
+const SIDE_SLIP: f64 = 0.6e-3;
+
 impl Method {
     /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
     pub const ALL: [Self; 11] = [
@@ -233,6 +236,10 @@ pub fn prepare(
         dynamic: method.map == Map::Dynamic,
         slam: method.map.is_slam(),
     };
+    if method.map.is_slam() {
+        // Scale and steering offset are in the state, so the noise need not stand for them.
+        recording.parameters.odometry_noise.side_slip = SIDE_SLIP;
+    }
     if !method.map.has_key_scans() {
         recording.parameters.slam.key_scans = None;
     }

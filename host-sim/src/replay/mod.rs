@@ -71,7 +71,13 @@ pub fn replay(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<
         }
     }
     replay.elapsed = start.elapsed();
-    replay.dynamic_landmarks = localizer.dynamic_landmarks().iter().map(|landmark| landmark.position.into()).collect();
+    replay.dynamic_landmarks = localizer
+        .dynamic_landmarks()
+        .iter()
+        .map(|landmark| landmark.position)
+        .chain(localizer.state_landmarks().map(|(_, position)| position))
+        .map(Into::into)
+        .collect();
     progress(recording.events.len());
     Ok(replay)
 }

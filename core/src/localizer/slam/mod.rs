@@ -118,6 +118,11 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         self.time = time.max(self.time);
     }
 
+    /// The landmarks in the state.
+    pub(super) fn landmarks(&self) -> impl Iterator<Item = (LandmarkKind, Point)> + '_ {
+        self.book.entries().filter_map(|(place, entry)| Some((entry.kind, self.filter.landmark(place)?)))
+    }
+
     fn predict(&mut self, motion: &Motion, lever: f64) {
         self.filter.predict(motion, lever);
     }
@@ -183,10 +188,14 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     pub(super) fn discover(&mut self, seen: &Seen, parameters: &Parameters) {
         let located = self.filter.locate(&seen.cartesian.position, &parameters.laser);
         let orientation = self.orientation(seen, parameters);
+        let least = match seen.kind {
+            LandmarkKind::Reflector => 0.5 * parameters.association.reflector_radius,
+            _ => parameters.slam.least_distance,
+        };
         let is_near = |place: usize| {
-            self.filter.landmark(place).is_some_and(|position| {
-                libm::hypot(position.x - located.x, position.y - located.y) < parameters.slam.least_distance
-            })
+            self.filter
+                .landmark(place)
+                .is_some_and(|position| libm::hypot(position.x - located.x, position.y - located.y) < least)
         };
         let is_known = self
             .book

@@ -73,7 +73,7 @@ impl Default for KeyScanParameters {
     /// Inflation and floors of the project's feasibility study; the gate lets 99.9 per cent of the right ones pass.
     fn default() -> Self {
         Self {
-            spacing: 2.0,
+            spacing: 1.5,
             turn: 0.35,
             surfaces: SurfaceParameters::default(),
             alignment: SurfaceAlignmentParameters::default(),

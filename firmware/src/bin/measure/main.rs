@@ -11,7 +11,7 @@ use core::panic::PanicInfo;
 use agv_core::features::{Keypoint, PointScan, falko};
 use agv_core::geometry::Point;
 use agv_core::landmarks::{DynamicMap, FixedMap, Landmark, LandmarkKind, NearestNeighbour};
-use agv_core::localizer::{Event, Localizer};
+use agv_core::localizer::{Event, Localizer, MapUse};
 use agv_core::measurement::{Reflectors, Scan, Time};
 use agv_core::record::Record;
 use agv_core::wire::cola::{Deframed, Deframer, Dialect, Sequence};
@@ -58,6 +58,7 @@ struct Counts {
     prediction: Count,
     reflector: Count,
     scan: Count,
+    slam: Count,
     falko: Count,
     association: Count,
     map_update: Count,
@@ -69,6 +70,7 @@ impl Counts {
             prediction: Count::new("prediction"),
             reflector: Count::new("one reflector update"),
             scan: Count::new("scan cycle"),
+            slam: Count::new("scan cycle with landmarks and key scans in the state"),
             falko: Count::new("falko on 1440 beams"),
             association: Count::new("association among 1000 reflectors"),
             map_update: Count::new("dynamic map update of 20 keypoints"),
@@ -78,6 +80,7 @@ impl Counts {
 
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
+static SLAM: StaticCell<Localizer> = StaticCell::new();
 static POINTS: ConstStaticCell<PointScan<1440>> = ConstStaticCell::new(PointScan::new());
 static DETECTOR: StaticCell<falko::Detector<1440>> = StaticCell::new();
 static MAP: StaticCell<FixedMap<1000>> = StaticCell::new();
@@ -89,6 +92,7 @@ fn main() -> ! {
     let stopwatch = Stopwatch::new();
     let mut counts = Counts::new();
     let mut localizer: Option<&mut Localizer> = None;
+    let mut slam: Option<&mut Localizer> = None;
     let mut detector: Option<&mut falko::Detector<1440>> = None;
     let points = POINTS.take();
     let map = MAP.init_with(FixedMap::new);
@@ -99,6 +103,9 @@ fn main() -> ! {
         .for_each(&mut input, |record| match (record, &mut localizer) {
             (Record::Header(header), None) => {
                 localizer = Some(LOCALIZER.init_with(|| Localizer::new(*header.parameters)));
+                let mut parameters = *header.parameters;
+                parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
+                slam = Some(SLAM.init_with(|| Localizer::new(parameters)));
                 detector = Some(DETECTOR.init_with(|| falko::Detector::new(header.parameters.features.detector)));
             }
             (Record::Landmarks(landmarks), Some(localizer)) => {
@@ -109,6 +116,14 @@ fn main() -> ! {
                     features(&stopwatch, &mut counts, scan, points, detector, dynamic);
                 }
                 handle(&stopwatch, &mut counts, localizer, event);
+                if let Some(slam) = &mut slam {
+                    let count = stopwatch.count(|| {
+                        slam.handle(&event);
+                    });
+                    if matches!(event, Event::Scan(_)) {
+                        counts.slam.add(count);
+                    }
+                }
             }
             _ => {}
         })
@@ -117,9 +132,9 @@ fn main() -> ! {
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
-    let Counts { prediction, reflector, scan, falko, association, map_update } = counts;
+    let Counts { prediction, reflector, scan, slam, falko, association, map_update } = counts;
     let [few, many] = search::count(&stopwatch, map);
-    for count in [prediction, reflector, association, falko, map_update, scan, decode(&stopwatch), few, many] {
+    for count in [prediction, reflector, association, falko, map_update, scan, slam, decode(&stopwatch), few, many] {
         let mean = count.total / count.runs.max(1);
         writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");
     }

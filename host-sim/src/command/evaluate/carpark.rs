@@ -12,6 +12,9 @@ pub struct Carpark {
     /// What is believed of the vehicle's own sensors.
     #[arg(long, value_enum, default_value = "nominal")]
     noise: Noise,
+    /// What is known of the reflectors.
+    #[arg(long, value_enum, default_value = "map")]
+    mode: Mode,
     /// Switch the vehicle on at that many random moments instead, with no start pose: it finds itself by its reflectors.
     #[arg(long, value_name = "STARTS", num_args = 0..=1, default_missing_value = "50")]
     relocalise: Option<usize>,
@@ -21,6 +24,14 @@ pub struct Carpark {
     /// One JSON object instead of a table.
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Mode {
+    /// Where all of them are.
+    Map,
+    /// Nothing: they are found on the way.
+    Slam,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -43,7 +54,11 @@ impl Carpark {
             Noise::Nominal => carpark::Noise::Nominal,
             Noise::Tight => carpark::Noise::Tight,
         };
-        let (outcome, _, _) = carpark::run(&folder, noise)?;
+        let knowledge = match self.mode {
+            Mode::Map => carpark::Knowledge::Map,
+            Mode::Slam => carpark::Knowledge::Slam,
+        };
+        let (outcome, _, _) = carpark::run(&folder, noise, knowledge)?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcome)?);
             return Ok(());
@@ -55,6 +70,12 @@ impl Carpark {
         );
         println!("heading      rms {:.2} deg", outcome.heading_rmse_deg);
         println!("reflectors   {} accepted, {} rejected", outcome.accepted, outcome.rejected);
+        if let Some(error) = outcome.map_error_m {
+            println!(
+                "map          {} reflectors, rms {error:.3} m, {} elsewhere",
+                outcome.landmarks, outcome.landmarks_elsewhere
+            );
+        }
         println!("wrong        {}", or_never(outcome.wrong_at_s));
         println!("lost         {}", or_never(outcome.lost_at_s));
         println!("speed        {:.0} times real time", outcome.realtime_factor);
