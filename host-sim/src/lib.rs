@@ -10,6 +10,7 @@ pub mod file_kind;
 pub mod import;
 pub mod layout_check;
 pub mod layout_file;
+pub mod lidar3d;
 pub mod link;
 pub mod live;
 pub mod log;

@@ -12,8 +12,9 @@ pub enum Offsets {
     Alternate,
 }
 
-/// The far point of the two-point correction, m, and its near points along M's x and y, m (HDL-64E S2 manual).
-const FAR_POINT: f64 = 25.04;
+/// The far point of the two-point correction, m (HDL-64E S2 manual).
+pub(crate) const FAR_POINT: f64 = 25.04;
+/// Its near points along M's x and y, m.
 const NEAR_POINT_X: f64 = 2.4;
 const NEAR_POINT_Y: f64 = 1.93;
 
@@ -48,13 +49,18 @@ pub fn point_with_two_points(laser: &Laser, offsets: Offsets, azimuth: f64, dist
     let Some(full) = laser.full.filter(|full| full.has_two_points && distance + laser.distance < FAR_POINT) else {
         return far;
     };
-    let blend = |near_point: f64, near: f64, at: f64| {
-        near + (laser.distance - near) * (libm::fabs(at) - near_point) / (FAR_POINT - near_point)
-    };
-    let along = |correction: f64| point(&Laser { distance: correction, ..*laser }, offsets, azimuth, distance);
-    let [_, y, _] = along(blend(NEAR_POINT_X, full.distance_x, far[1]));
-    let [x, _, z] = along(blend(NEAR_POINT_Y, full.distance_y, far[0]));
+    let near = near_corrections(laser.distance, [full.distance_x, full.distance_y], [far[0], far[1]]);
+    let along = |correction| point(&Laser { distance: correction, ..*laser }, offsets, azimuth, distance);
+    let [[_, y, _], [x, _, z]] = near.map(along);
     [x, y, z]
+}
+
+/// The distance corrections along M's x and y, m, of a point at `x` and `y` (this crate's): they blend from those at the
+/// `near` points into the `far` one.
+pub(crate) fn near_corrections(far: f64, near: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    let blend =
+        |near_point: f64, near: f64, at: f64| near + (far - near) * (at.abs() - near_point) / (FAR_POINT - near_point);
+    [blend(NEAR_POINT_X, near[0], y), blend(NEAR_POINT_Y, near[1], x)]
 }
 
 /// Derivatives of [`point`]: of x, y and z, each by D_corr (1), theta and alpha (m/rad).

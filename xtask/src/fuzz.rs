@@ -18,7 +18,7 @@ pub struct Fuzz {
 }
 
 /// Targets of the folder `fuzz`.
-const TARGETS: [&str; 5] = ["cola_a", "cola_b", "canopen", "slcan", "log_reader"];
+const TARGETS: [&str; 7] = ["cola_a", "cola_b", "canopen", "slcan", "log_reader", "velodyne_packet", "capture"];
 
 impl Fuzz {
     /// Every target, for so many seconds.

@@ -38,13 +38,14 @@ const REQUIREMENTS: [Requirement; 4] = [
 ];
 
 /// Packages of Python that Debian does not have, and the modules that they bring.
-const PYTHON_PACKAGES: [(&str, &str); 6] = [
+const PYTHON_PACKAGES: [(&str, &str); 7] = [
     ("cantools>=39,<50", "cantools"),
     ("canopen>=2.2,<3", "canopen"),
     ("mcap>=1.2,<2", "mcap"),
     ("mcap-ros2-support>=0.5,<1", "mcap_ros2"),
     ("rosbags>=0.10,<1", "rosbags"),
     ("evo>=1.30,<2", "evo"),
+    ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
 ];
 
 /// What drives a browser, from npm.
@@ -75,7 +76,7 @@ pub fn prepare_python(folder: &Path) -> Vec<String> {
         return Vec::new();
     }
     vec![format!(
-        "missing: the independent readers of what this program writes; install them with `python3 -m pip install --target {} {}`",
+        "missing: the independent readers of what this program reads and writes; install them with `python3 -m pip install --target {} {}`",
         folder.display(),
         packages.map(|package| format!("'{package}'")).join(" ")
     )]

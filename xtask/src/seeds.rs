@@ -53,8 +53,10 @@ impl Seeds {
             }
         }
         let frames = write_frames(&data, &corpus)?;
+        let captures = write_captures(&data, &corpus)?;
         println!("telegrams  {count}");
         println!("frames     {frames}");
+        println!("captures   {captures}");
         Ok(())
     }
 }
@@ -84,6 +86,28 @@ fn write_frames(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
         std::fs::write(corpus.join("slcan").join(format!("talk{number}")), lines)?;
     }
     Ok(frames.len())
+}
+
+/// Longest piece of a capture that is a seed: some packets of a lidar.
+const CAPTURE_PIECE: usize = 8192;
+
+/// The beginnings of recorded captures, and the packet that a lidar's manual prints. Returns how many captures there are.
+fn write_captures(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
+    let folder = data.join("lidar3d/pcap");
+    for target in ["capture", "velodyne_packet"] {
+        std::fs::create_dir_all(corpus.join(target))?;
+    }
+    let mut count = 0;
+    for entry in std::fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
+        let name = path.file_name().unwrap_or_default();
+        let is_capture = path.extension().is_some_and(|ending| ending == "pcap");
+        let target = if is_capture { "capture" } else { "velodyne_packet" };
+        std::fs::write(corpus.join(target).join(name), &bytes[..bytes.len().min(CAPTURE_PIECE)])?;
+        count += usize::from(is_capture);
+    }
+    Ok(count)
 }
 
 /// Identifier and data of a line `can0 589 [8] 4B 77 ...`.

@@ -8,10 +8,12 @@ mod halting_points;
 mod kidnapping;
 mod lidar3d_calibration;
 mod lidar3d_places;
+mod lidar3d_sharpness;
 mod places;
 mod slam;
 mod warehouse;
 
+pub use lidar3d_places::Lidar3dPlaces;
 pub use places::Places;
 
 /// A log of the thesis.
@@ -49,6 +51,7 @@ enum Experiment {
     Slam(slam::Slam),
     Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
+    Lidar3dSharpness(lidar3d_sharpness::Lidar3dSharpness),
     Warehouse(warehouse::Warehouse),
 }
 
@@ -66,6 +69,7 @@ impl Evaluate {
             Experiment::Slam(experiment) => experiment.run(),
             Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),
+            Experiment::Lidar3dSharpness(experiment) => experiment.run(),
             Experiment::Warehouse(experiment) => experiment.run(),
         }
     }

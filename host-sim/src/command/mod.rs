@@ -15,6 +15,7 @@ pub mod export;
 pub mod features;
 pub mod import;
 pub mod layout;
+pub mod lidar3d;
 mod like;
 pub mod map;
 pub mod nav350;

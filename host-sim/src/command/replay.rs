@@ -17,6 +17,7 @@ use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
 
+use super::lidar3d::relocalise::Relocalisation;
 use super::{output, pose_argument, progress};
 
 const HELP: &str = "\
@@ -27,6 +28,7 @@ Examples:
   agv replay drive.agvlog --vehicle vehicle.toml
   agv replay intel.agvlog --start recorded --landmarks dynamic
   agv replay drive.agvlog --landmarks none --output odometry.agvlog
+  agv replay drive.agvlog --relocalise lidar3d --places street.places3d --scans drive.pcap
 
 Keys of --json:
   software, duration_s, way_m, events, poses, realtime_factor,
@@ -62,6 +64,8 @@ pub struct Replay {
     /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose.
     #[arg(long, value_name = "POSE", value_parser = start, allow_hyphen_values = true)]
     start: Option<Start>,
+    #[command(flatten)]
+    relocalisation: Relocalisation,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -77,6 +81,8 @@ enum Landmarks {
     Features,
     /// Natural features that are found while driving.
     Dynamic,
+    /// Natural features that are found on the way, in the state of the filter.
+    Slam,
 }
 
 /// Where the vehicle is at the start.
@@ -123,8 +129,15 @@ impl Replay {
         let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let Contents { software, mut recording, outputs, damages } = contents;
-        let is_as_recorded =
-            self.map.is_empty() && self.landmarks.is_empty() && self.start.is_none() && self.vehicle.is_none();
+        let is_as_recorded = self.map.is_empty()
+            && self.landmarks.is_empty()
+            && self.start.is_none()
+            && self.vehicle.is_none()
+            && !self.relocalisation.is_wanted();
+        let fix = self.relocalisation.fix(&recording)?;
+        if let Some(fix) = fix {
+            recording.events.insert(0, RecordedEvent::SetPose(fix));
+        }
         if let Some(start) = self.start {
             set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
         }
@@ -187,6 +200,7 @@ impl Replay {
             reflectors: has(Landmarks::Reflectors),
             features: has(Landmarks::Features),
             dynamic: has(Landmarks::Dynamic),
+            slam: has(Landmarks::Slam),
         })
     }
 

@@ -8,23 +8,17 @@ use std::path::Path;
 use std::time::Instant;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{
-    BINS, ENRICHED_LENGTH, Enriched, Histogram, Neighbours, Orientation, chi_square, from_key_scans,
-    normalised_chi_square, normalised_sorensen, sorensen,
-};
+use agv_lidar3d::place::{DIRECTIONS, from_key_scans};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde::Serialize;
 
 use crate::import::range_image::{RangeImageError, RangeImages};
+use crate::lidar3d::place_map::APART;
+use crate::lidar3d::signatures::{Method, Signatures, sensor_height};
 
 const SEED: u64 = 1;
-/// Height of the points that the orientation is determined from, above the sensor, m, and their reach, m.
-const ORIENTATION_HEIGHTS: [f32; 2] = [-1.4, 1.1];
-const ORIENTATION_REACH: f32 = 50.0;
-/// Places so far apart are different ones, m.
-const APART: f64 = 30.0;
 
 /// What a method achieves by one protocol.
 #[derive(Clone, Debug, Serialize)]
@@ -57,65 +51,23 @@ pub struct Outcome {
     pub answerable: usize,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Method {
-    ChiSquare,
-    Sorensen,
-    NormalisedChiSquare,
-    NormalisedSorensen,
-    Enriched,
-}
-
-impl Method {
-    const ALL: [Self; 5] =
-        [Self::ChiSquare, Self::Sorensen, Self::NormalisedChiSquare, Self::NormalisedSorensen, Self::Enriched];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::ChiSquare => "thesis chi-square",
-            Self::Sorensen => "thesis Sorensen",
-            Self::NormalisedChiSquare => "normalised chi-square",
-            Self::NormalisedSorensen => "normalised Sorensen",
-            Self::Enriched => "enriched",
-        }
-    }
-
-    fn distance(self, one: &Signatures, other: &Signatures) -> f64 {
-        match self {
-            Self::ChiSquare => chi_square(&one.counts, &other.counts),
-            Self::Sorensen => sorensen(&one.counts, &other.counts),
-            Self::NormalisedChiSquare => normalised_chi_square(&one.shares, &other.shares),
-            Self::NormalisedSorensen => normalised_sorensen(&one.shares, &other.shares),
-            Self::Enriched => f64::from(one.enriched.distance(&other.enriched)),
-        }
-    }
-}
-
-/// All signatures of a scan.
-struct Signatures {
-    counts: Histogram,
-    shares: Histogram,
-    enriched: Enriched,
-    orientation: Orientation,
+/// The signatures of a scan and what they cost.
+struct Described {
+    signatures: Signatures,
     /// Seconds for the histogram, and for the enriched signature with it.
     seconds: [f64; 2],
 }
 
-impl Signatures {
-    fn new(points: &[Option<[f32; 3]>], rings: usize, sensor_height: f32, turn: f32) -> Option<Self> {
-        let cloud = Cloud::new(points, rings)?;
-        let start = Instant::now();
-        let counts = Histogram::new(&cloud, &Neighbours::default());
-        let histogram = start.elapsed().as_secs_f64();
-        let enriched = Enriched::new(&cloud, &counts, sensor_height);
-        let both = start.elapsed().as_secs_f64();
-        let (sin, cos) = turn.sin_cos();
-        let turned: Vec<_> =
-            points.iter().map(|point| point.map(|[x, y, z]| [x * cos - y * sin, x * sin + y * cos, z])).collect();
-        let [low, high] = ORIENTATION_HEIGHTS;
-        let orientation = Orientation::of_heights(&Cloud::new(&turned, rings)?, low, high, ORIENTATION_REACH);
-        Some(Self { shares: counts.normalised(), counts, enriched, orientation, seconds: [histogram, both] })
+impl Described {
+    fn new(points: &[Option<[f32; 3]>], rings: usize, sensor_height: f32) -> Option<Self> {
+        let (signatures, seconds) = Signatures::timed(&Cloud::new(points, rings)?, sensor_height);
+        Some(Self { signatures, seconds })
     }
+}
+
+fn turned(points: &[Option<[f32; 3]>], turn: f32) -> Vec<Option<[f32; 3]>> {
+    let (sin, cos) = turn.sin_cos();
+    points.iter().map(|point| point.map(|[x, y, z]| [x * cos - y * sin, x * sin + y * cos, z])).collect()
 }
 
 /// A key scan.
@@ -139,6 +91,7 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
     let mut height = None;
     let mut whole = Vec::new();
     let mut half = Vec::new();
+    let mut asked_turn = Vec::new();
     let mut turns = Vec::new();
     for key in &keys {
         let points = images.points(key.scan)?;
@@ -147,15 +100,9 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
         let halved: Vec<_> = points.chunks_exact(columns).flat_map(|row| row.iter().step_by(2).copied()).collect();
         let turn: f32 = random.random_range(-3.1..3.1);
         turns.push(f64::from(turn));
-        for (target, points, turn) in [(&mut whole, &points, 0.0), (&mut half, &halved, turn)] {
-            if let Some(signatures) = Signatures::new(points, rings, height, turn) {
-                target.push(signatures);
-            }
-        }
-        // The orientation is asked with all columns and a turn.
-        if let (Some(cloudless), Some(last)) = (Signatures::new(&points, rings, height, turn), half.last_mut()) {
-            last.orientation = cloudless.orientation;
-        }
+        whole.extend(Described::new(&points, rings, height));
+        half.extend(Described::new(&halved, rings, height));
+        asked_turn.extend(Described::new(&turned(&points, turn), rings, height).map(|found| found.signatures));
         progress(keys.len());
     }
     let mut outcomes = Vec::new();
@@ -164,13 +111,13 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
             (0..keys.len()).step_by(spacing).filter(|index| keys[*index].travelled <= 150.0).collect();
         let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
         for half_columns in [false, true] {
-            for method in Method::ALL {
+            for (method, is_checked) in experiments() {
                 let asked = if half_columns { &half } else { &whole };
                 let test = Test { keys: &keys, map: &map, queries: &queries, stored: &whole, asked, right };
-                let mut outcome = test.run(method);
+                let mut outcome = test.run(method, is_checked);
                 outcome.protocol = protocol;
                 outcome.half_columns = half_columns;
-                outcome.orientation_within_2_deg = orientation(&test, &half, &turns);
+                outcome.orientation_within_2_deg = orientation(&test, &asked_turn, &turns);
                 outcomes.push(outcome);
             }
         }
@@ -178,12 +125,18 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
     Ok(outcomes)
 }
 
+/// All methods, and those of the thesis with the check of the walls against look-alike places.
+fn experiments() -> impl Iterator<Item = (Method, bool)> {
+    let checked = Method::ALL.into_iter().filter(|method| *method != Method::Enriched);
+    Method::ALL.into_iter().map(|method| (method, false)).chain(checked.map(|method| (method, true)))
+}
+
 struct Test<'a> {
     keys: &'a [Key],
     map: &'a [usize],
     queries: &'a [usize],
-    stored: &'a [Signatures],
-    asked: &'a [Signatures],
+    stored: &'a [Described],
+    asked: &'a [Described],
     right: f64,
 }
 
@@ -199,21 +152,37 @@ impl Test<'_> {
         nearest.filter(|node| self.apart(query, *node) <= self.right)
     }
 
-    fn run(&self, method: Method) -> Outcome {
+    fn run(&self, method: Method, is_checked: bool) -> Outcome {
+        let places: Vec<[f64; 2]> = self.map.iter().map(|node| self.keys[*node].position).collect();
+        let facing = |one: usize, other: usize| {
+            let [one, other] = [one, other].map(|place| &self.stored[self.map[place]].signatures.facing);
+            f64::from(one.distance(other))
+        };
+        let check = if is_checked { from_key_scans(&places, APART, facing).unwrap_or(0.0) } else { f64::MAX };
         let start = Instant::now();
-        let mut answers: Vec<(f64, bool)> = Vec::new();
+        let mut found = Vec::new();
         for &query in self.queries {
-            let distances =
-                self.map.iter().map(|&node| (method.distance(&self.asked[query], &self.stored[node]), node));
+            let distances = self
+                .map
+                .iter()
+                .map(|&node| (method.distance(&self.asked[query].signatures, &self.stored[node].signatures), node));
             if let Some((distance, node)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                answers.push((distance, self.apart(query, node) <= self.right));
+                found.push((distance, query, node));
             }
         }
         let compare_us = start.elapsed().as_secs_f64() * 1e6 / (self.queries.len() * self.map.len()) as f64;
         let answerable = self.queries.iter().filter(|query| self.truth(**query).is_some()).count();
-        let places: Vec<[f64; 2]> = self.map.iter().map(|node| self.keys[*node].position).collect();
+        let is_like = |query: usize, node: usize| {
+            let [one, other] = [&self.asked[query], &self.stored[node]].map(|described| &described.signatures.facing);
+            !is_checked || f64::from(one.distance(other)) < check
+        };
+        let mut answers: Vec<(f64, bool)> = found
+            .into_iter()
+            .filter(|(_, query, node)| is_like(*query, *node))
+            .map(|(distance, query, node)| (distance, self.apart(query, node) <= self.right))
+            .collect();
         let threshold = from_key_scans(&places, APART, |one, other| {
-            method.distance(&self.stored[self.map[one]], &self.stored[self.map[other]])
+            method.distance(&self.stored[self.map[one]].signatures, &self.stored[self.map[other]].signatures)
         })
         .unwrap_or(0.0);
         answers.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -238,10 +207,10 @@ impl Test<'_> {
         }
         let (learned_precision, learned_recall) = score(answers.partition_point(|(distance, _)| *distance < threshold));
         let part = usize::from(method == Method::Enriched);
-        let mut seconds: Vec<f64> = self.asked.iter().map(|signatures| signatures.seconds[part]).collect();
+        let mut seconds: Vec<f64> = self.asked.iter().map(|described| described.seconds[part]).collect();
         seconds.sort_by(f64::total_cmp);
         Outcome {
-            method: method.name(),
+            method: if is_checked { method.checked_name() } else { method.name() },
             protocol: "",
             half_columns: false,
             recall_at_full_precision,
@@ -251,7 +220,7 @@ impl Test<'_> {
             signature_ms: 1e3 * seconds[seconds.len() / 2],
             compare_us,
             orientation_within_2_deg: 0.0,
-            bytes: if method == Method::Enriched { ENRICHED_LENGTH } else { 8 * BINS },
+            bytes: method.bytes() + if is_checked { DIRECTIONS } else { 0 },
             queries: self.queries.len(),
             answerable,
         }
@@ -263,20 +232,12 @@ fn orientation(test: &Test<'_>, turned: &[Signatures], turns: &[f64]) -> f64 {
     let pairs: Vec<(usize, usize)> =
         test.queries.iter().filter_map(|query| Some((*query, test.truth(*query)?))).collect();
     let found = pairs.iter().filter(|(query, node)| {
-        let found = f64::from(test.stored[*node].orientation.turn(&turned[*query].orientation));
+        let found = turned[*query].turn_since(&test.stored[*node].signatures);
         let truth = test.keys[*query].heading - test.keys[*node].heading - turns[*query];
         let error = (found - truth + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
         error.abs() <= 2f64.to_radians()
     });
     found.count() as f64 / pairs.len().max(1) as f64
-}
-
-/// Height of the sensor above the ground, m: the median of the low points between 5 and 15 m.
-fn sensor_height(points: &[Option<[f32; 3]>]) -> f32 {
-    let near = |[x, y, z]: &[f32; 3]| (5.0..15.0).contains(&x.hypot(*y)) && *z < -0.5;
-    let mut heights: Vec<f32> = points.iter().flatten().filter(|point| near(point)).map(|[_, _, z]| -z).collect();
-    heights.sort_by(f32::total_cmp);
-    heights.get(heights.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// One scan every metre of the way.

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::net::IpAddr;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use agv_core::measurement::Time;
@@ -56,6 +57,7 @@ pub fn read(path: &Path, ports: &[u16]) -> Result<Capture, CaptureError> {
     let mut talks = Talks { ports, ..Talks::default() };
     let seen = packets::for_each(path, |time, packet| {
         talks.packet(time, &packet);
+        ControlFlow::Continue(())
     })?;
     talks.packets = seen.packets;
     talks.is_cut = seen.is_cut;

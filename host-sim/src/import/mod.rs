@@ -7,6 +7,7 @@ pub mod carpark;
 pub mod graph_log;
 pub mod packets;
 mod posed_scan;
+pub mod poses;
 pub mod range_image;
 pub mod raw;
 pub mod ros;

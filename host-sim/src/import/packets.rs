@@ -1,7 +1,8 @@
 //! The packets of a network capture, pcap or pcapng, on any usual kind of link.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use agv_core::measurement::Time;
@@ -40,15 +41,24 @@ pub struct Seen {
     pub is_cut: bool,
 }
 
-/// Calls `take` with the time and the headers of each IP packet of a capture.
+/// Calls `take` with the time and the headers of each IP packet of a capture, until it breaks off.
 ///
 /// # Errors
 /// See [`PacketsError`]. A capture that is cut off is read up to there.
-pub fn for_each(path: &Path, mut take: impl FnMut(Time, LaxSlicedPacket<'_>)) -> Result<Seen, PacketsError> {
-    let io = |source| PacketsError::Io { path: path.to_owned(), source };
-    let foreign = || PacketsError::Foreign { path: path.to_owned() };
-    let file = File::open(path).map_err(io)?;
-    let mut reader = create_reader(BUFFER, file).map_err(|_| foreign())?;
+pub fn for_each(
+    path: &Path,
+    take: impl FnMut(Time, LaxSlicedPacket<'_>) -> ControlFlow<()>,
+) -> Result<Seen, PacketsError> {
+    let file = File::open(path).map_err(|source| PacketsError::Io { path: path.to_owned(), source })?;
+    for_each_in(file, take).ok_or_else(|| PacketsError::Foreign { path: path.to_owned() })
+}
+
+/// As [`for_each`], of any bytes; None if they are no capture.
+pub fn for_each_in(
+    bytes: impl Read + Send,
+    mut take: impl FnMut(Time, LaxSlicedPacket<'_>) -> ControlFlow<()>,
+) -> Option<Seen> {
+    let mut reader = create_reader(BUFFER, bytes).ok()?;
     let mut interfaces = Interfaces::default();
     let mut seen = Seen::default();
     loop {
@@ -56,8 +66,10 @@ pub fn for_each(path: &Path, mut take: impl FnMut(Time, LaxSlicedPacket<'_>)) ->
             Ok((length, block)) => {
                 if let Some((time, link, data)) = interfaces.packet(&block) {
                     seen.packets += 1;
-                    if let Some(packet) = slice(link, data) {
-                        take(time, packet);
+                    if let Some(packet) = slice(link, data)
+                        && take(time, packet).is_break()
+                    {
+                        break;
                     }
                 }
                 reader.consume(length);
@@ -69,14 +81,14 @@ pub fn for_each(path: &Path, mut take: impl FnMut(Time, LaxSlicedPacket<'_>)) ->
                     break;
                 }
             }
-            Err(_) if seen.packets == 0 => return Err(foreign()),
+            Err(error) if seen.packets == 0 && !matches!(error, PcapError::UnexpectedEof) => return None,
             Err(_) => {
                 seen.is_cut = true;
                 break;
             }
         }
     }
-    Ok(seen)
+    Some(seen)
 }
 
 /// How packets of an interface are to be read.

@@ -4,6 +4,11 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use agv_lidar3d::calibration::{Calibration, Laser};
+use agv_lidar3d::packet::LENGTH;
+
+use crate::export::velodyne::hdl64e_packets;
+
 /// Why range images could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RangeImageError {
@@ -108,4 +113,30 @@ impl RangeImages {
             })
             .collect())
     }
+
+    /// The sensor that they are of: no corrections, and the elevations of the rows.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        let laser = |elevation: &f64| Laser { elevation: *elevation, is_enabled: true, ..Laser::default() };
+        Calibration { distance_resolution: self.resolution, lasers: self.elevations.iter().map(laser).collect() }
+    }
+
+    /// Angle of the head at the first column, 0.01 degrees.
+    #[must_use]
+    pub fn first_azimuth(&self) -> u16 {
+        self.rotations.first().map_or(0, clockwise)
+    }
+
+    /// Counts as the packets of an HDL-64E S2, the angles of the columns rounded to 0.01 degrees.
+    #[must_use]
+    pub fn packets(&self, counts: &[u16]) -> Vec<[u8; LENGTH]> {
+        let columns = self.rotations.len();
+        let azimuths: Vec<u16> = self.rotations.iter().map(clockwise).collect();
+        hdl64e_packets(&azimuths, |column, row| counts.get(row * columns + column).copied().unwrap_or(0))
+    }
+}
+
+/// The angle of the head, 0.01 degrees, that looks in a direction, rad.
+fn clockwise(rotation: &f64) -> u16 {
+    (-rotation.to_degrees() * 100.0).round().rem_euclid(36_000.0) as u16
 }

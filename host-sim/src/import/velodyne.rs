@@ -1,9 +1,10 @@
 //! Packets of a multi-beam lidar in a network capture.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use agv_core::measurement::Time;
-use agv_lidar3d::packet::{LENGTH, PORT, Packet};
+use agv_lidar3d::packet::{PORT, Packet};
 use etherparse::TransportSlice;
 
 use super::packets::{self, PacketsError};
@@ -26,11 +27,11 @@ pub enum VelodyneError {
     },
 }
 
-/// The packets of a capture.
-#[derive(Clone, Debug, Default)]
-pub struct Stream {
-    /// Time of capture and bytes, all of them valid.
-    pub packets: Vec<(Time, Box<[u8; LENGTH]>)>,
+/// What a capture holds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// Packets of a sensor.
+    pub packets: usize,
     /// Packets to the port that are not valid.
     pub refused: usize,
     /// Packets to other ports.
@@ -39,32 +40,50 @@ pub struct Stream {
     pub is_cut: bool,
 }
 
-/// Reads the packets to [`PORT`].
+/// Calls `take` with the time and the contents of each packet to [`PORT`].
+///
+/// # Errors
+/// See [`VelodyneError`]. A capture that is cut off is read up to there.
+pub fn for_each(path: &Path, mut take: impl FnMut(Time, &Packet<'_>)) -> Result<Seen, VelodyneError> {
+    for_each_until(path, |time, packet| {
+        take(time, packet);
+        ControlFlow::Continue(())
+    })
+}
+
+/// As [`for_each`], until `take` breaks off.
 ///
 /// # Errors
 /// See [`VelodyneError`].
-pub fn read(path: &Path) -> Result<Stream, VelodyneError> {
-    let mut stream = Stream::default();
+pub fn for_each_until(
+    path: &Path,
+    mut take: impl FnMut(Time, &Packet<'_>) -> ControlFlow<()>,
+) -> Result<Seen, VelodyneError> {
+    let mut seen = Seen::default();
     let mut detail = String::new();
-    let seen = packets::for_each(path, |time, packet| {
-        let Some(TransportSlice::Udp(udp)) = packet.transport else { return };
+    let all = packets::for_each(path, |time, packet| {
+        let Some(TransportSlice::Udp(udp)) = packet.transport else { return ControlFlow::Continue(()) };
         if udp.destination_port() != PORT {
-            return;
+            return ControlFlow::Continue(());
         }
-        match (Packet::new(udp.payload()), udp.payload().try_into()) {
-            (Ok(_), Ok(bytes)) => stream.packets.push((time, Box::new(bytes))),
-            (outcome, _) => {
-                stream.refused += 1;
-                if let (Err(error), true) = (outcome, detail.is_empty()) {
+        match Packet::new(udp.payload()) {
+            Ok(packet) => {
+                seen.packets += 1;
+                return take(time, &packet);
+            }
+            Err(error) => {
+                seen.refused += 1;
+                if detail.is_empty() {
                     detail = format!(": {error}");
                 }
             }
         }
+        ControlFlow::Continue(())
     })?;
-    stream.other = seen.packets - stream.packets.len() - stream.refused;
-    stream.is_cut = seen.is_cut;
-    if stream.packets.is_empty() {
-        return Err(VelodyneError::NoSensor { path: path.to_owned(), packets: seen.packets, detail });
+    seen.other = all.packets - seen.packets - seen.refused;
+    seen.is_cut = all.is_cut;
+    if seen.packets == 0 {
+        return Err(VelodyneError::NoSensor { path: path.to_owned(), packets: all.packets, detail });
     }
-    Ok(stream)
+    Ok(seen)
 }

@@ -5,6 +5,7 @@ mod figure;
 mod heat_map;
 mod page;
 mod pdf;
+pub mod scan_picture;
 mod state_timeline;
 mod thinning;
 mod trajectories;

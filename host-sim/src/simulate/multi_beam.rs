@@ -1,14 +1,19 @@
 //! What a multi-beam lidar sees of a wall on level ground.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use agv_lidar3d::calibration::Laser;
 use agv_lidar3d::geometry::{Offsets, point};
 use agv_lidar3d::intrinsic::Return;
+use agv_lidar3d::packet::LENGTH;
 use nalgebra::{Rotation3, Vector3};
 
 use super::random::Random;
+use crate::export::velodyne::hdl64e_packets;
 
+/// Lasers of an HDL-64E.
+const LASERS: usize = 64;
 /// Width and height of the wall, m.
 pub const WALL: [f64; 2] = [30.0, 8.0];
 /// Height of the sensor above the ground, m.
@@ -49,7 +54,7 @@ pub struct Sensor<'a> {
     pub noise: f64,
 }
 
-/// One revolution.
+/// One revolution, as the returns that are seen.
 pub fn scan(sensor: Sensor<'_>, stand: Stand, random: &mut Random) -> Vec<Return> {
     let attitude = Rotation3::from_euler_angles(stand.roll, -stand.pitch, stand.heading);
     let mut returns = Vec::new();
@@ -74,6 +79,23 @@ pub fn scan(sensor: Sensor<'_>, stand: Stand, random: &mut Random) -> Vec<Return
         }
     }
     returns
+}
+
+/// One revolution and the beginning of the next, as the packets of an HDL-64E.
+pub fn packets(sensor: Sensor<'_>, stand: Stand, random: &mut Random) -> Vec<[u8; LENGTH]> {
+    let mut counts: BTreeMap<u16, [u16; LASERS]> = BTreeMap::new();
+    for seen in scan(sensor, stand, random) {
+        let azimuth = (seen.azimuth / AZIMUTH_COUNT).round().rem_euclid(TAU / AZIMUTH_COUNT) as u16;
+        if let Some(count) = counts.entry(azimuth).or_insert([0; LASERS]).get_mut(seen.laser) {
+            *count = (seen.distance / sensor.resolution).round() as u16;
+        }
+    }
+    let mut azimuths: Vec<u16> = counts.keys().copied().collect();
+    // A revolution is known to be whole when the next one begins, and the one before has ended.
+    azimuths.rotate_right(1);
+    azimuths.extend(azimuths.get(1).copied());
+    let firings: Vec<&[u16; LASERS]> = azimuths.iter().filter_map(|azimuth| counts.get(azimuth)).collect();
+    hdl64e_packets(&azimuths, |firing, laser| firings.get(firing).map_or(0, |counts| counts[laser]))
 }
 
 /// Distance to the nearer of wall and ground, m.

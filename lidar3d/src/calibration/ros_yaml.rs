@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Calibration, CalibrationError, Full, Laser};
 
+/// Characters of a complaint of the parser.
+const LONGEST_REASON: usize = 120;
+
 #[derive(Serialize, Deserialize)]
 struct File {
     #[serde(default = "default_resolution")]
@@ -48,8 +51,10 @@ struct Entry {
 }
 
 pub(super) fn read(text: &str) -> Result<Calibration, CalibrationError> {
+    // The parser repeats what it read, which may be the whole of a foreign file.
+    let reason = |error: serde_yaml_ng::Error| error.to_string().chars().take(LONGEST_REASON).collect();
     let file: File =
-        serde_yaml_ng::from_str(text).map_err(|error| CalibrationError::Foreign { reason: error.to_string() })?;
+        serde_yaml_ng::from_str(text).map_err(|error| CalibrationError::Foreign { reason: reason(error) })?;
     if let Some((place, entry)) = file.lasers.iter().enumerate().find(|(place, entry)| entry.laser_id != *place as i64)
     {
         return Err(CalibrationError::Numbers { place, found: entry.laser_id });

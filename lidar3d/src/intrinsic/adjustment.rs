@@ -86,6 +86,30 @@ pub fn calibrate(
     residual: Residual,
     targets: &[Target],
 ) -> Result<Adjustment, AdjustmentError> {
+    adjust(start, offsets, residual, None, targets)
+}
+
+/// As [`calibrate`], where the start is known to these standard deviations: what the targets hardly show stays near it.
+///
+/// # Errors
+/// See [`AdjustmentError`].
+pub fn calibrate_near(
+    start: &[Laser],
+    offsets: Offsets,
+    residual: Residual,
+    prior: &Deviation,
+    targets: &[Target],
+) -> Result<Adjustment, AdjustmentError> {
+    adjust(start, offsets, residual, Some(prior), targets)
+}
+
+fn adjust(
+    start: &[Laser],
+    offsets: Offsets,
+    residual: Residual,
+    prior: Option<&Deviation>,
+    targets: &[Target],
+) -> Result<Adjustment, AdjustmentError> {
     let mut points = vec![0_usize; start.len()];
     for seen in targets.iter().flat_map(|target| &target.returns) {
         if let Some(count) = points.get_mut(seen.laser) {
@@ -108,7 +132,16 @@ pub fn calibrate(
         let shift = lasers.iter().zip(start).zip(&is_observed).filter(|(_, is_observed)| **is_observed);
         let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
         let observed = is_observed.iter().filter(|is_observed| **is_observed).count();
-        let equations = LaserEquations::new(&sums, &is_observed, shift / observed as f64);
+        let mut equations = LaserEquations::new(&sums, &is_observed, shift / observed as f64);
+        if let Some(prior) = prior {
+            let known = Vector3::new(prior.distance, prior.elevation, prior.rotation);
+            let weights = known.map(|deviation| (noise / deviation).powi(2));
+            let off = lasers.iter().zip(start).map(|(laser, start)| {
+                let by = [laser.distance - start.distance, laser.elevation - start.elevation];
+                Vector3::new(by[0], by[1], laser.rotation - start.rotation)
+            });
+            equations.hold_near(&weights, off);
+        }
         let (steps, variances) = equations.solve().ok_or(AdjustmentError::Undetermined)?;
         for (laser, step) in lasers.iter_mut().zip(&steps) {
             laser.distance += step[0];

@@ -9,7 +9,7 @@ mod plane;
 mod scan;
 mod segmentation;
 
-pub use adjustment::{Adjustment, AdjustmentError, Deviation, Residual, calibrate};
+pub use adjustment::{Adjustment, AdjustmentError, Deviation, Residual, calibrate, calibrate_near};
 pub use plane::Plane;
 pub use scan::{Flatness, Return, Target, flatness};
 pub use segmentation::{SegmentationError, segment};

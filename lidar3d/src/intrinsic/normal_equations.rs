@@ -110,6 +110,17 @@ impl LaserEquations {
         Self { matrix, gradient, is_observed: is_observed.to_vec() }
     }
 
+    /// Adds that each parameter is known: `weights` of the squares of `off`, by which each laser is off what is known.
+    pub(super) fn hold_near(&mut self, weights: &Vector3<f64>, off: impl Iterator<Item = Vector3<f64>>) {
+        for (laser, off) in off.enumerate().filter(|(laser, _)| self.is_observed.get(*laser) == Some(&true)) {
+            for parameter in 0..3 {
+                let row = 3 * laser + parameter;
+                self.matrix[(row, row)] += weights[parameter];
+                self.gradient[row] += weights[parameter] * off[parameter];
+            }
+        }
+    }
+
     /// The step of each laser's D_corr, theta and alpha, and the variance of each for residuals of unit variance; None if
     /// the scans leave more undetermined than the gauge.
     pub(super) fn solve(self) -> Option<(PerLaser, PerLaser)> {

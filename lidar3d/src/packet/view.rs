@@ -35,7 +35,7 @@ pub enum PacketError {
         /// What stands there.
         found: u16,
     },
-    /// A rotation angle of a full turn or more.
+    /// A rotation angle of more than a full turn.
     #[cfg_attr(feature = "std", error("block {block} states an angle of {found} hundredths of a degree"))]
     Azimuth {
         /// Number of the block, from 0.
@@ -67,10 +67,10 @@ impl<'a> Block<'a> {
         u16::from_le_bytes([self.bytes[0], self.bytes[1]]) == LOWER
     }
 
-    /// Rotation angle of the head, 0.01 degrees, 0 to 35999.
+    /// Rotation angle of the head, 0.01 degrees, 0 to 35999. Sensors state a full turn now and then, which is zero.
     #[must_use]
     pub fn azimuth(&self) -> u16 {
-        u16::from_le_bytes([self.bytes[2], self.bytes[3]])
+        u16::from_le_bytes([self.bytes[2], self.bytes[3]]) % TURN
     }
 
     /// The returns in the order in which they stand.
@@ -106,9 +106,9 @@ impl<'a> Packet<'a> {
             if identifier != UPPER && identifier != LOWER {
                 return Err(PacketError::Identifier { block: index, found: identifier });
             }
-            let azimuth = Block { bytes }.azimuth();
-            if azimuth >= TURN {
-                return Err(PacketError::Azimuth { block: index, found: azimuth });
+            let found = u16::from_le_bytes([bytes[2], bytes[3]]);
+            if found > TURN {
+                return Err(PacketError::Azimuth { block: index, found });
             }
         }
         Ok(Self { blocks, tail: *tail })
@@ -117,6 +117,17 @@ impl<'a> Packet<'a> {
     /// The blocks, [`BLOCKS`] of them.
     pub fn blocks(&self) -> impl Iterator<Item = Block<'a>> + use<'a> {
         self.blocks.iter().map(|bytes| Block { bytes })
+    }
+
+    /// The bytes themselves.
+    #[must_use]
+    pub fn bytes(&self) -> [u8; LENGTH] {
+        let mut bytes = [0; LENGTH];
+        for (target, block) in bytes.as_chunks_mut::<BLOCK_LENGTH>().0.iter_mut().zip(self.blocks) {
+            *target = *block;
+        }
+        bytes[LENGTH - 6..].copy_from_slice(&self.tail);
+        bytes
     }
 
     /// Rotation angle of a block, 0.01 degrees.

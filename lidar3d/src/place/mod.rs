@@ -1,13 +1,19 @@
 //! Qualitative localisation: has this place been seen (M chapter 5)?
 
 mod enriched;
+mod facing;
 mod histogram;
+mod key_signatures;
+mod loop_closure;
 mod normals;
 mod orientation;
 mod threshold;
 
 pub use enriched::{ENRICHED_LENGTH, Enriched};
+pub use facing::{Facing, relative_turn};
 pub use histogram::{BINS, Histogram, chi_square, normalised_chi_square, normalised_sorensen, sorensen};
+pub use key_signatures::KeySignatures;
+pub use loop_closure::{Limits, loop_closure};
 pub use normals::{Neighbours, vertical_parts};
 pub use orientation::{DIRECTIONS, Orientation};
 pub use threshold::from_key_scans;

@@ -18,14 +18,22 @@ pub struct Neighbours {
     pub far: f32,
 }
 
+/// Rings, least and greatest distance are M's. M states no reach, and an angle for columns of 0.09 degrees; both are
+/// those with the greatest recall at full precision among 70 pairs when one half of the map of the Moosmann route (its key
+/// scans of the first 150 m) is asked about the other: no query of that route was looked at.
 impl Default for Neighbours {
     fn default() -> Self {
-        Self { angle: 2.07_f32.to_radians(), rings: 2, reach: 3.0, near: 3.0, far: 50.0 }
+        Self { angle: 1.24_f32.to_radians(), rings: 2, reach: 2.0, near: 3.0, far: 50.0 }
     }
 }
 
 /// Calls `take` with the vertical part of each normal, -1 to 1.
 pub fn vertical_parts(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut(f32)) {
+    normals(cloud, neighbours, |[_, _, vertical]| take(vertical));
+}
+
+/// Calls `take` with each normal, of length one; all of a surface point to the same side of it.
+pub(super) fn normals(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut([f32; 3])) {
     let columns = cloud.columns();
     let step = libm::roundf(neighbours.angle * columns as f32 / core::f32::consts::TAU).max(1.0) as usize;
     if step >= columns {
@@ -57,7 +65,7 @@ pub fn vertical_parts(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl
             }
             let length = libm::sqrtf(dot(sum, sum));
             if length > 0.0 {
-                take(sum[2] / length);
+                take(sum.map(|value| value / length));
             }
         }
     }

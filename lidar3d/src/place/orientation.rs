@@ -37,21 +37,34 @@ impl Orientation {
         Self(sums.map(|(sum, count)| if count > 0 { sum / count as f32 } else { 0.0 }))
     }
 
-    /// The angle by which `other` must be turned to lie on this one, rad, -pi to pi; to a fraction of a bin by the
-    /// parabola through the least sum of absolute differences and its neighbours.
+    /// The angle by which `other` must be turned to lie on this one, rad, -pi to pi (M 5.3).
     #[must_use]
     pub fn turn(&self, other: &Self) -> f32 {
-        let mut sums = [0.0f32; DIRECTIONS];
-        for (shift, sum) in sums.iter_mut().enumerate() {
-            let turned = other.0.iter().cycle().skip(DIRECTIONS - shift);
-            *sum = self.0.iter().zip(turned).map(|(a, b)| (a - b).abs()).sum();
-        }
-        let least = (0..DIRECTIONS).min_by(|a, b| sums[*a].total_cmp(&sums[*b])).unwrap_or(0);
-        let (before, at, after) =
-            (sums[(least + DIRECTIONS - 1) % DIRECTIONS], sums[least], sums[(least + 1) % DIRECTIONS]);
-        let curvature = before - 2.0 * at + after;
-        let fraction = if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
-        let turn = (least as f32 + fraction) * (core::f32::consts::TAU / DIRECTIONS as f32);
-        if turn > core::f32::consts::PI { turn - core::f32::consts::TAU } else { turn }
+        least(&self.mismatches(other))
     }
+
+    /// Sums of absolute differences, m, for each turn of the other.
+    pub(super) fn mismatches(&self, other: &Self) -> [f32; DIRECTIONS] {
+        core::array::from_fn(|shift| {
+            let (end, begin) = other.0.split_at(DIRECTIONS - shift);
+            self.0.iter().zip(begin.iter().chain(end)).map(|(a, b)| (a - b).abs()).sum()
+        })
+    }
+}
+
+/// The turn with the least mismatch, rad, -pi to pi; to a fraction of a direction by the parabola through it and its
+/// neighbours.
+pub(super) fn least(mismatches: &[f32; DIRECTIONS]) -> f32 {
+    let (mut shift, mut at) = (0, f32::MAX);
+    for (candidate, mismatch) in mismatches.iter().enumerate() {
+        if *mismatch < at {
+            (shift, at) = (candidate, *mismatch);
+        }
+    }
+    let neighbour = |step: usize| mismatches.get((shift + step) % DIRECTIONS).copied().unwrap_or(at);
+    let (before, after) = (neighbour(DIRECTIONS - 1), neighbour(1));
+    let curvature = before - 2.0 * at + after;
+    let fraction = if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
+    let turn = (shift as f32 + fraction) * (core::f32::consts::TAU / DIRECTIONS as f32);
+    if turn > core::f32::consts::PI { turn - core::f32::consts::TAU } else { turn }
 }

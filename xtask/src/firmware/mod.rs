@@ -59,9 +59,21 @@ impl Firmware {
     }
 }
 
-/// Builds the images of every board.
+/// Builds the images of every board, and what no image uses but every board could.
 pub fn build() -> anyhow::Result<()> {
-    BOARDS.iter().try_for_each(|board| build_board(board))
+    BOARDS.iter().try_for_each(|board| build_board(board))?;
+    build_lidar3d()
+}
+
+/// Packets and signatures of multi-beam lidars, without an operating system.
+fn build_lidar3d() -> anyhow::Result<()> {
+    let mut cargo = toolchain::cargo()?;
+    cargo.args(["build", "--package", "agv-lidar3d", "--no-default-features", "--profile", "firmware"]);
+    cargo.args(["--target", image::TARGET, "--target-dir"]).arg(AN500.folder());
+    if !cargo.status().context("cargo cannot be started")?.success() {
+        bail!("agv-lidar3d does not build without std");
+    }
+    Ok(())
 }
 
 /// The vehicle's image for the emulated board, built.

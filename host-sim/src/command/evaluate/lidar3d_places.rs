@@ -40,10 +40,12 @@ impl Lidar3dPlaces {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());
         }
-        println!("method                 protocol columns  R at P 1  max F1  learned P / R  ms    us    turn  bytes");
+        println!(
+            "method                          protocol columns  R at P 1  max F1  learned P / R  ms    us    turn  bytes"
+        );
         for outcome in outcomes {
             println!(
-                "{:<22} {:<8} {:<7} {:>9.3} {:>7.3} {:>6.3} / {:.3} {:>5.2} {:>5.3} {:>6.3} {:>6}",
+                "{:<31} {:<8} {:<7} {:>9.3} {:>7.3} {:>6.3} / {:.3} {:>5.2} {:>5.3} {:>6.3} {:>6}",
                 outcome.method,
                 outcome.protocol,
                 if outcome.half_columns { "half" } else { "all" },

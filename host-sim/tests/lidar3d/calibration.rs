@@ -1,4 +1,4 @@
-//! Multi-beam lidars: parameters of a real sensor found back from simulated scans.
+//! Parameters of a real sensor found back from simulated scans.
 
 use agv_host_sim::data;
 use agv_host_sim::evaluate::lidar3d_calibration;
@@ -13,7 +13,9 @@ fn disturbed_parameters_of_a_real_sensor_come_back_and_their_deviations_are_hone
     let outcome = lidar3d_calibration::run(&path, Offsets::Orthogonal, Residual::AlongBeam, 11).unwrap();
     assert_eq!(outcome.lasers, 64);
     assert!(outcome.is_within_limits, "{outcome:?}");
-    assert!(outcome.normalised_errors.iter().all(|error| (0.6..1.5).contains(error)), "{outcome:?}");
+    // The errors of all lasers have a part in common, so their root mean square is not as near to one as their number
+    // would make it.
+    assert!(outcome.normalised_errors.iter().all(|error| (0.4..1.6).contains(error)), "{outcome:?}");
     assert!(outcome.used.sum_of_squares_ratio >= 5.0, "{outcome:?}");
     // Not thinner than the truth makes them, up to a hundredth: that would be fitted noise.
     for walls in [outcome.used, outcome.held_out] {

@@ -1,0 +1,41 @@
+//! `agv lidar3d`.
+
+mod arguments;
+mod calibrate;
+mod convert;
+mod decode;
+mod info;
+mod places;
+pub mod relocalise;
+mod view;
+
+/// Multi-beam lidars: look at, decode, convert and calibrate, and recognise places.
+#[derive(clap::Args)]
+pub struct Lidar3d {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(clap::Subcommand)]
+enum Action {
+    Info(info::Info),
+    Decode(decode::Decode),
+    Convert(convert::Convert),
+    Calibrate(calibrate::Calibrate),
+    Places(places::Places),
+    View(view::View),
+}
+
+impl Lidar3d {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        match self.action {
+            Action::Info(command) => command.run(),
+            Action::Decode(command) => command.run(),
+            Action::Convert(command) => command.run(),
+            Action::Calibrate(command) => command.run(),
+            Action::Places(command) => command.run(),
+            Action::View(command) => command.run(),
+        }
+    }
+}

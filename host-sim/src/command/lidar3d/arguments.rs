@@ -1,0 +1,115 @@
+//! What all of these commands are told about a sensor.
+
+use std::path::PathBuf;
+
+use agv_host_sim::lidar3d::SetupOptions;
+use agv_lidar3d::geometry;
+use agv_lidar3d::packet::{self, Filter, Tally};
+
+/// What the source of a scan can be, for the help.
+pub const SOURCES: &str = "\
+A SOURCE is a capture (pcap or pcapng) with packets to UDP port 2368, a folder of range images (velodyne_config.txt and
+data/*.png), or udp[:PORT] for a sensor that sends to this machine.";
+
+/// The sensor and its parameters.
+#[derive(clap::Args, Clone)]
+pub struct SensorArguments {
+    /// Kind of sensor, where the packets do not state it.
+    #[arg(long, value_name = "KIND")]
+    sensor: Option<Sensor>,
+    /// Calibration file, db.xml or YAML; without it that of the packets, or the maker's elevations.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// How the offsets of a beam are measured.
+    #[arg(long, default_value = "orthogonal")]
+    offsets: Offsets,
+    /// Use the maker's two-point correction of near distances where the calibration states it.
+    #[arg(long)]
+    two_points: bool,
+    /// Returns nearer than this are false, m.
+    #[arg(long, default_value_t = 0.9, value_name = "M")]
+    near: f32,
+    /// Returns farther than this are false, m.
+    #[arg(long, default_value_t = 120.0, value_name = "M")]
+    far: f32,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum Sensor {
+    /// 64 lasers, S1, S2 or S3.
+    Hdl64e,
+    /// 32 lasers.
+    Hdl32e,
+    /// 16 lasers.
+    Vlp16,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum Offsets {
+    /// At right angles to the beam.
+    Orthogonal,
+    /// The vertical one as a height above the plane of the sensor.
+    Alternate,
+}
+
+impl From<Offsets> for geometry::Offsets {
+    fn from(offsets: Offsets) -> Self {
+        match offsets {
+            Offsets::Orthogonal => Self::Orthogonal,
+            Offsets::Alternate => Self::Alternate,
+        }
+    }
+}
+
+impl SensorArguments {
+    /// What is stated.
+    pub fn options(&self) -> SetupOptions {
+        let sensor = self.sensor.map(|sensor| match sensor {
+            Sensor::Hdl64e => packet::Sensor::Hdl64e,
+            Sensor::Hdl32e => packet::Sensor::Hdl32e,
+            Sensor::Vlp16 => packet::Sensor::Vlp16,
+        });
+        SetupOptions {
+            sensor,
+            calibration: self.calibration.clone(),
+            offsets: self.offsets.into(),
+            two_points: self.two_points,
+            filter: Filter { near: self.near, far: self.far },
+        }
+    }
+}
+
+/// Name of a kind of sensor.
+pub fn sensor_name(sensor: packet::Sensor) -> &'static str {
+    match sensor {
+        packet::Sensor::Hdl64e => "HDL-64E",
+        packet::Sensor::Hdl32e => "HDL-32E",
+        packet::Sensor::Vlp16 => "VLP-16",
+    }
+}
+
+/// What became of the returns, as JSON.
+pub fn tally_object(tally: Tally) -> serde_json::Value {
+    serde_json::json!({
+        "points": tally.points,
+        "empty": tally.empty,
+        "false_near": tally.near,
+        "false_far": tally.far,
+        "unused": tally.unused,
+    })
+}
+
+/// What became of the returns, for people.
+pub fn tally_rows(tally: Tally) -> Vec<[String; 2]> {
+    let row = |name: &str, count: u64| [name.to_owned(), count.to_string()];
+    let mut rows = vec![
+        row("points", tally.points),
+        row("nothing seen", tally.empty),
+        row("false, too near", tally.near),
+        row("false, too far", tally.far),
+    ];
+    if tally.unused > 0 {
+        rows.push(row("of lasers not in use", tally.unused));
+    }
+    rows
+}

@@ -1,0 +1,104 @@
+//! `agv lidar3d info`.
+
+use std::ops::ControlFlow;
+
+use agv_host_sim::lidar3d::{SetupError, Source};
+use serde_json::json;
+
+use super::arguments::{SOURCES, SensorArguments, sensor_name, tally_object, tally_rows};
+use crate::command::{output, progress, stop};
+
+const HELP: &str = "\
+Examples:
+  agv lidar3d info drive.pcap
+  agv lidar3d info drive.pcap --calibration db.xml --json
+  agv lidar3d info udp
+
+Keys of --json: sensor, version, packets, refused, other, cut, duration_s, turns, turns_per_s,
+  calibration_in_stream, lasers, returns {points, empty, false_near, false_far, unused}; returns is null without a calibration.";
+
+/// What sends a stream of packets, and what is in it.
+#[derive(clap::Args)]
+#[command(after_help = HELP, after_long_help = format!("{SOURCES}\n\n{HELP}"))]
+pub struct Info {
+    /// Capture, folder of range images, or udp[:PORT]; the network is listened to until Ctrl-C.
+    #[arg(value_name = "SOURCE", value_parser = Source::parse)]
+    source: Source,
+    #[command(flatten)]
+    sensor: SensorArguments,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Info {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let stop = stop::on_interrupt()?;
+        let name = self.source.name();
+        let source = self.source.open(&self.sensor.options(), &stop)?;
+        let survey = source.survey.clone();
+        let setup = match source.setup() {
+            Ok(setup) => Some(setup),
+            // What is missing is a result here.
+            Err(SetupError::NoCalibration { .. } | SetupError::UnknownSensor) => None,
+            Err(error) => return Err(error.into()),
+        };
+        let lasers = setup.as_ref().map(|setup| setup.lasers.len());
+        let sensor = setup.as_ref().map(|setup| setup.sensor).or(survey.sensor).map(sensor_name);
+        let bar = progress::bar("decoding", source.length().unwrap_or(0));
+        let tally = match setup {
+            Some(_) => Some(source.revolutions(&stop, |_| {
+                bar.inc(1);
+                ControlFlow::Continue(())
+            })?),
+            None => None,
+        };
+        bar.finish_and_clear();
+        let duration = survey.duration();
+        let rate = if duration > 0.0 { survey.turns / duration } else { 0.0 };
+        if self.json {
+            let object = json!({
+                "sensor": sensor,
+                "version": survey.version,
+                "packets": survey.packets,
+                "refused": survey.refused,
+                "other": survey.other,
+                "cut": survey.is_cut,
+                "duration_s": duration,
+                "turns": survey.turns,
+                "turns_per_s": rate,
+                "calibration_in_stream": survey.calibration.is_some(),
+                "lasers": lasers,
+                "returns": tally.map(tally_object),
+            });
+            println!("{}", serde_json::to_string_pretty(&object)?);
+            return Ok(());
+        }
+        let mut rows = vec![
+            ["source".to_owned(), name],
+            ["sensor".to_owned(), sensor.unwrap_or("unknown; name it with --sensor").to_owned()],
+        ];
+        rows.extend(survey.version.map(|version| ["version".to_owned(), version]));
+        if survey.packets > 0 {
+            rows.push(["packets".to_owned(), survey.packets.to_string()]);
+            rows.push([
+                "not of a sensor".to_owned(),
+                format!("{} to the port, {} others", survey.refused, survey.other),
+            ]);
+            rows.push(["turns".to_owned(), format!("{:.2} in {duration:.2} s, {rate:.2} a second", survey.turns)]);
+        }
+        if survey.is_cut {
+            rows.push(["end".to_owned(), "in the middle of a packet".to_owned()]);
+        }
+        if survey.sensor == Some(agv_lidar3d::packet::Sensor::Hdl64e) {
+            let found = if survey.calibration.is_some() { "in the packets" } else { "not in the packets" };
+            rows.push(["calibration".to_owned(), found.to_owned()]);
+        }
+        if let Some(tally) = tally {
+            rows.extend(tally_rows(tally));
+        }
+        output::print_rows(&rows);
+        Ok(())
+    }
+}

@@ -1,0 +1,98 @@
+//! A multi-beam lidar tells where a drive begins: `agv replay --relocalise lidar3d`.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use agv_core::geometry::Pose;
+use agv_core::localizer::PoseFix;
+use agv_host_sim::lidar3d::Source;
+use agv_host_sim::lidar3d::place_map::{self, Limits};
+use agv_host_sim::lidar3d::signatures::Method;
+use agv_host_sim::recording::{RecordedEvent, Recording};
+use anyhow::{Context, bail, ensure};
+
+use super::arguments::SensorArguments;
+use super::places::Drive;
+
+/// Standard deviation of the turn that is found, rad.
+const HEADING_DEVIATION: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// Standard deviation of a position within a place, as a share of the distance to the next one: evenly anywhere between
+/// half way to the one and half way to the other.
+const POSITION_SHARE: f64 = 0.29;
+/// The least that is claimed, m: the way is not exactly the same a second time.
+const LEAST_POSITION_DEVIATION: f64 = 0.5;
+/// Scans that are looked at for a place, at the most.
+const SCANS: usize = 20;
+
+/// Where the vehicle is at the start, from the scans of another sensor.
+#[derive(clap::Args)]
+pub struct Relocalisation {
+    /// Find the place where the drive begins.
+    #[arg(long, value_name = "SENSOR", requires = "places", requires = "scans")]
+    relocalise: Option<By>,
+    /// Places with poses that 'agv lidar3d places index' has stored.
+    #[arg(long, value_name = "FILE", requires = "relocalise")]
+    places: Option<PathBuf>,
+    /// Scans that were taken as the drive began: capture or folder of range images.
+    #[arg(long, value_name = "SOURCE", value_parser = Source::parse, requires = "relocalise")]
+    scans: Option<Source>,
+    /// Pose of that sensor on the vehicle, seen from the logical point: X,Y,HEADING in m, m and deg.
+    #[arg(long, value_name = "POSE", default_value = "0,0,0", value_parser = pose, allow_hyphen_values = true)]
+    mount: Pose,
+    #[command(flatten)]
+    sensor: SensorArguments,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum By {
+    /// Multi-beam lidar.
+    Lidar3d,
+}
+
+fn pose(text: &str) -> Result<Pose, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse::<f64>()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, heading]) if [x, y, heading].iter().all(|value| value.is_finite()) => {
+            Ok(Pose::new(x, y, heading.to_radians()))
+        }
+        _ => Err("three numbers are expected".to_owned()),
+    }
+}
+
+impl Relocalisation {
+    /// Whether it is asked for.
+    pub fn is_wanted(&self) -> bool {
+        self.relocalise.is_some()
+    }
+
+    /// The pose of the logical point at the first event of a log. None if nobody asks.
+    pub fn fix(&self, recording: &Recording) -> anyhow::Result<Option<PoseFix>> {
+        let (Some(By::Lidar3d), Some(path), Some(source)) = (self.relocalise, &self.places, &self.scans) else {
+            return Ok(None);
+        };
+        let map = place_map::read(path)?;
+        let named = || path.display().to_string();
+        ensure!(map.places.iter().all(|place| place.pose.is_some()), "{}: the places have no poses", named());
+        let distance = map.threshold(Method::Enriched);
+        let distance = distance.with_context(|| format!("{}: too few places to learn a threshold", named()))?;
+        let limits = Limits { distance, facing: None };
+        let (mut found, mut asked) = (None, 0);
+        let drive = Drive { source: source.clone(), sensor: self.sensor.clone() };
+        drive.for_each(Some(map.sensor_height), |_, signatures| {
+            asked += 1;
+            found = map.find(Method::Enriched, &limits, &signatures).filter(|answer| answer.is_believed);
+            if found.is_some() || asked >= SCANS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        let Some(answer) = found else { bail!("{}: none of {asked} scans is of a stored place", source.name()) };
+        let [x, y, heading] = map.places[answer.place].pose.unwrap_or_default();
+        let sensor = Pose::new(x, y, heading + answer.turn);
+        let time = recording.events.iter().filter_map(RecordedEvent::time).min();
+        let position_deviation = (POSITION_SHARE * map.spacing().unwrap_or(0.0)).max(LEAST_POSITION_DEVIATION);
+        Ok(Some(PoseFix {
+            time: time.context("the log has no events")?,
+            pose: sensor.compose(&self.mount.inverse()),
+            position_deviation,
+            heading_deviation: HEADING_DEVIATION,
+        }))
+    }
+}

@@ -1,0 +1,15 @@
+//! Multi-beam lidars: where their packets come from, and whole revolutions of points.
+
+pub mod live;
+pub mod place_map;
+pub mod revolution;
+pub mod setup;
+pub mod signatures;
+pub mod source;
+pub mod stand;
+pub mod survey;
+
+pub use revolution::{Revolution, Revolutions};
+pub use setup::{Setup, SetupError, SetupOptions};
+pub use source::{OpenSource, Source, SourceError};
+pub use survey::Survey;

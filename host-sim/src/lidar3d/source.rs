@@ -1,0 +1,254 @@
+//! Where packets come from: a capture, a sensor on the network, or range images.
+
+use std::io;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use agv_core::measurement::Time;
+use agv_lidar3d::packet::{LENGTH, PORT, Packet, STATUS_CYCLE, Sensor, Tally};
+
+use super::live::Listener;
+use super::revolution::{Revolution, Revolutions};
+use super::setup::{Setup, SetupError, SetupOptions};
+use super::survey::{Survey, Surveyor};
+use crate::import::range_image::{RangeImageError, RangeImages};
+use crate::import::velodyne::{self, VelodyneError};
+
+/// Time between two range images, us: the sensor turned ten times a second.
+const IMAGE_INTERVAL: u64 = 100_000;
+/// Packets of a live sensor that are looked at before any is decoded, at least, and if it is one that may still send its
+/// calibration.
+const LOOK: usize = 100;
+const LONG_LOOK: usize = 2 * STATUS_CYCLE;
+
+/// Why there are no points.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// The capture.
+    #[error(transparent)]
+    Capture(#[from] VelodyneError),
+    /// The range images.
+    #[error(transparent)]
+    Images(#[from] RangeImageError),
+    /// The sensor or its calibration.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The network.
+    #[error("UDP port {port}: {problem}")]
+    Network {
+        /// The port.
+        port: u16,
+        /// What the operating system says.
+        problem: io::Error,
+    },
+    /// Nothing was received.
+    #[error("nothing was received on UDP port {port}")]
+    Silent {
+        /// The port.
+        port: u16,
+    },
+    /// No return of any packet is a point.
+    #[error("{name}: nothing was seen: {detail}")]
+    Blind {
+        /// The source.
+        name: String,
+        /// What became of the returns.
+        detail: String,
+    },
+}
+
+/// Where packets come from.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// A capture, pcap or pcapng.
+    Capture(PathBuf),
+    /// A UDP port of this machine.
+    Live(u16),
+    /// A folder of range images.
+    Images(PathBuf),
+}
+
+impl Source {
+    /// `udp` or `udp:PORT` is the network, a folder holds range images, and any other name is a capture.
+    ///
+    /// # Errors
+    /// If the port is no number.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text.strip_prefix("udp") {
+            Some("") => Ok(Self::Live(PORT)),
+            Some(rest) if rest.starts_with(':') => {
+                rest[1..].parse().map(Self::Live).map_err(|_| format!("'{}' is no port", &rest[1..]))
+            }
+            _ if Path::new(text).is_dir() => Ok(Self::Images(text.into())),
+            _ => Ok(Self::Capture(text.into())),
+        }
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Capture(path) | Self::Images(path) => path.display().to_string(),
+            Self::Live(port) => format!("UDP port {port}"),
+        }
+    }
+
+    /// Looks at the source, as far as is needed to decode it; a live one is listened to until `stop` is set.
+    ///
+    /// # Errors
+    /// See [`SourceError`].
+    pub fn open(self, options: &SetupOptions, stop: &AtomicBool) -> Result<OpenSource, SourceError> {
+        match self {
+            Self::Capture(path) => {
+                let survey = Survey::of_capture(&path)?;
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Capture(path) })
+            }
+            Self::Images(path) => {
+                let images = RangeImages::open(&path)?;
+                let survey = Survey {
+                    sensor: Some(Sensor::Hdl64e),
+                    calibration: Some(images.calibration()),
+                    ..Survey::default()
+                };
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Images(images) })
+            }
+            Self::Live(port) => {
+                let network = |problem| SourceError::Network { port, problem };
+                let mut listener = Listener::new(port).map_err(network)?;
+                let mut surveyor = Surveyor::default();
+                let mut waiting = Vec::new();
+                while !stop.load(Ordering::Relaxed) {
+                    listener
+                        .receive(|time, packet| {
+                            surveyor.packet(time, packet);
+                            waiting.push((time, Box::new(packet.bytes())));
+                        })
+                        .map_err(network)?;
+                    let needs_calibration = options.calibration.is_none() && surveyor.sensor() == Some(Sensor::Hdl64e);
+                    if waiting.len() >= (if needs_calibration { LONG_LOOK } else { LOOK }) {
+                        break;
+                    }
+                }
+                if waiting.is_empty() {
+                    return Err(SourceError::Silent { port });
+                }
+                let survey = surveyor.finish();
+                let packets = Packets::Live { port, listener, waiting };
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
+            }
+        }
+    }
+}
+
+enum Packets {
+    Capture(PathBuf),
+    Images(RangeImages),
+    Live { port: u16, listener: Listener, waiting: Vec<(Time, Box<[u8; LENGTH]>)> },
+}
+
+/// A source that has been looked at.
+pub struct OpenSource {
+    options: SetupOptions,
+    setup: Option<Setup>,
+    /// What it says about itself.
+    pub survey: Survey,
+    packets: Packets,
+}
+
+impl OpenSource {
+    /// The sensor and its parameters.
+    ///
+    /// # Errors
+    /// See [`SetupError`].
+    pub fn setup(&self) -> Result<Setup, SetupError> {
+        match &self.setup {
+            Some(setup) => Ok(setup.clone()),
+            None => Setup::new(&self.options, &self.survey),
+        }
+    }
+
+    /// Decodes with other parameters than those that were stated.
+    pub fn decode_with(&mut self, setup: Setup) {
+        self.setup = Some(setup);
+    }
+
+    /// How many revolutions there will be, if that is known.
+    #[must_use]
+    pub fn length(&self) -> Option<u64> {
+        match &self.packets {
+            Packets::Capture(_) => Some(self.survey.turns.ceil() as u64),
+            Packets::Images(images) => Some(images.files.len() as u64),
+            Packets::Live { .. } => None,
+        }
+    }
+
+    /// Calls `take` with each revolution until it breaks off, the source ends or `stop` is set. The first and the last
+    /// revolution of a stream may be parts of one. Returns what became of the returns.
+    ///
+    /// # Errors
+    /// See [`SourceError`]; [`SourceError::Blind`] if there was no point at all.
+    pub fn revolutions(
+        mut self,
+        stop: &AtomicBool,
+        mut take: impl FnMut(Revolution) -> ControlFlow<()>,
+    ) -> Result<Tally, SourceError> {
+        let setup = self.setup()?;
+        let mut revolutions = Revolutions::new(&setup);
+        let mut flow = ControlFlow::Continue(());
+        let mut push = |time: Time, packet: &Packet<'_>, revolutions: &mut Revolutions| {
+            revolutions.packet(time, packet, |revolution| {
+                if flow.is_continue() {
+                    flow = take(revolution);
+                }
+            });
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { flow }
+        };
+        let name = match &mut self.packets {
+            Packets::Capture(path) => {
+                velodyne::for_each_until(path, |time, packet| push(time, packet, &mut revolutions))?;
+                path.display().to_string()
+            }
+            Packets::Images(images) => {
+                revolutions.begin_at(images.first_azimuth());
+                for index in 0..images.files.len() {
+                    let time = Time::from_micros(index as u64 * IMAGE_INTERVAL);
+                    let counts = images.counts(index)?;
+                    let flows = images.packets(&counts).iter().try_for_each(|bytes| match Packet::new(bytes) {
+                        Ok(packet) => push(time, &packet, &mut revolutions),
+                        Err(_) => ControlFlow::Continue(()),
+                    });
+                    if flows.is_break() {
+                        break;
+                    }
+                }
+                "the range images".to_owned()
+            }
+            Packets::Live { port, listener, waiting } => {
+                let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| match Packet::new(&bytes[..]) {
+                    Ok(packet) => push(time, &packet, &mut revolutions),
+                    Err(_) => ControlFlow::Continue(()),
+                });
+                while is_going.is_continue() && !stop.load(Ordering::Relaxed) {
+                    listener
+                        .receive(|time, packet| is_going = push(time, packet, &mut revolutions))
+                        .map_err(|problem| SourceError::Network { port: *port, problem })?;
+                }
+                format!("UDP port {port}")
+            }
+        };
+        let (last, tally) = revolutions.finish();
+        if let (Some(mut last), ControlFlow::Continue(())) = (last, flow) {
+            last.is_whole = matches!(self.packets, Packets::Images(_));
+            let _ = take(last);
+        }
+        if tally.points == 0 {
+            let detail = format!(
+                "{} returns are empty, {} too near, {} too far, {} of lasers that are not in use",
+                tally.empty, tally.near, tally.far, tally.unused
+            );
+            return Err(SourceError::Blind { name, detail });
+        }
+        Ok(tally)
+    }
+}

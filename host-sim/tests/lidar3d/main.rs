@@ -1,0 +1,9 @@
+//! Multi-beam lidars, on recordings of real ones and in simulation.
+
+mod calibration;
+mod command;
+mod manual;
+mod range_images;
+#[path = "../support/mod.rs"]
+mod support;
+mod velodyne_decoder;
