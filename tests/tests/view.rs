@@ -160,7 +160,7 @@ fn a_log_is_looked_at() {
         let relocalised = found_by_log["kinds"]["relocalised"]["count"].as_u64().unwrap();
         assert_eq!(relocalised, 2, "{kinds}");
         let played = number(&found_by_log["after_play"]["time_s"]) - number(&found_by_log["before_play"]["time_s"]);
-        assert!(played >= 5.0 && played < 60.0, "{played}");
+        assert!((5.0..60.0).contains(&played), "{played}");
         assert_eq!(found_by_log["after_keys"]["following"], false);
     }
 }

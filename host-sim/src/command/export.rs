@@ -14,7 +14,8 @@ use anyhow::{Context, bail, ensure};
 use super::{output, progress};
 
 const HELP: &str = "\
-Poses are those of the log where it has any, else those of a replay.
+Poses are those of the log where it has any, else those of a replay. --json prints how many of what were written: messages
+by topic, poses, or frames.
 
 Examples:
   agv export mcap drive.agvlog --output drive.mcap

@@ -82,8 +82,8 @@ fn listed(topics: &[String]) -> String {
 /// A message that matters, in the order of its arrival.
 enum Heard {
     Scan(LaserScan),
-    Odometry(Odometry),
-    InitialPose(PoseWithCovarianceStamped),
+    Odometry(Box<Odometry>),
+    InitialPose(Box<PoseWithCovarianceStamped>),
 }
 
 impl Heard {
@@ -176,9 +176,9 @@ fn messages(path: &Path, bag: &Bag, scan: &str, odometry: &str) -> Result<(Messa
         let taken = if topic == scan {
             decode(data).map(|message| heard.push((time, Heard::Scan(message))))
         } else if topic == odometry {
-            decode(data).map(|message| heard.push((time, Heard::Odometry(message))))
+            decode(data).map(|message| heard.push((time, Heard::Odometry(Box::new(message)))))
         } else if topic == INITIAL_POSE && kind == Kind::PoseWithCovarianceStamped.name() {
-            decode(data).map(|message| heard.push((time, Heard::InitialPose(message))))
+            decode(data).map(|message| heard.push((time, Heard::InitialPose(Box::new(message)))))
         } else if topic == "/tf_static" && kind == Kind::Transforms.name() {
             decode(data).map(|message: Transforms| transforms.transforms.extend(message.transforms))
         } else {

@@ -7,10 +7,10 @@ use crate::report::{Cell, FigureError, HeatMap, Page, PointSet, Table, heat_map}
 
 /// Limits of the expected standard deviation of the position that are told apart, m, and what they mean.
 const DEVIATIONS: [(f64, &str); 5] = [
+    (0.002, "up to 2 mm"),
     (0.005, "up to 5 mm"),
     (0.01, "up to 1 cm"),
     (0.02, "up to 2 cm"),
-    (0.05, "up to 5 cm"),
     (f64::INFINITY, "more, or none"),
 ];
 

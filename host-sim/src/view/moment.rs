@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::hits::FoundLandmark;
 use super::scans::Found;
-use super::timeline::Timeline;
+use super::timeline::{Revolution, Timeline};
 use crate::evaluate::drive::{mode_name, reason_name};
 use crate::recording::{RecordedScan, truth_at};
 
@@ -17,6 +17,9 @@ const ODOMETRY_PATIENCE: f64 = 0.25;
 
 /// Observations of a revolution are shown for so long, s.
 const SHOWN: f64 = 0.3;
+
+/// Answers that are not further apart than this belong to one revolution, s.
+const SAME_REVOLUTION: f64 = 0.05;
 
 /// The pose and what it rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -168,8 +171,10 @@ impl Timeline {
         if time.since(newest.time) > SHOWN {
             return &[];
         }
-        let start = after.checked_sub(2).map_or(0, |before| self.revolutions[before].end);
-        &self.uses[start..newest.end]
+        // Reflectors and features of one revolution are two answers.
+        let is_older = |revolution: &Revolution| newest.time.since(revolution.time) > SAME_REVOLUTION;
+        let start = self.revolutions[..after].iter().rev().find(|revolution| is_older(revolution));
+        &self.uses[start.map_or(0, |before| before.end)..newest.end]
     }
 }
 

@@ -95,7 +95,7 @@ fn a_check_warns_and_draws() {
     assert!((axis - 3.0).abs() < 0.01 && mirror["reflectors"] == 24, "{mirror}");
     let page = std::fs::read_to_string(Path::new(&report).join("index.html")).unwrap();
     let expected =
-        ["How well the pose is determined", "How many reflectors are visible", "up to 1 cm", "0.20 m apart", "mirror"];
+        ["How well the pose is determined", "How many reflectors are visible", "up to 5 mm", "0.20 m apart", "mirror"];
     for expected in expected {
         assert!(page.contains(expected), "{expected}");
     }

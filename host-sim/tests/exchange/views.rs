@@ -4,7 +4,13 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::atomic::AtomicBool;
 
+use agv_core::localizer::{Mode, PoseOutput};
+use agv_core::measurement::Time;
+use agv_host_sim::recording::RecordedEvent;
+use agv_host_sim::replay::replay;
+use agv_host_sim::view::{Shared, Timeline, Window, load};
 use agv_host_sim::{data, log};
 use serde_json::Value;
 
@@ -128,4 +134,54 @@ fn quiet_says_results_and_errors_only() {
     assert!(quiet.stderr.is_empty() && quiet.stdout == talkative.stdout);
     let refused = agv(&["replay", &files.path("missing"), "--quiet"]);
     assert_eq!((refused.status.code(), text(&refused.stderr).lines().count()), (Some(1), 1));
+}
+
+#[test]
+fn what_is_sent_coarsely_hides_nothing() {
+    let files = Files::new();
+    let log_path = files.path("drive.agvlog");
+    let recording = hall(20.0);
+    log::write(Path::new(&log_path), &recording).unwrap();
+    let answers = replay(&recording, |_| ()).unwrap();
+    let shared = Shared::new(Timeline::of_log(log_path.clone().into()));
+    load(Path::new(&log_path), &shared, &AtomicBool::new(false)).unwrap();
+    let timeline = shared.read();
+    let status = timeline.status();
+    let scans = recording.events.iter().filter(|event| matches!(event, RecordedEvent::Scan(_))).count();
+    assert!(status.is_complete && status.scans == scans && status.landmarks == recording.landmarks.len());
+    let poses: Vec<PoseOutput> = answers.poses.iter().filter(|pose| pose.mode != Mode::NotLocalised).copied().collect();
+
+    // The way: every pose is near a point of it, and it has fewer points the coarser it is.
+    let mut counts = Vec::new();
+    for tolerance_m in [0.01, 0.1, 1.0] {
+        let everywhere = Window { tolerance_m, x0: -1e3, y0: -1e3, x1: 1e3, y1: 1e3 };
+        let outline = timeline.outline(&everywhere);
+        let points: Vec<[f64; 2]> = outline
+            .pieces
+            .iter()
+            .flat_map(|(_, points)| points.chunks(2))
+            .map(|point| [f64::from(point[0]) * 1e-3, f64::from(point[1]) * 1e-3])
+            .collect();
+        for pose in &poses {
+            let distance = |point: &[f64; 2]| (point[0] - pose.pose.x).hypot(point[1] - pose.pose.y);
+            let nearest = points.iter().map(distance).fold(f64::INFINITY, f64::min);
+            assert!(nearest <= tolerance_m + 0.002, "{nearest} at {tolerance_m}");
+        }
+        counts.push(points.len());
+        let nowhere = Window { tolerance_m, x0: -20.0, y0: -20.0, x1: -10.0, y1: -10.0 };
+        assert!(timeline.outline(&nowhere).pieces.is_empty());
+    }
+    assert!(counts[0] > 2 * counts[1] && counts[1] > 2 * counts[2], "{counts:?}");
+
+    // Curves: the largest value of all is in every answer, however coarse.
+    let largest = poses.iter().map(|pose| pose.normalised_square as f32).fold(0.0, f32::max);
+    for intervals in [1, 7, 100, 1000] {
+        let [from, to] = [status.start_s, status.end_s].map(Time::from_seconds);
+        let overview = timeline.overview(from, to, intervals);
+        assert_eq!(overview.normalised_square.len(), intervals);
+        assert_eq!(overview.normalised_square.iter().flatten().copied().fold(0.0, f32::max), largest);
+        // It began without a landmark, which is graver than what followed.
+        let first = overview.modes.iter().flatten().next().map(|mode| overview.mode_names[usize::from(*mode)]);
+        assert_eq!(first, Some("dead reckoning"));
+    }
 }

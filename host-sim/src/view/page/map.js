@@ -41,11 +41,17 @@ const MARKS = {
     c.beginPath(); c.moveTo(x - k, y - k); c.lineTo(x + k, y + k); c.moveTo(x + k, y - k); c.lineTo(x - k, y + k);
     c.strokeStyle = "#d55e00"; c.lineWidth = 2.5; c.stroke();
   },
+  unknown(c, x, y, r) {
+    c.beginPath(); c.moveTo(x - r, y); c.lineTo(x + r, y); c.moveTo(x, y - r); c.lineTo(x, y + r);
+    c.strokeStyle = "#999"; c.lineWidth = 1.5; c.stroke();
+  },
   scan(c, x, y) { c.fillStyle = "#444"; c.fillRect(x - 1, y - 1, 2, 2); },
 };
 
 const LEGEND = [["reflector", "reflector"], ["corner", "corner"], ["end_point", "end point"], ["found", "found while driving"],
-  ["used", "observation that corrected the pose"], ["refused", "observation that was not used"], ["scan", "scan"]];
+  ["used", "observation that corrected the pose"], ["refused", "observation that fits no landmark"], ["unknown", "observation without a landmark near"], ["scan", "scan"]];
+
+const VERDICT_MARKS = { accepted: "used", gated: "refused", ambiguous: "refused", out_of_time: "refused", unknown: "unknown" };
 
 class MapView {
   constructor(canvas) { this.canvas = canvas; this.camera = new Camera(); this.drawn = {}; }
@@ -137,7 +143,7 @@ class MapView {
 
   observations(c, observations, sx, sy) {
     for (const { located: [x, y], verdict } of observations) {
-      MARKS[verdict === "accepted" ? "used" : "refused"](c, sx(x), sy(y), 5);
+      MARKS[VERDICT_MARKS[verdict]](c, sx(x), sy(y), 5);
       this.drawn.observations += 1;
     }
   }

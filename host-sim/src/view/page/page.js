@@ -105,7 +105,9 @@ function fitOnce() {
 
 async function askOverview() {
   const { start_s, end_s } = model.status;
-  model.overview = await ask("overview", { from_s: start_s, to_s: end_s, intervals: curves.intervals() });
+  // No interval is so short that it has no pose.
+  const most = Math.max(1, Math.floor((end_s - start_s) / 0.05));
+  model.overview = await ask("overview", { from_s: start_s, to_s: end_s, intervals: Math.min(curves.intervals(), most) });
   model.modeNames = model.overview.mode_names;
 }
 

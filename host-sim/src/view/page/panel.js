@@ -29,7 +29,7 @@ function showPanel(moment) {
     row("odometry, bus", is_bus_alive ? "sound" : "silent", !is_bus_alive),
     fault("drive encoder", drive), fault("steering encoder", steering),
   ]);
-  setRows(document.querySelector("#observations tbody"), moment.observations.slice(0, 40).map(observationRow));
+  setRows(document.querySelector("#observations tbody"), sorted(moment.observations).slice(0, 40).map(observationRow));
 }
 
 function poseRows(pose, truth) {
@@ -50,6 +50,12 @@ function poseRows(pose, truth) {
   return rows;
 }
 
+// What has a landmark comes first.
+function sorted(observations) {
+  const order = ["gated", "ambiguous", "out_of_time", "accepted", "unknown"];
+  return [...observations].sort((a, b) => order.indexOf(a.verdict) - order.indexOf(b.verdict));
+}
+
 function observationRow({ kind, landmark, verdict, residual, test_ratio }) {
   const second = kind === "reflector" ? degrees(residual[1]) : (1000 * residual[1]).toFixed(0) + " mm";
   return {
@@ -58,7 +64,7 @@ function observationRow({ kind, landmark, verdict, residual, test_ratio }) {
       landmark ? `${(1000 * residual[0]).toFixed(0)} mm, ${second}` : "–",
       verdict === "accepted" || verdict === "gated" ? test_ratio.toFixed(2) : verdict.replaceAll("_", " "),
     ],
-    isBad: verdict !== "accepted",
+    isBad: verdict !== "accepted" && verdict !== "unknown",
   };
 }
 
