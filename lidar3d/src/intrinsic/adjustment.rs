@@ -23,6 +23,9 @@ const CUT: f64 = 4.685;
 const MEDIAN_DEVIATE: f64 = 0.6745;
 /// Steps below this part of a parameter's standard deviation end it.
 const SMALL: f64 = 0.02;
+/// So do steps below this part of the standard deviation to which a parameter is known before: where surfaces are not quite
+/// planes, which points count changes a little for ever.
+const SMALL_TO_KNOWN: f64 = 0.05;
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -155,9 +158,10 @@ fn adjust(
             }
         }
         let deviations: Vec<Vector3<f64>> = variances.iter().map(|variance| variance.map(libm::sqrt) * noise).collect();
-        // Steps far below what is known anyway change nothing.
         let is_small = |(step, deviation): (&Vector3<f64>, &Vector3<f64>)| {
-            (0..3).all(|parameter| step[parameter].abs() < SMALL * deviation[parameter].max(known[parameter]))
+            (0..3).all(|parameter| {
+                step[parameter].abs() < (SMALL * deviation[parameter]).max(SMALL_TO_KNOWN * known[parameter])
+            })
         };
         if steps.iter().zip(&deviations).all(is_small) {
             let deviations = deviations.iter().zip(&is_observed).map(|(deviation, is_observed)| {
