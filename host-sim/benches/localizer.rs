@@ -8,6 +8,7 @@ use agv_core::localizer::{Event, Localizer, Parameters, PoseFix};
 use agv_core::measurement::{EncoderSample, ReflectorObservation, Reflectors, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_host_sim::evaluate::warehouse::{Method, PATHS, prepare};
+use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
 use agv_host_sim::recording::RecordedEvent;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 
@@ -82,7 +83,8 @@ fn steps(criterion: &mut Criterion) {
 
 fn scan_cycle(criterion: &mut Criterion) {
     let method = Method::ALL.iter().find(|method| method.name == "static").expect("there is a static map");
-    let recording = prepare(PATHS[0].1, method, 1).expect("the standard drive can be simulated").recording;
+    let recording =
+        prepare(PATHS[0].1, method, Disturbance::None, 1).expect("the standard drive can be simulated").recording;
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
     localizer.add_landmarks(&recording.landmarks).expect("the map fits");
     // The middle of the drive: the vehicle moves, and the lane is on both sides.

@@ -1,15 +1,27 @@
-//! Where a layout of reflectors resembles itself: a vehicle that is switched on there cannot tell where it is.
+//! What a layout of reflectors is good for: where a vehicle that is switched on finds itself, how well its pose is
+//! determined, and which reflectors stand in each other's way.
+
+mod arrangement;
+mod determination;
+mod page;
+
+pub use arrangement::{ClosePair, Mirror, close_pairs, mirrors};
+pub use determination::{Determination, determination};
+pub use page::page;
 
 use std::collections::BTreeMap;
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::landmarks::{FixedMap, Landmark, MapError};
+use agv_core::localizer::ReflectorParameters;
 use agv_core::places::{
     IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
 };
 use rayon::prelude::*;
 use serde::Serialize;
+
+use crate::evaluate::accuracy::Spread;
 
 /// Most reflectors of a layout.
 pub const REFLECTORS: usize = 1024;
@@ -23,6 +35,10 @@ pub struct CheckOptions {
     pub farthest: f64,
     /// Most reflectors that are seen at once, the nearest ones: walls and racks hide others, which a layout does not say.
     pub most_seen: usize,
+    /// Reflectors that are closer to each other than this may be taken for one, m.
+    pub closest: f64,
+    /// How well reflectors are seen.
+    pub noise: ReflectorParameters,
 }
 
 /// What was found at one place.
@@ -55,6 +71,10 @@ pub struct CheckedPlace {
     pub y_m: f64,
     /// Reflectors seen there.
     pub seen: usize,
+    /// Expected standard deviation of the position along its worst axis, m; None if nothing determines it.
+    pub position_deviation_m: Option<f64>,
+    /// The same of the heading, deg.
+    pub heading_deviation_deg: Option<f64>,
     /// What was found.
     #[serde(flatten)]
     pub finding: Finding,
@@ -86,8 +106,53 @@ pub struct Check {
     pub too_few_share: f64,
     /// By what movements the layout resembles itself, the commonest first.
     pub resemblances: Vec<Resemblance>,
+    /// Median over the places of the expected standard deviation of the position, m; None if few are determined.
+    pub median_deviation_m: Option<f64>,
+    /// Pairs of reflectors that are too close to each other.
+    pub close_pairs: Vec<ClosePair>,
+    /// Lines about which the layout is its own mirror image.
+    pub mirrors: Vec<Mirror>,
     /// All places where a vehicle does not find itself.
     pub problems: Vec<CheckedPlace>,
+    /// All places.
+    #[serde(skip)]
+    pub looked: Vec<CheckedPlace>,
+}
+
+impl Check {
+    /// The figures: name and value.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Vec<String>> {
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let deviation = self.median_deviation_m.map_or("-".to_owned(), |median| format!("{:.1} mm", 1e3 * median));
+        let rows = [
+            ("reflectors", self.reflectors.to_string()),
+            ("places", self.places.to_string()),
+            ("unique", percent(self.unique_share)),
+            ("ambiguous", percent(self.ambiguous_share)),
+            ("too few seen", percent(self.too_few_share)),
+            ("expected deviation, median", deviation),
+        ];
+        rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect()
+    }
+
+    /// What somebody should look at, in sentences.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let close = self.close_pairs.iter().map(|ClosePair { reflectors: [first, second], distance_m }| {
+            format!("reflectors number {first} and {second} are only {distance_m:.2} m apart and may be taken for one")
+        });
+        let mirrored = self.mirrors.iter().map(|Mirror { point_m: [x, y], direction_deg, reflectors }| {
+            format!(
+                "{reflectors} reflectors are mirror images of each other about the line through ({x:.1}, {y:.1}) m at \
+                 {direction_deg:.0}°"
+            )
+        });
+        let resembling = self.resemblances.iter().map(|Resemblance { turn_deg, shift_m: [x, y], places }| {
+            format!("resembles itself turned by {turn_deg:.0}° and shifted by ({x:.1}, {y:.1}) m, at {places} places")
+        });
+        close.chain(mirrored).chain(resembling).collect()
+    }
 }
 
 /// Looks at places on a grid over the layout, with what a vehicle would see there without noise, and asks whether it could
@@ -120,8 +185,17 @@ pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, MapEr
         ambiguous_share: share(|finding| matches!(finding, Finding::Resembles { .. })),
         too_few_share: share(|finding| *finding == Finding::TooFew),
         resemblances: resemblances(&looked),
-        problems: looked.into_iter().filter(|place| place.finding != Finding::Unique).collect(),
+        median_deviation_m: median(looked.iter().map(|place| place.position_deviation_m.unwrap_or(f64::INFINITY))),
+        close_pairs: close_pairs(positions, options.closest),
+        mirrors: mirrors(positions),
+        problems: looked.iter().filter(|place| place.finding != Finding::Unique).copied().collect(),
+        looked,
     })
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let median = Spread::of(values).median;
+    median.is_finite().then_some(median)
 }
 
 /// Places over the rectangle around the reflectors.
@@ -175,7 +249,16 @@ fn look(
         ReflectorAnswer::TooFew => Finding::TooFew,
         ReflectorAnswer::Unknown => Finding::Unknown,
     };
-    CheckedPlace { x_m: place.x, y_m: place.y, seen: near.len(), finding }
+    let seen: Vec<Point> = near.iter().map(|(_, position)| **position).collect();
+    let expected = determination(place, &seen, &options.noise);
+    CheckedPlace {
+        x_m: place.x,
+        y_m: place.y,
+        seen: seen.len(),
+        position_deviation_m: expected.map(|expected| expected.position),
+        heading_deviation_deg: expected.map(|expected| expected.heading.to_degrees()),
+        finding,
+    }
 }
 
 /// Movements that differ by less than a degree and half a metre are one.
@@ -206,7 +289,13 @@ fn resemblances(looked: &[CheckedPlace]) -> Vec<Resemblance> {
 mod tests {
     use super::*;
 
-    const OPTIONS: CheckOptions = CheckOptions { spacing: 4.0, farthest: 30.0, most_seen: 12 };
+    const OPTIONS: CheckOptions = CheckOptions {
+        spacing: 4.0,
+        farthest: 30.0,
+        most_seen: 12,
+        closest: 0.5,
+        noise: ReflectorParameters { range_deviation: 0.01, bearing_deviation: 0.001, detection: None },
+    };
 
     /// Reflectors at irregular places of a hall of 40 x 20 m.
     fn irregular() -> Vec<Point> {

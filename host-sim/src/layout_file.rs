@@ -2,7 +2,10 @@
 //!
 //! An imk file has one landmark a line: `globID x_mm y_mm type subtype size_mm layer1 [layer2 ...]`; lines that begin
 //! with `#` or `globID` are skipped. A csv file has the same columns behind a line of their names, with the layers
-//! separated by spaces.
+//! separated by spaces; a map of this program is read, too. A dxf drawing has a point for each landmark and a text with its
+//! name at the same place.
+
+mod drawing;
 
 use std::path::Path;
 use std::str::FromStr;
@@ -10,6 +13,7 @@ use std::str::FromStr;
 use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
 
+use crate::mapping::map_file;
 use crate::text_file::{self, TextFileError};
 
 /// How a layout is written.
@@ -19,20 +23,23 @@ pub enum Format {
     Imk,
     /// Comma-separated.
     Csv,
+    /// A drawing.
+    Dxf,
 }
 
 impl Format {
     /// The format that the ending of the name says.
     ///
     /// # Errors
-    /// If it is neither `imk` nor `csv`.
+    /// If it is neither `imk`, `csv` nor `dxf`.
     pub fn of(path: &Path) -> Result<Self, TextFileError> {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some(ending) if ending.eq_ignore_ascii_case("imk") => Ok(Self::Imk),
             Some(ending) if ending.eq_ignore_ascii_case("csv") => Ok(Self::Csv),
+            Some(ending) if ending.eq_ignore_ascii_case("dxf") => Ok(Self::Dxf),
             _ => Err(TextFileError::Foreign {
                 path: path.to_owned(),
-                expected: "a layout, whose name ends in .imk or .csv,",
+                expected: "a layout, whose name ends in .imk, .csv or .dxf,",
                 looks_like: "a file of another name",
             }),
         }
@@ -88,6 +95,7 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
     let (separator, mut text) = match format {
         Format::Imk => (' ', "# globID x_mm y_mm type subtype size_mm layer1 layer2 layer3\n".to_owned()),
         Format::Csv => (',', "globID,x_mm,y_mm,type,subtype,size_mm,layers\n".to_owned()),
+        Format::Dxf => return drawing::write(landmarks),
     };
     for IdentifiedLandmark { id, landmark } in landmarks {
         let LayoutLandmark { x, y, kind, subtype, size, layers } = landmark;
@@ -111,8 +119,14 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
 /// # Errors
 /// If the file cannot be read, or a line is no landmark.
 pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
-    Format::of(path)?;
+    let format = Format::of(path)?;
     let text = text_file::read(path, "a layout")?;
+    if format == Format::Dxf {
+        return drawing::parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem));
+    }
+    if text.lines().next().is_some_and(|first| first.trim() == map_file::HEADER) {
+        return Ok(layout(&map_file::read(path)?));
+    }
     parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem))
 }
 
@@ -145,16 +159,18 @@ pub fn landmarks(layout: &[IdentifiedLandmark]) -> Vec<Landmark> {
 #[must_use]
 pub fn layout(landmarks: &[Landmark]) -> Vec<IdentifiedLandmark> {
     let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
-    let entry = |landmark: &Landmark| IdentifiedLandmark {
-        id: landmark.id,
-        landmark: LayoutLandmark {
-            x: Coordinate::from_metres(landmark.x),
-            y: Coordinate::from_metres(landmark.y),
-            kind: 1,
-            subtype: 2,
-            size: Size(80),
-            layers: [0].into_iter().collect(),
-        },
+    reflectors.map(|landmark| reflector(landmark.id, landmark.x, landmark.y)).collect()
+}
+
+/// A reflector of the usual kind at a place in m.
+fn reflector(id: u16, x: f64, y: f64) -> IdentifiedLandmark {
+    let landmark = LayoutLandmark {
+        x: Coordinate::from_metres(x),
+        y: Coordinate::from_metres(y),
+        kind: 1,
+        subtype: 2,
+        size: Size(80),
+        layers: [0].into_iter().collect(),
     };
-    reflectors.map(entry).collect()
+    IdentifiedLandmark { id, landmark }
 }

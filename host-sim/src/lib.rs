@@ -20,6 +20,8 @@ pub mod provision;
 pub mod recording;
 pub mod replay;
 pub mod report;
+pub mod ros;
 pub mod serve;
 pub mod simulate;
 pub mod text_file;
+pub mod view;

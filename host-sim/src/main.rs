@@ -13,6 +13,9 @@ use clap::{Parser, Subcommand};
 #[derive(Parser)]
 #[command(name = "agv", version, args_conflicts_with_subcommands = true, after_help = HELP)]
 struct Agv {
+    /// Print results and errors only: neither progress nor notes.
+    #[arg(short, long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Option<Command>,
     #[command(flatten)]
@@ -24,7 +27,11 @@ Examples:
   agv
   agv --report /tmp/report
   agv simulate host-sim/scenarios/block_storage_p2.toml --output drive.agvlog
-  agv replay drive.agvlog --report report";
+  agv replay drive.agvlog --report report
+  agv view drive.agvlog
+
+Exit codes: 0 done; 1 it could not be done, and one line on standard error says why; 2 the command line is wrong;
+130 ended by a second Ctrl-C.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -32,6 +39,8 @@ enum Command {
     Export(command::export::Export),
     Simulate(command::simulate::Simulate),
     Replay(command::replay::Replay),
+    View(command::view::View),
+    Report(command::report::Report),
     Map(command::map::Map),
     Calibrate(command::calibrate::Calibrate),
     Evaluate(command::evaluate::Evaluate),
@@ -45,17 +54,23 @@ enum Command {
     Emulate(command::emulate::Emulate),
     Ctl(command::ctl::Ctl),
     Provision(command::provision::Provision),
+    Completion(command::completion::Completion),
 }
 
 fn main() -> ExitCode {
     command::panic_message::install();
     let arguments = Agv::parse();
+    if arguments.quiet {
+        command::output::be_quiet();
+    }
     let outcome = match arguments.command {
         None => arguments.demonstration.run(),
         Some(Command::Import(command)) => command.run(),
         Some(Command::Export(command)) => command.run(),
         Some(Command::Simulate(command)) => command.run(),
         Some(Command::Replay(command)) => command.run(),
+        Some(Command::View(command)) => command.run(),
+        Some(Command::Report(command)) => command.run(),
         Some(Command::Map(command)) => command.run(),
         Some(Command::Calibrate(command)) => command.run(),
         Some(Command::Evaluate(command)) => command.run(),
@@ -69,6 +84,10 @@ fn main() -> ExitCode {
         Some(Command::Emulate(command)) => command.run(),
         Some(Command::Ctl(command)) => command.run(),
         Some(Command::Provision(command)) => command.run(),
+        Some(Command::Completion(command)) => {
+            command.run::<Agv>();
+            Ok(())
+        }
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

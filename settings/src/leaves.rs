@@ -116,7 +116,7 @@ const TURN: f64 = core::f64::consts::TAU;
 const SMALL: f64 = 1e-9;
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 59] = [
+pub static LEAVES: [Leaf; 60] = [
     tricycle_number!(100, "vehicle.wheelbase", "m", 0.05, 50.0, wheelbase),
     tricycle_number!(101, "vehicle.drive_scale", "m/tick", -1.0, 1.0, drive_scale),
     tricycle_number!(102, "vehicle.steering_scale", "rad/tick", -1.0, 1.0, steering_scale),
@@ -145,6 +145,7 @@ pub static LEAVES: [Leaf; 59] = [
     switch!(161, "maps.features", parameters.maps.features),
     switch!(162, "maps.dynamic", parameters.maps.dynamic),
     switch!(163, "maps.start_search", start_search),
+    switch!(164, "maps.slam", parameters.maps.slam),
     number!(170, "reflectors.range_deviation", "m", SMALL, 10.0, parameters.reflectors.range_deviation),
     number!(171, "reflectors.bearing_deviation", "rad", SMALL, 1.0, parameters.reflectors.bearing_deviation),
     number!(180, "features.nearest", "m", 0.0, 250.0, parameters.features.nearest),

@@ -6,6 +6,7 @@ use agv_core::geometry::{Point, Pose};
 use agv_host_sim::data;
 use agv_host_sim::evaluate::carpark::{self, Noise};
 use agv_host_sim::evaluate::warehouse::{Map, Method, PATHS, experiment};
+use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
 
 fn carpark_folder(test: &str) -> Option<PathBuf> {
     let folder = data::folder();
@@ -55,7 +56,7 @@ fn worst(name: &str, runs: u64) -> (f64, f64, f64) {
     let method = Method::ALL.iter().find(|method| method.name == name).unwrap();
     let mut worst = (0.0_f64, 0.0_f64, 1.0_f64);
     for path in PATHS {
-        let outcome = experiment(path, method, 1..1 + runs, || ()).unwrap();
+        let outcome = experiment(path, method, Disturbance::None, 1..1 + runs, || ()).unwrap();
         println!("{outcome:?}");
         worst =
             (worst.0.max(outcome.position_mm.p95), worst.1.max(outcome.heading_deg.p95), worst.2.min(outcome.ok_share));
@@ -69,6 +70,12 @@ fn worst(name: &str, runs: u64) -> (f64, f64, f64) {
 fn a_static_map_holds_five_millimetres() {
     let (position, heading, ok) = worst("static", 10);
     assert!(position <= 5.0 && heading <= 0.1 && ok >= 1.0, "{position} mm, {heading} deg");
+}
+
+#[test]
+fn features_found_on_the_way_bring_the_vehicle_twelve_metres_within_the_requirement() {
+    let (position, heading, ok) = worst("slam", 6);
+    assert!(position <= 20.0 && heading <= 0.1 && ok >= 0.8, "{position} mm, {heading} deg, {ok}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use agv_core::measurement::EncoderFault;
 use agv_core::state::Mode;
-use agv_core::wire::can::controller::LaserHealth;
+use agv_core::wire::can::controller::{LaserHealth, StartSearch};
 use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, ServiceError};
 use agv_host_sim::recording::Recording;
@@ -59,7 +59,7 @@ struct Drive {
 
 fn drive(image: &Path, recording: &Recording, seconds: f64, watch: impl FnOnce(&Watch) + Send) -> Drive {
     let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions { image, folder: folder.path(), key: Some(KEY), provision: true };
+    let options = VehicleOptions { image, folder: folder.path(), key: Some(KEY), provision: true, is_told: true };
     let driven = vehicle::drive(recording, &options, seconds, watch).unwrap();
     Drive { driven, folder }
 }
@@ -145,6 +145,28 @@ fn check_stack(lines: &[String]) {
     println!("{:<24} {:>8}", "deepest stack, bytes", deepest);
     println!("{:<24} {:>8}", "reserved", reserved);
     assert!(deepest > 1000 && deepest <= reserved / 2, "{deepest} of {reserved}");
+}
+
+#[test]
+fn a_vehicle_that_is_told_nothing_finds_itself() {
+    let Some((image, _alone)) = image("a_vehicle_that_is_told_nothing_finds_itself") else { return };
+    let recording = hall();
+    let folder = tempfile::tempdir().unwrap();
+    let options = VehicleOptions { image: &image, folder: folder.path(), key: None, provision: true, is_told: false };
+    let driven = vehicle::drive(&recording, &options, 5.0, |_| ()).unwrap();
+    assert!(driven.poses.first().is_some_and(|heard| heard.pose.mode == Mode::NotLocalised));
+    let last = driven.poses.last().unwrap().pose;
+    assert_eq!((last.mode, last.health.start_search), (Mode::Reflectors, StartSearch::Idle));
+    let errors = vehicle::errors(&driven, &recording).unwrap();
+    println!("{errors:?}");
+    // The machine may be busy: a wrong place would be metres away.
+    assert!(errors.position_p95_m < 0.1, "{errors:?}");
+    let found = |driven: &Driven| {
+        let events = log::read_contents(&driven.log, |_| ()).unwrap().recording.events;
+        events.iter().filter(|event| matches!(event.view(), agv_core::localizer::Event::SetPose(_))).count()
+    };
+    assert_eq!(found(&driven), 1);
+    assert_replayed(&Drive { driven, folder }, 300);
 }
 
 #[test]
@@ -239,7 +261,8 @@ fn it_is_commissioned_over_the_service_port() {
     let Some((image, _alone)) = image("it_is_commissioned_over_the_service_port") else { return };
     let recording = hall();
     let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions { image: &image, folder: folder.path(), key: Some(KEY), provision: true };
+    let options =
+        VehicleOptions { image: &image, folder: folder.path(), key: Some(KEY), provision: true, is_told: true };
     let driven = vehicle::drive(&recording, &options, 6.0, |watch| {
         let host = format!("127.0.0.1:{}", watch.ports.service);
         until(60.0, "poses", || watch.pose().is_some());

@@ -13,7 +13,7 @@ struct Requirement {
     packages: &'static [&'static str],
 }
 
-const REQUIREMENTS: [Requirement; 3] = [
+const REQUIREMENTS: [Requirement; 4] = [
     Requirement {
         purpose: "the firmware in emulation",
         probe: &["qemu-system-arm", "--version"],
@@ -24,6 +24,11 @@ const REQUIREMENTS: [Requirement; 3] = [
         probe: &["python3", "-c", "import numpy, scipy, shapely"],
         packages: &["python3", "python3-numpy", "python3-scipy", "python3-shapely"],
     },
+    Requirement {
+        purpose: "the tests in a browser, and reports as PDF",
+        probe: &["sh", "-c", "(command -v chromium || command -v \"$CHROMIUM\") && command -v node && command -v npm"],
+        packages: &["chromium", "nodejs", "npm"],
+    },
     // A kernel with CAN in an ordinary process, for machines whose own kernel has none.
     Requirement {
         purpose: "the tests on a real CAN stack",
@@ -33,11 +38,18 @@ const REQUIREMENTS: [Requirement; 3] = [
 ];
 
 /// Packages of Python that Debian does not have, and the modules that they bring.
-const PYTHON_PACKAGES: [(&str, &str); 3] = [
+const PYTHON_PACKAGES: [(&str, &str); 7] = [
     ("cantools>=39,<50", "cantools"),
     ("canopen>=2.2,<3", "canopen"),
+    ("mcap>=1.2,<2", "mcap"),
+    ("mcap-ros2-support>=0.5,<1", "mcap_ros2"),
+    ("rosbags>=0.10,<1", "rosbags"),
+    ("evo>=1.30,<2", "evo"),
     ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
 ];
+
+/// What drives a browser, from npm.
+const NODE_PACKAGE: &str = "playwright-core@1";
 
 /// Puts the Python packages into `folder`. Returns what is still missing, one line each.
 pub fn prepare_python(folder: &Path) -> Vec<String> {
@@ -64,9 +76,30 @@ pub fn prepare_python(folder: &Path) -> Vec<String> {
         return Vec::new();
     }
     vec![format!(
-        "missing: the independent readers of agv.dbc, agv.eds and packets of lidars; install them with `python3 -m pip install --target {} {}`",
+        "missing: the independent readers of what this program reads and writes; install them with `python3 -m pip install --target {} {}`",
         folder.display(),
         packages.map(|package| format!("'{package}'")).join(" ")
+    )]
+}
+
+/// Puts the package of Node into `folder`. Returns what is still missing, one line each.
+pub fn prepare_node(folder: &Path) -> Vec<String> {
+    let is_there = || {
+        let modules = folder.join("node_modules");
+        succeeds(Command::new("node").args(["-e", "require('playwright-core')"]).env("NODE_PATH", modules))
+    };
+    if is_there() {
+        return Vec::new();
+    }
+    eprintln!("installing {NODE_PACKAGE} into {}", folder.display());
+    let arguments = ["install", "--no-audit", "--no-fund", "--silent", "--prefix"];
+    succeeds(Command::new("npm").args(arguments).arg(folder).arg(NODE_PACKAGE));
+    if is_there() {
+        return Vec::new();
+    }
+    vec![format!(
+        "missing: what drives the browser of the tests; install it with `npm install --prefix {} {NODE_PACKAGE}`",
+        folder.display()
     )]
 }
 

@@ -43,6 +43,7 @@ impl Test {
     pub fn run(self) -> anyhow::Result<()> {
         let mut missing = packages::prepare();
         missing.extend(packages::prepare_python(&repository().join("target/python")));
+        missing.extend(packages::prepare_node(&repository().join("target/node")));
         // The tests in emulation run these images.
         firmware::build()?;
         firmware::check_sizes()?;

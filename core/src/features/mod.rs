@@ -4,6 +4,7 @@ mod binary_shape_context;
 mod cumulative_gaussian_histogram;
 pub mod falko;
 mod keypoint;
+pub(crate) mod line;
 mod motion_correction;
 mod neighbourhood;
 mod orthogonal_corners;

@@ -55,6 +55,13 @@ impl SensorPath {
         }
     }
 
+    /// Where the sensor was `time` seconds after the first beam, in its frame at the first beam.
+    #[must_use]
+    pub fn place(&self, time: f64) -> Pose {
+        let transform = self.transform(time, &mut 0);
+        Pose::new(transform.x, transform.y, libm::atan2(transform.sine, transform.cosine))
+    }
+
     /// Where a point that was seen `time` seconds after the first beam is in the frame of the first beam, m.
     #[must_use]
     pub fn to_start(&self, time: f64, point: &Point) -> Point {

@@ -26,6 +26,15 @@ pub struct Innovation {
     pub normalised_square: f64,
 }
 
+impl Innovation {
+    /// None if the covariance is singular or not finite.
+    #[must_use]
+    pub fn new(residual: Vector2<f64>, covariance: Matrix2<f64>) -> Option<Self> {
+        let normalised_square = (residual.transpose() * invert(&covariance)? * residual).x;
+        normalised_square.is_finite().then_some(Self { residual, covariance, normalised_square })
+    }
+}
+
 impl Ekf {
     /// A pose that is known with these standard deviations, m and rad.
     #[must_use]
@@ -70,13 +79,7 @@ impl Ekf {
     pub fn innovation(&self, observation: &Linearisation) -> Option<Innovation> {
         let covariance =
             observation.jacobian * self.covariance * observation.jacobian.transpose() + observation.covariance;
-        let information = invert(&covariance)?;
-        let normalised_square = (observation.residual.transpose() * information * observation.residual).x;
-        normalised_square.is_finite().then_some(Innovation {
-            residual: observation.residual,
-            covariance,
-            normalised_square,
-        })
+        Innovation::new(observation.residual, covariance)
     }
 
     /// Correction, K 5.5 to 5.7, the last in Joseph's form, which stays symmetric and positive whatever the gain. False,

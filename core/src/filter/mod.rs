@@ -1,15 +1,23 @@
 //! The extended Kalman filter of the pose (K 5.3).
 
+mod augmented;
+mod augmented_observation;
 mod cartesian;
 mod consistency;
 mod ekf;
 mod observation;
+mod packed_covariance;
 mod range_bearing;
+mod sparse_linearisation;
 mod timeline;
 
+pub use augmented::{Augmented, BiasDeviations, augmented_states};
+pub use augmented_observation::RelativePose;
 pub use cartesian::Cartesian;
 pub use consistency::{Consistency, ConsistencyParameters};
 pub use ekf::{Ekf, Innovation};
 pub use observation::{Linearisation, Observation};
+pub use packed_covariance::{PackedCovariance, packed_entries};
 pub use range_bearing::RangeBearing;
+pub use sparse_linearisation::{SparseLinearisation, TERMS};
 pub use timeline::{Correction, Timeline, TimelineError};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 
-use super::Linearisation;
+use super::{Cartesian, Linearisation};
 use crate::geometry::{Point, Pose, difference};
 
 /// Nearer than this, m, the direction of a landmark means nothing.
@@ -22,6 +22,23 @@ pub struct RangeBearing {
 }
 
 impl RangeBearing {
+    /// The same as a position.
+    #[must_use]
+    pub fn cartesian(&self) -> Cartesian {
+        let (sine, cosine) = libm::sincos(self.bearing);
+        let across = self.range * self.range * self.bearing_variance;
+        let both = (self.range_variance - across) * sine * cosine;
+        Cartesian {
+            position: Point::new(self.range * cosine, self.range * sine),
+            covariance: Matrix2::new(
+                self.range_variance * cosine * cosine + across * sine * sine,
+                both,
+                both,
+                self.range_variance * sine * sine + across * cosine * cosine,
+            ),
+        }
+    }
+
     /// K 5.14 to 5.16, which are printed for a sensor at the logical point; here the sensor sits at `laser`.
     pub(super) fn linearise(
         &self,

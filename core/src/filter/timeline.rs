@@ -35,8 +35,17 @@ pub enum TimelineError {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     motion: Motion,
-    correction: Option<Correction>,
+    fusion: Fusion,
     state: Ekf,
+}
+
+/// What happened at the end of a motion.
+#[derive(Clone, Copy, Debug)]
+enum Fusion {
+    Nothing,
+    Correction(Correction),
+    /// The state was given by a filter that knows more.
+    State(Ekf),
 }
 
 impl Entry {
@@ -45,9 +54,13 @@ impl Entry {
     }
 
     fn recompute(&mut self, before: &Ekf, laser: &Pose) {
+        if let Fusion::State(state) = &self.fusion {
+            self.state = *state;
+            return;
+        }
         self.state = *before;
         self.state.predict(&self.motion);
-        if let Some(correction) = &self.correction {
+        if let Fusion::Correction(correction) = &self.fusion {
             correction.apply(&mut self.state, laser);
         }
     }
@@ -98,7 +111,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     pub fn begin(&mut self, time: Time, state: Ekf) {
         self.entries.clear();
         // A ring without room would be useless but not unsound.
-        let _ = self.entries.push_back(Entry { motion: Motion::none(time), correction: None, state });
+        let _ = self.entries.push_back(Entry { motion: Motion::none(time), fusion: Fusion::Nothing, state });
         self.settled = 1;
         self.ahead = None;
         self.last_motion = Motion::none(time);
@@ -190,13 +203,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         self.settle(position + 1);
         let mut state = self.entries.get(position).ok_or(TimelineError::TooLate)?.state;
-        let (motion, rest) = match self.entries.get(position + 1) {
-            Some(next) => {
-                let (first, second) = next.motion.split(time);
-                (first, Some(second))
-            }
-            None => (self.extrapolation(time)?, None),
-        };
+        let (motion, rest) = self.motion_to(position, time)?;
         state.predict(&motion);
         let Some(correction) = choose(&state) else {
             return Ok(false);
@@ -204,38 +211,71 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         if !correction.apply(&mut state, &self.laser) {
             return Ok(false);
         }
-        if rest.is_none() {
-            let (assumed, _) = self.ahead.unwrap_or((Pose::default(), time));
-            self.ahead = Some((assumed.compose(&motion.displacement), time));
+        self.divide(position, (motion, rest), Fusion::Correction(correction), state);
+        Ok(true)
+    }
+
+    /// Sets the state at `time` to what another filter has found; what followed is computed again.
+    ///
+    /// # Errors
+    /// See [`TimelineError`].
+    pub fn set_state(&mut self, time: Time, state: Ekf) -> Result<(), TimelineError> {
+        let position = self.position(time).ok_or(TimelineError::TooLate)?;
+        let parts = self.motion_to(position, time)?;
+        self.divide(position, parts, Fusion::State(state), state);
+        Ok(())
+    }
+
+    /// The motion from the entry at `position` to `time`, and what remains of it to the entry that follows, if one does.
+    fn motion_to(&self, position: usize, time: Time) -> Result<(Motion, Option<Motion>), TimelineError> {
+        match self.entries.get(position + 1) {
+            Some(next) => {
+                let (first, second) = next.motion.split(time);
+                Ok((first, Some(second)))
+            }
+            None => Ok((self.extrapolation(time)?, None)),
         }
-        let position = self.insert(position + 1, Entry { motion, correction: Some(correction), state });
+    }
+
+    /// Puts an entry with that state behind the one at `position`, at the end of the first part of the motion.
+    fn divide(&mut self, position: usize, (motion, rest): (Motion, Option<Motion>), fusion: Fusion, state: Ekf) {
+        if rest.is_none() {
+            let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
+            self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
+        }
+        let position = self.insert(position + 1, Entry { motion, fusion, state });
         if let (Some(rest), Some(next)) = (rest, self.entries.get_mut(position + 1)) {
             next.motion = rest;
         }
         self.settled = position + 1;
-        Ok(true)
     }
 
     /// The displacement of R from `from` to each of the entries up to `to`, as pairs of time and pose in R at `from`,
     /// beginning with `from` itself. The odometry alone decides: corrections leave no step in it.
     pub fn relative_path<'a>(&'a self, from: Time, to: Time) -> impl Iterator<Item = (Time, Pose)> + 'a {
-        let position = self.position(from).unwrap_or(0);
         let mut pose = Pose::default();
+        core::iter::once((from, pose)).chain(self.motions(from, to).map(move |motion| {
+            pose = pose.compose(&motion.displacement);
+            (motion.end, pose)
+        }))
+    }
+
+    /// The motions between two times, as far as they are remembered.
+    pub fn motions(&self, from: Time, to: Time) -> impl Iterator<Item = Motion> + '_ {
+        let position = self.position(from).unwrap_or(0);
         let mut is_first = true;
         let within = self.entries.iter().skip(position + 1).map(|entry| entry.motion);
         let beyond = (to > self.now()).then(|| self.last_motion_until(to));
         let mut reached = false;
-        core::iter::once((from, pose)).chain(within.chain(beyond).map_while(move |motion| {
+        within.chain(beyond).map_while(move |motion| {
             if reached {
                 return None;
             }
             let motion =
                 if core::mem::take(&mut is_first) && motion.start < from { motion.split(from).1 } else { motion };
             reached = motion.end >= to;
-            let motion = if motion.end > to { motion.split(to).0 } else { motion };
-            pose = pose.compose(&motion.displacement);
-            Some((motion.end, pose))
-        }))
+            Some(if motion.end > to { motion.split(to).0 } else { motion })
+        })
     }
 
     fn last_motion_until(&self, time: Time) -> Motion {
@@ -259,7 +299,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     fn append(&mut self, motion: Motion) {
         let state = self.state();
         self.make_room();
-        let mut entry = Entry { motion, correction: None, state };
+        let mut entry = Entry { motion, fusion: Fusion::Nothing, state };
         entry.recompute(&state, &self.laser);
         let _ = self.entries.push_back(entry);
         self.settled = self.entries.len();

@@ -11,6 +11,8 @@ const REACH: i64 = 4;
 #[derive(Clone, Debug)]
 pub struct Grid<const POINTS: usize> {
     cell: f64,
+    /// A corner of the first cell: that of the map's first point, as maps may lie far from the origin of W.
+    corner: Point,
     /// Row, column and number of each point, in that order.
     places: Vec<(i16, i16, u16), POINTS>,
 }
@@ -19,14 +21,18 @@ impl<const POINTS: usize> Grid<POINTS> {
     /// An empty index with cells of `cell` metres.
     #[must_use]
     pub const fn new(cell: f64) -> Self {
-        Self { cell, places: Vec::new() }
+        Self { cell, corner: Point::new(0.0, 0.0), places: Vec::new() }
     }
 
     /// Sorts the points, m, into cells. Points beyond the capacity are left out.
     pub fn build(&mut self, points: impl Iterator<Item = Point>) {
         self.places.clear();
         for (number, point) in points.take(POINTS.min(usize::from(u16::MAX))).enumerate() {
-            let _ = self.places.push((self.line(point.y), self.line(point.x), number as u16));
+            if number == 0 {
+                self.corner = point;
+            }
+            let (row, column) = self.place(&point);
+            let _ = self.places.push((row, column, number as u16));
         }
         self.places.sort_unstable();
     }
@@ -35,27 +41,31 @@ impl<const POINTS: usize> Grid<POINTS> {
     /// within `radius`, and some that are not. The radius counts as at most four cells.
     pub fn near(&self, point: Point, radius: f64) -> impl Iterator<Item = usize> {
         let radius = radius.min(self.cell * (REACH - 1) as f64);
-        let rows = (self.line(point.y - radius), self.line(point.y + radius));
-        let columns = (self.line(point.x - radius), self.line(point.x + radius));
-        (0..2 * REACH as i16).map_while(move |offset| rows.0.checked_add(offset).filter(|row| *row <= rows.1)).flat_map(
-            move |row| {
-                let first = self.places.partition_point(|place| (place.0, place.1) < (row, columns.0));
-                self.places
-                    .get(first..)
-                    .unwrap_or_default()
-                    .iter()
-                    .take_while(move |place| place.0 == row && place.1 <= columns.1)
-                    .map(|place| usize::from(place.2))
-            },
-        )
+        let (first_row, first_column) = self.place(&(point - Point::repeat(radius)));
+        let (last_row, last_column) = self.place(&(point + Point::repeat(radius)));
+        let rows =
+            (0..2 * REACH as i16).map_while(move |step| first_row.checked_add(step).filter(|row| *row <= last_row));
+        rows.flat_map(move |row| {
+            let first = self.places.partition_point(|place| (place.0, place.1) < (row, first_column));
+            self.places
+                .get(first..)
+                .unwrap_or_default()
+                .iter()
+                .take_while(move |place| place.0 == row && place.1 <= last_column)
+                .map(|place| usize::from(place.2))
+        })
     }
 
-    /// The row or column of a coordinate, m. What lies further away than 32767 cells is all in the last one.
-    fn line(&self, coordinate: f64) -> i16 {
-        let place = coordinate / self.cell;
-        let towards_zero = place as i32;
-        // Rounding down by hand costs a tenth of the general function.
-        let down = if f64::from(towards_zero) > place { towards_zero.saturating_sub(1) } else { towards_zero };
-        down.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
+    /// Row and column of a point.
+    fn place(&self, point: &Point) -> (i16, i16) {
+        let offset = (point - self.corner) / self.cell;
+        (round_down(offset.y), round_down(offset.x))
     }
+}
+
+/// The whole number below, as far as there are rows and columns: by hand, at a tenth of the general function's cost.
+fn round_down(number: f64) -> i16 {
+    let towards_zero = number as i32;
+    let down = if f64::from(towards_zero) > number { towards_zero.saturating_sub(1) } else { towards_zero };
+    down.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
 }

@@ -5,6 +5,7 @@ use nalgebra::Matrix2;
 
 use super::maps::{Association, Maps};
 use super::output::OBSERVATIONS;
+use super::slam::{SLAM_ENTRIES, SLAM_STATES, Seen, Slam, cartesian};
 use super::{Event, LandmarkSource, LandmarkUse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, detect_reflectors, falko};
 use crate::filter::{Cartesian, Consistency, Ekf, Observation, RangeBearing, Timeline};
@@ -14,23 +15,30 @@ use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
-const ENTRIES: usize = 128;
+const PAST: usize = 128;
 
 /// Localises one vehicle. All of its memory is in this value.
 ///
 /// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, and `DYNAMIC` landmarks
-/// that are found while driving.
+/// that are found while driving; in the filter's state for `KEYS` past poses and `LANDMARKS` landmarks, which make `STATES`
+/// states and `ENTRIES` entries of their covariance ([`crate::filter::augmented_states`],
+/// [`crate::filter::packed_entries`]).
 #[derive(Clone, Debug)]
 pub struct Localizer<
     const BEAMS: usize = 1440,
     const REFLECTORS: usize = 1000,
     const FEATURES: usize = 1000,
     const DYNAMIC: usize = 256,
+    const KEYS: usize = 4,
+    const LANDMARKS: usize = 64,
+    const STATES: usize = SLAM_STATES,
+    const ENTRIES: usize = SLAM_ENTRIES,
 > {
     parameters: Parameters,
     odometer: Odometer,
     maps: Maps<REFLECTORS, FEATURES, DYNAMIC>,
-    timeline: Timeline<ENTRIES>,
+    timeline: Timeline<PAST>,
+    slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
     consistency: Consistency,
     lost: Option<Reason>,
     blindness: Option<Blindness>,
@@ -56,6 +64,8 @@ struct Sighting {
     time: Time,
     kind: LandmarkKind,
     observation: Observation,
+    /// Direction of a feature in S, rad.
+    orientation: f32,
     /// What is left to do for the dynamic map: the landmark that it belongs to, or none if it is new.
     matched: Option<u16>,
     verdict: Verdict,
@@ -90,8 +100,16 @@ impl DistanceSince {
     }
 }
 
-impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize>
-    Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC>
+impl<
+    const BEAMS: usize,
+    const REFLECTORS: usize,
+    const FEATURES: usize,
+    const DYNAMIC: usize,
+    const KEYS: usize,
+    const LANDMARKS: usize,
+    const STATES: usize,
+    const ENTRIES: usize,
+> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
@@ -120,6 +138,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                 dynamic: DynamicMap::new(parameters.dynamic_map),
             },
             timeline: Timeline::new(parameters.laser, parameters.limits.longest_extrapolation),
+            slam: Slam::new(&parameters.slam),
             consistency: Consistency::new(parameters.consistency),
             lost: None,
             blindness: None,
@@ -199,7 +218,11 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             Event::Reflectors(reflectors) if self.parameters.maps.reflectors => {
                 self.workspace.sightings.clear();
                 see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
-                self.fuse();
+                if self.parameters.maps.slam {
+                    self.fuse_reflectors_by_slam();
+                } else {
+                    self.fuse();
+                }
             }
             Event::Reflectors(_) => {}
             Event::Scan(scan) => self.scan(scan),
@@ -215,6 +238,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
         self.timeline.begin(fix.time, state);
+        self.slam.begin(fix.time, &state);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
         self.blindness =
@@ -231,6 +255,11 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             // A pose may be given for a time between two samples; only what follows it counts.
             Ok(motion) if motion.end > timeline.start() => {
                 let motion = if motion.start < timeline.start() { motion.split(timeline.start()).1 } else { motion };
+                let motion = if self.parameters.maps.slam {
+                    motion.corrected(&self.slam.bias(), self.parameters.vehicle.steering_lever())
+                } else {
+                    motion
+                };
                 self.blindness = None;
                 self.distance.advance(motion.distance);
                 timeline.advance(&motion);
@@ -278,7 +307,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
         };
         let workspace = &mut self.workspace;
         let maps = self.parameters.maps;
-        if maps.features || maps.dynamic {
+        if maps.features || maps.dynamic || maps.slam {
             workspace.path.set(scan.start, &self.parameters.laser, timeline.relative_path(scan.start, scan.end()));
         }
         if let Some(detection) = &self.parameters.reflectors.detection
@@ -288,9 +317,15 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
             detect_reflectors(scan, detection, &mut workspace.reflectors);
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
-            self.fuse();
+            if maps.slam {
+                self.fuse_reflectors_by_slam();
+            } else {
+                self.fuse();
+            }
         }
-        if maps.features || maps.dynamic {
+        if maps.slam {
+            self.fuse_scan_by_slam(scan);
+        } else if maps.features || maps.dynamic {
             self.workspace.see_features(&self.parameters, scan);
             self.fuse();
             self.update_dynamic_map();
@@ -357,6 +392,114 @@ impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const D
                     .nearest
                     .map_or(0.0, |landmark| landmark.innovation.normalised_square / self.parameters.association.gate),
             });
+        }
+        self.consistency.add(expected, accepted, used, square_sum);
+        if self.consistency.is_rejecting() {
+            self.lost = Some(Reason::LandmarksRejected);
+        } else if self.consistency.is_surprised() {
+            self.lost = Some(Reason::InnovationsTooLarge);
+        }
+    }
+
+    /// Fuses the reflectors of the workspace, all at the time of the one in the middle.
+    fn fuse_reflectors_by_slam(&mut self) {
+        let sightings = &self.workspace.sightings;
+        let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
+        let (start, end) = (first.time, last.time);
+        let time = start.offset(0.5 * end.since(start));
+        let Some(timeline) = self.timeline.begun() else { return };
+        self.workspace.path.set(start, &self.parameters.laser, timeline.relative_path(start, end));
+        if self.begin_slam(time, end) {
+            self.fuse_by_slam(start);
+            self.end_slam();
+        }
+    }
+
+    /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
+    fn fuse_scan_by_slam(&mut self, scan: &Scan) {
+        self.workspace.see_features(&self.parameters, scan);
+        if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
+            return;
+        }
+        if !self.slam.wants_scan(&self.parameters.slam) {
+            return;
+        }
+        let place = self.workspace.path.place(self.slam.time().since(scan.start));
+        self.slam.align(&self.workspace.points, &place, &self.parameters);
+        self.fuse_by_slam(scan.start);
+        self.slam.finish(&self.parameters.slam);
+        self.slam.keep(&self.workspace.points, &place, &self.parameters);
+        self.end_slam();
+    }
+
+    /// Brings the filter to `time`, or where it is if that is later, but not beyond `latest`. False if it cannot be there.
+    fn begin_slam(&mut self, time: Time, latest: Time) -> bool {
+        let Some(timeline) = self.timeline.begun().filter(|_| self.lost.is_none()) else { return false };
+        if self.slam.time() > latest {
+            return false;
+        }
+        self.slam.advance(time, timeline, self.parameters.vehicle.steering_lever());
+        true
+    }
+
+    fn end_slam(&mut self) {
+        // The filter's time is one that the timeline remembers.
+        let _ = self.timeline.set_state(self.slam.time(), self.slam.state());
+    }
+
+    /// Fuses the sightings of the workspace at the filter's time; its path begins at `start`.
+    fn fuse_by_slam(&mut self, start: Time) {
+        let (mut expected, mut accepted, mut used, mut square_sum) = (0, 0, 0, 0.0);
+        let now = self.slam.time().since(start);
+        let path = &self.workspace.path;
+        for sighting in &mut self.workspace.sightings {
+            let mut seen = cartesian(&sighting.observation);
+            seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
+            let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
+            let fate = self.slam.see(&seen, &self.maps, &self.parameters);
+            let is_reflector = sighting.kind == LandmarkKind::Reflector;
+            let is_accepted = fate.verdict == Verdict::Accepted;
+            let is_fixed = fate.landmark.is_none_or(|(source, ..)| source == LandmarkSource::Fixed);
+            if is_fixed && fate.verdict != Verdict::Ambiguous && (is_reflector || fate.landmark.is_some()) {
+                expected += 1;
+                accepted += usize::from(is_accepted);
+            }
+            if let Some((_, _, innovation)) = fate.landmark.filter(|_| is_accepted) {
+                used += 1;
+                square_sum += innovation.normalised_square;
+                if is_reflector {
+                    self.distance.reflector = 0.0;
+                } else {
+                    self.distance.feature = 0.0;
+                }
+            }
+            sighting.verdict = fate.verdict;
+            let position = sighting.observation.position();
+            let _ = self.outputs.uses.push(LandmarkUse {
+                time: sighting.time,
+                kind: sighting.kind,
+                landmark: fate.landmark.map(|(source, id, _)| (source, id)),
+                verdict: fate.verdict,
+                position: [position.x as f32, position.y as f32],
+                located: fate.located.into(),
+                residual: fate.landmark.map_or([0.0; 2], |(_, _, innovation)| innovation.residual.into()),
+                residual_deviation: fate.landmark.map_or([0.0; 2], |(_, _, innovation)| {
+                    [libm::sqrt(innovation.covariance.m11), libm::sqrt(innovation.covariance.m22)]
+                }),
+                test_ratio: fate
+                    .landmark
+                    .map_or(0.0, |(_, _, innovation)| innovation.normalised_square / self.parameters.association.gate),
+            });
+        }
+        // What fits no landmark is new, once the whole scan has corrected the pose.
+        for sighting in &self.workspace.sightings {
+            if sighting.kind != LandmarkKind::Reflector && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated)
+            {
+                let mut seen = cartesian(&sighting.observation);
+                seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
+                let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
+                self.slam.discover(&seen, &self.parameters);
+            }
         }
         self.consistency.add(expected, accepted, used, square_sum);
         if self.consistency.is_rejecting() {
@@ -456,6 +599,7 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
                     position,
                     covariance: Matrix2::new(xx + added, xy, xy, yy + added),
                 }),
+                orientation: keypoint.orientation,
                 matched: None,
                 verdict: Verdict::Unknown,
             });
@@ -485,6 +629,7 @@ fn see_reflectors(
             time: observation.time,
             kind: LandmarkKind::Reflector,
             observation: observation_model,
+            orientation: 0.0,
             matched: None,
             verdict: Verdict::Unknown,
         });

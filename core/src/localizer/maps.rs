@@ -54,7 +54,7 @@ impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> Maps<
         kind: LandmarkKind,
         observation: &Observation,
     ) -> Association {
-        let MapUse { reflectors, features, dynamic } = parameters.maps;
+        let MapUse { reflectors, features, dynamic, .. } = parameters.maps;
         let seen = observation.locate(&state.pose, &parameters.laser);
         let association = &parameters.association;
         let compare = |source, id, position: Point, variance: f64| -> Option<Candidate> {

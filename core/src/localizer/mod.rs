@@ -6,6 +6,7 @@ mod maps;
 mod output;
 mod output_predictor;
 mod parameters;
+mod slam;
 mod start_finder;
 
 pub use event::Event;
@@ -14,6 +15,7 @@ pub use output::{LandmarkSource, LandmarkUse, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
 
+pub use slam::{KeyScanParameters, SLAM_ENTRIES, SLAM_STATES, SlamParameters};
 pub use start_finder::{StartFinder, StartState};
 
 pub use crate::measurement::PoseFix;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::slam::SlamParameters;
 use crate::features::{ReflectorDetection, falko};
 use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
@@ -29,6 +30,8 @@ pub struct Parameters {
     pub association: AssociationParameters,
     /// The map that is made while driving.
     pub dynamic_map: DynamicMapParameters,
+    /// The map that is part of the filter's state.
+    pub slam: SlamParameters,
     /// When the evidence is against the pose.
     pub consistency: ConsistencyParameters,
     /// When the vehicle is dead reckoning, and when it is lost.
@@ -49,6 +52,7 @@ impl Parameters {
             features: FeatureParameters::default(),
             association: AssociationParameters::default(),
             dynamic_map: DynamicMapParameters::default(),
+            slam: SlamParameters::default(),
             consistency: ConsistencyParameters::default(),
             limits: Limits::default(),
         }
@@ -63,13 +67,15 @@ pub struct MapUse {
     pub reflectors: bool,
     /// The fixed map of natural features.
     pub features: bool,
-    /// The dynamic map of natural features.
+    /// The dynamic map of natural features (Algorithm 1 of K).
     pub dynamic: bool,
+    /// Landmarks, calibration and past poses in the state of the filter; the dynamic map is then not used.
+    pub slam: bool,
 }
 
 impl Default for MapUse {
     fn default() -> Self {
-        Self { reflectors: true, features: true, dynamic: false }
+        Self { reflectors: true, features: true, dynamic: false, slam: false }
     }
 }
 

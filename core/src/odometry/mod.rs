@@ -1,5 +1,6 @@
 //! The vehicle's own account of its motion.
 
+mod bias;
 mod coasting;
 mod counter;
 mod integration;
@@ -8,6 +9,7 @@ mod noise;
 mod odometer;
 mod vehicle;
 
+pub use bias::{BiasJacobian, OdometryBias};
 pub use coasting::Coasting;
 pub use counter::CounterRange;
 pub use integration::{Control, Integration};

@@ -16,7 +16,9 @@ mod recognition;
 mod reflectors;
 mod scan_alignment;
 mod scan_overlap;
+mod surface_alignment;
 mod surface_relations;
+mod surface_scan;
 
 pub use alignment::{Alignment, align};
 pub use correspondence::{Correspondence, common_points, refine};
@@ -33,4 +35,6 @@ pub use reflectors::{
 };
 pub use scan_alignment::{ScanAlignment, ScanAlignmentParameters, align_scans};
 pub use scan_overlap::{Overlap, OverlapParameters, overlap};
+pub use surface_alignment::{SurfaceAlignmentParameters, align_to_surfaces};
 pub use surface_relations::surface_normal;
+pub use surface_scan::{Surface, SurfaceParameters, SurfaceScan};

@@ -21,6 +21,7 @@ use anyhow::Context;
 use serde_json::json;
 
 use super::encoder_arguments::node;
+use super::output::note;
 
 const HELP: &str = "\
 A bus is an interface of SocketCAN, or an adapter that speaks SLCAN.
@@ -355,7 +356,7 @@ impl ServeEncoders {
         let log = self.log.as_ref().context("neither a scenario nor a log")?;
         let (recording, damages) = agv_host_sim::log::read(log)?;
         if !damages.is_empty() {
-            eprintln!("{}: {} places are damaged", log.display(), damages.len());
+            note(&format!("{}: {} places are damaged", log.display(), damages.len()));
         }
         Ok(recording)
     }

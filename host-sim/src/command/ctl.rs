@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use agv_core::geometry::Pose;
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, Setting};
+use agv_host_sim::link::with_port;
 use agv_settings::leaf::Value;
 use anyhow::{Context, bail};
-use indicatif::ProgressBar;
 use serde_json::json;
 
 use super::output::print_rows;
+use super::progress;
 
 const HELP: &str = "\
 Reading needs nothing; changing needs the controller's key (64 hexadecimal digits in a file) and a vehicle that stands.
@@ -177,7 +178,7 @@ impl Ctl {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let key = self.key.as_deref().map(read_key).transpose()?;
-        let host = if self.host.contains(':') { self.host.clone() } else { format!("{}:{PORT}", self.host) };
+        let host = with_port(&self.host, PORT);
         let mut client = Client::connect(&host, key)?;
         match &self.action {
             Action::Version => {
@@ -198,7 +199,7 @@ impl Ctl {
             Action::Store => client.store()?,
             Action::Map { action: MapAction::Upload { file } } => {
                 let landmarks = layout_file::landmarks(&layout_file::load(file)?);
-                let progress = ProgressBar::new(landmarks.len() as u64);
+                let progress = progress::bar("uploading", landmarks.len() as u64);
                 client.upload_map(&landmarks, |count| progress.inc(count as u64))?;
                 progress.finish_and_clear();
                 self.print(&[["landmarks".to_owned(), landmarks.len().to_string()]])?;

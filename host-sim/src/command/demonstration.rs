@@ -6,8 +6,9 @@ use agv_host_sim::evaluate::demonstration::{self, LocalisedDrive};
 use agv_host_sim::evaluate::drive::Figures;
 use agv_host_sim::log;
 use anyhow::Context;
-use indicatif::ProgressBar;
 use serde::Serialize;
+
+use super::progress;
 
 /// One drive, localised in four ways.
 #[derive(clap::Args)]
@@ -30,7 +31,7 @@ struct Entry<'a> {
 impl Demonstration {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let spinner = ProgressBar::new_spinner();
+        let spinner = progress::spinner();
         let drives = demonstration::run(|doing| {
             spinner.set_message(doing);
             spinner.tick();

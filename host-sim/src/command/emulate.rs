@@ -8,18 +8,21 @@ use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
 use anyhow::{Context, bail};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressStyle;
 use serde::Serialize;
 
-use super::output::print_rows;
+use super::output::{note, print_rows};
+use super::progress;
 
 const HELP: &str = "\
 The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
-replayed here afterwards, and must give the same bits. In the repository, `cargo xtask emulate` builds the firmware first.
+replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that
+is printed. In the repository, `cargo xtask emulate` builds the firmware first.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
   agv emulate --image vehicle --scenario host-sim/scenarios/warehouse_hall.toml --seconds 30 --json
+  agv emulate --image vehicle --untold --seconds 10
   agv emulate --image vehicle --folder /tmp/vehicle && defmt-print -e vehicle < /tmp/vehicle/defmt.bin";
 
 /// Drive a vehicle whose controller runs the firmware in emulation
@@ -38,6 +41,9 @@ pub struct Emulate {
     /// Folder for the board's files: flash.bin, defmt.bin, stream.agvlog. A temporary one if absent.
     #[arg(long)]
     folder: Option<PathBuf>,
+    /// Do not tell the vehicle where it is: it finds itself by its reflectors.
+    #[arg(long)]
+    untold: bool,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -66,7 +72,8 @@ impl Emulate {
         let folder = self.folder.clone().unwrap_or_else(|| temporary.clone());
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let folder = folder.canonicalize()?;
-        let options = VehicleOptions { image: &image, folder: &folder, key: None, provision: true };
+        let options =
+            VehicleOptions { image: &image, folder: &folder, key: None, provision: true, is_told: !self.untold };
         let outcome = self.drive(&recording, &options);
         if self.folder.is_none() {
             // What cannot be removed is left to the system.
@@ -118,10 +125,11 @@ impl Emulate {
     }
 }
 
-/// Shows the pose while the vehicle drives, on a terminal only.
+/// Says where the drive can be seen, and shows the pose while the vehicle drives, on a terminal only.
 fn look(watch: &Watch) {
+    note(&format!("see it live: agv view --live 127.0.0.1:{}", watch.stream_port));
     let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
-    let progress = ProgressBar::new_spinner().with_style(style);
+    let progress = progress::spinner().with_style(style);
     while !watch.is_over() {
         let driven = watch.driven().map_or(0.0, |time| time.as_secs_f64());
         let line = watch.pose().map_or_else(

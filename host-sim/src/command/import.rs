@@ -4,8 +4,9 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use agv_core::geometry::Pose;
 use agv_host_sim::import::raw::{self, RawBytes};
-use agv_host_sim::import::{self, ScanLog, candump, capture, carmen, carpark, graph_log, sapienza};
+use agv_host_sim::import::{self, ScanLog, candump, capture, carmen, carpark, graph_log, ros, sapienza};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
@@ -15,6 +16,9 @@ use indicatif::ProgressBar;
 
 use super::encoder_arguments::EncoderArguments;
 use super::like;
+use super::output::note;
+use super::pose_argument;
+use super::progress;
 use super::summary::Summary;
 
 const HELP: &str = "\
@@ -23,6 +27,8 @@ Examples:
   agv import carpark shared/data/carpark --output carpark.agvlog
   agv import candump candump-2026-05-04.log --like hall.agvlog --output encoders.agvlog
   agv import capture nav350.pcapng --like hall.agvlog --output laser.agvlog
+  agv import mcap drive.mcap --output drive.agvlog
+  agv import rosbag2 rosbag2_2026_05_04 --scan-topic /front/scan --laser 1.2,0,0 --output drive.agvlog
   agv import raw drive.agvlog --output again.agvlog";
 
 /// Turn the recordings of others into logs.
@@ -31,7 +37,7 @@ Examples:
 pub struct Import {
     /// What the input is.
     format: Format,
-    /// File, or for the car park the folder of its tables.
+    /// File, or for the car park and rosbag2 a folder.
     input: PathBuf,
     /// Where the log goes; an older one is replaced.
     #[arg(short, long, value_name = "LOG")]
@@ -44,6 +50,15 @@ pub struct Import {
     port: Option<u16>,
     #[command(flatten)]
     encoders: EncoderArguments,
+    /// Topic of the laser in a recording of ROS 2 that has several.
+    #[arg(long, value_name = "TOPIC")]
+    scan_topic: Option<String>,
+    /// Topic of the odometry in a recording of ROS 2 that has several.
+    #[arg(long, value_name = "TOPIC")]
+    odometry_topic: Option<String>,
+    /// Where the laser is on the vehicle, m, m and deg, for recordings of ROS 2; as their transforms say if absent.
+    #[arg(long, value_name = "X,Y,HEADING", value_parser = pose_argument::pose, allow_hyphen_values = true)]
+    laser: Option<Pose>,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -63,6 +78,10 @@ enum Format {
     Candump,
     /// Network capture, pcap or pcapng: what a NAV350 and its host said over TCP.
     Capture,
+    /// MCAP file with messages of ROS 2: LaserScan and Odometry.
+    Mcap,
+    /// Recording of rosbag2, folder or file, stored as MCAP or SQLite: LaserScan and Odometry.
+    Rosbag2,
     /// Log of this program: its events are made anew of the raw bytes in it.
     Raw,
     /// Pose graph with scans: VERTEX2, ROBOTLASER1, EDGE2. Its corrected poses serve as odometry.
@@ -77,12 +96,13 @@ impl Import {
             stated => stated,
         };
         // Shown on a terminal only, and gone when an error is reported.
-        let progress = ProgressBar::new_spinner().with_message(format!("reading {}", self.input.display()));
+        let progress = progress::spinner().with_message(format!("reading {}", self.input.display()));
         progress.enable_steady_tick(Duration::from_millis(100));
         let recording = match format {
             Format::Candump => return self.import_raw(&progress, candump_bytes(&self.input)?),
             Format::Capture => return self.import_raw(&progress, self.capture()?),
             Format::Raw => self.raw_drive()?,
+            Format::Mcap | Format::Rosbag2 => ros::read(&self.input, &self.ros_choice())?,
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
             Format::Carmen => drive(&self.input, "CARMEN", &carmen::read(&self.input)?.front)?,
@@ -106,18 +126,22 @@ impl Import {
         Summary::of(&drive).print(self.json)
     }
 
+    fn ros_choice(&self) -> ros::Choice {
+        ros::Choice { scan: self.scan_topic.clone(), odometry: self.odometry_topic.clone(), laser: self.laser }
+    }
+
     fn capture(&self) -> anyhow::Result<Vec<RawBytes>> {
         let ports = self.port.map_or(capture::PORTS.to_vec(), |port| vec![port]);
         let found = capture::read(&self.input, &ports)?;
         let input = self.input.display();
         if found.lost > 0 {
-            eprintln!("agv: {input}: {} bytes of the connection were not captured", found.lost);
+            note(&format!("agv: {input}: {} bytes of the connection were not captured", found.lost));
         }
         if found.left_out > 0 {
-            eprintln!("agv: {input}: {} connections beside the main one are left out", found.left_out);
+            note(&format!("agv: {input}: {} connections beside the main one are left out", found.left_out));
         }
         if found.is_cut {
-            eprintln!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets);
+            note(&format!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets));
         }
         Ok(found.raw)
     }
@@ -125,7 +149,7 @@ impl Import {
     fn raw_drive(&self) -> anyhow::Result<Recording> {
         let (recording, damages) = raw::read_drive(&self.input, &self.encoders.nodes())?;
         for damage in &damages {
-            eprintln!("agv: {}: {damage}", self.input.display());
+            note(&format!("agv: {}: {damage}", self.input.display()));
         }
         if recording.events.is_empty() {
             bail!("{}: there are no raw bytes in the log that mean anything", self.input.display());
@@ -156,7 +180,10 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
         if input.join("laser_ranges_m.csv").exists() {
             return Ok(Format::Carpark);
         }
-        bail!("{}: this folder does not hold the car park tables", input.display());
+        if input.join("metadata.yaml").exists() {
+            return Ok(Format::Rosbag2);
+        }
+        bail!("{}: this folder holds neither the car park tables nor a recording of rosbag2", input.display());
     }
     let beginning = beginning(input).with_context(|| input.display().to_string())?;
     if beginning.is_empty() {
@@ -164,6 +191,12 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
     }
     if file_kind::describe(&beginning).starts_with("a network capture") {
         return Ok(Format::Capture);
+    }
+    if beginning.starts_with(b"\x89MCAP") {
+        return Ok(Format::Mcap);
+    }
+    if beginning.starts_with(b"SQLite format 3") {
+        return Ok(Format::Rosbag2);
     }
     let mut unpacked = Vec::new();
     // What is not compressed, or cut, is looked at as far as it goes.

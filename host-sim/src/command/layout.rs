@@ -3,15 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Point;
-use agv_core::landmarks::LandmarkKind;
-use agv_host_sim::layout_check::{CheckOptions, Finding, REFLECTORS, check};
+use agv_core::localizer::ReflectorParameters;
+use agv_host_sim::layout_check::{CheckOptions, Finding, REFLECTORS, check, page};
 use agv_host_sim::layout_file;
 use agv_host_sim::mapping::map_file;
+use anyhow::Context;
 
 use super::output;
 
+const EXAMPLES: &str = "\
+Examples:
+  agv layout check hall.imk --report hall
+  agv layout convert hall.imk hall.dxf
+  agv layout convert drawing.dxf hall.csv --map";
+
 /// Look at a layout of reflectors.
 #[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub struct Layout {
     #[command(subcommand)]
     action: Action,
@@ -20,6 +28,39 @@ pub struct Layout {
 #[derive(clap::Subcommand)]
 enum Action {
     Check(Check),
+    Convert(Convert),
+}
+
+/// From one file to another: .imk, .csv or .dxf, as the ending of the name says
+#[derive(clap::Args)]
+struct Convert {
+    /// File to read; a map of this program (.csv), too.
+    input: PathBuf,
+    /// File to write; an older one is replaced.
+    output: PathBuf,
+    /// Write a map, as 'agv replay --map' takes it, instead of a layout.
+    #[arg(long)]
+    map: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Convert {
+    fn run(self) -> anyhow::Result<()> {
+        let layout = layout_file::load(&self.input)?;
+        if self.map {
+            map_file::write(&self.output, &layout_file::landmarks(&layout))?;
+        } else {
+            layout_file::save(&self.output, &layout)?;
+        }
+        if self.json {
+            println!("{}", serde_json::json!({ "landmarks": layout.len() }));
+        } else {
+            output::print_rows(&[["landmarks".to_owned(), layout.len().to_string()]]);
+        }
+        Ok(())
+    }
 }
 
 impl Layout {
@@ -27,6 +68,7 @@ impl Layout {
     pub fn run(self) -> anyhow::Result<()> {
         match self.action {
             Action::Check(check) => check.run(),
+            Action::Convert(convert) => convert.run(),
         }
     }
 }
@@ -38,15 +80,17 @@ the layout resembles itself: a reflector more, or one moved by 20 cm, tells the 
 Examples:
   agv layout check reflectors.csv
   agv layout check hall.imk --spacing 1 --most-seen 8 --json
+  agv layout check drawing.dxf --report layout
 
 Keys of --json: reflectors, places, unique_share, ambiguous_share, too_few_share, resemblances (turn_deg about the origin, then
-shift_m; places), problems (x_m, y_m, seen, answer).";
+shift_m; places), median_deviation_m, close_pairs (reflectors, distance_m), mirrors (point_m, direction_deg, reflectors),
+problems (x_m, y_m, seen, position_deviation_m, heading_deviation_deg, answer).";
 
-/// Say where a layout resembles itself, before a vehicle has to find itself there.
+/// Say where a layout resembles itself or has reflectors too close to each other, and how well it determines a pose
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 struct Check {
-    /// A map (.csv, as of 'agv map'), or a layout of the sensor's maker (.imk).
+    /// A map (.csv, as of 'agv map'), a layout of the sensor's maker (.imk, .csv), or a drawing (.dxf).
     layout: PathBuf,
     /// Distance between the places that are looked at, m.
     #[arg(long, default_value_t = 2.0, value_parser = positive)]
@@ -57,6 +101,12 @@ struct Check {
     /// Most reflectors that are seen at once.
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u8).range(1..=64))]
     most_seen: u8,
+    /// Distance below which the sensor may take two reflectors for one, m.
+    #[arg(long, default_value_t = 0.5, value_parser = positive)]
+    closest: f64,
+    /// Write a page with pictures to DIR/index.html.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -66,28 +116,30 @@ impl Check {
     fn run(self) -> anyhow::Result<()> {
         let positions = reflectors(&self.layout)?;
         anyhow::ensure!(!positions.is_empty(), "{} has no reflectors", self.layout.display());
-        let options =
-            CheckOptions { spacing: self.spacing, farthest: self.farthest, most_seen: usize::from(self.most_seen) };
+        let options = CheckOptions {
+            spacing: self.spacing,
+            farthest: self.farthest,
+            most_seen: usize::from(self.most_seen),
+            closest: self.closest,
+            noise: ReflectorParameters::default(),
+        };
         let check = check(&positions, &options)
             .map_err(|_| anyhow::anyhow!("{} has more than {REFLECTORS} reflectors", self.layout.display()))?;
+        if let Some(folder) = &self.report {
+            let name = self.layout.file_name().unwrap_or_default().to_string_lossy();
+            let path = folder.join("index.html");
+            let page = page(&name, &positions, &options, &check)?;
+            page.write(&path).with_context(|| path.display().to_string())?;
+        }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&check)?);
             return Ok(());
         }
-        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        output::print_rows(&[
-            ["reflectors".to_owned(), check.reflectors.to_string()],
-            ["places".to_owned(), check.places.to_string()],
-            ["unique".to_owned(), percent(check.unique_share)],
-            ["ambiguous".to_owned(), percent(check.ambiguous_share)],
-            ["too few seen".to_owned(), percent(check.too_few_share)],
-        ]);
-        for resemblance in check.resemblances.iter().take(SHOWN) {
-            let [x, y] = resemblance.shift_m;
-            println!(
-                "resembles itself turned by {:.0}° and shifted by ({x:.1}, {y:.1}) m, at {} places",
-                resemblance.turn_deg, resemblance.places
-            );
+        for row in check.rows() {
+            println!("{:<28} {}", row[0], row[1]);
+        }
+        for warning in check.warnings().iter().take(SHOWN) {
+            println!("{warning}");
         }
         for place in check.problems.iter().take(SHOWN) {
             let what = match place.finding {
@@ -110,17 +162,8 @@ impl Check {
 const SHOWN: usize = 10;
 
 fn reflectors(path: &Path) -> anyhow::Result<Vec<Point>> {
-    let is_imk = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("imk"));
-    if is_imk {
-        let layout = layout_file::load(path)?;
-        let metres = |landmark: &agv_core::wire::nav350::LayoutLandmark| {
-            Point::new(f64::from(landmark.x.0) * 1e-3, f64::from(landmark.y.0) * 1e-3)
-        };
-        return Ok(layout.iter().map(|identified| metres(&identified.landmark)).collect());
-    }
-    let landmarks = map_file::read(path)?;
-    let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
-    Ok(reflectors.map(|landmark| Point::new(landmark.x, landmark.y)).collect())
+    let layout = layout_file::load(path)?;
+    Ok(layout.iter().map(|entry| Point::new(entry.landmark.x.metres(), entry.landmark.y.metres())).collect())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

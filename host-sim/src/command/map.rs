@@ -10,7 +10,6 @@ use agv_host_sim::mapping::{
 };
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
-use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{output, progress};
@@ -94,7 +93,7 @@ impl Map {
         };
         let poses = match self.poses.unwrap_or(default) {
             _ if self.slam => {
-                let bar = ProgressBar::new_spinner().with_message("finding the poses");
+                let bar = progress::spinner().with_message("finding the poses");
                 let found = slam_poses(&recording, &SlamParameters::all(), || bar.tick())
                     .with_context(|| self.log.display().to_string())?;
                 bar.finish_and_clear();
@@ -109,7 +108,7 @@ impl Map {
         if let Some((poses, name)) = &poses {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());
         }
-        let looking = ProgressBar::new_spinner().with_message("looking for landmarks");
+        let looking = progress::spinner().with_message("looking for landmarks");
         looking.tick();
         let landmarks = match (self.kind, &poses) {
             (Kind::Reflectors, None) => {
@@ -124,7 +123,7 @@ impl Map {
         ensure!(!landmarks.is_empty(), "{}: no landmark was seen often enough from known poses", self.log.display());
         map_file::write(&self.output, &landmarks)?;
         for damage in &damages {
-            eprintln!("{}: {damage}", self.log.display());
+            output::note(&format!("{}: {damage}", self.log.display()));
         }
         let summary =
             Summary { key_scans: slam.map(|slam| slam.0), loops: slam.map(|slam| slam.1), ..Summary::of(&landmarks) };

@@ -1,10 +1,11 @@
 //! The subcommands of `agv`, one file each.
 //!
 //! A subcommand is a clap `Args` structure with `run(self) -> anyhow::Result<()>`. Results go to standard output,
-//! progress to standard error.
+//! progress and notes to standard error.
 
 pub mod calibrate;
 pub mod can;
+pub mod completion;
 pub mod ctl;
 pub mod demonstration;
 pub mod emulate;
@@ -18,14 +19,17 @@ pub mod lidar3d;
 mod like;
 pub mod map;
 pub mod nav350;
-mod output;
+pub mod output;
 pub mod panic_message;
 pub mod places;
+mod pose_argument;
 mod posed_scans;
 mod progress;
 pub mod provision;
 pub mod record;
 pub mod replay;
+pub mod report;
 pub mod simulate;
 mod stop;
 mod summary;
+pub mod view;

@@ -19,7 +19,7 @@ use agv_host_sim::simulate::simulate;
 use anyhow::{Context, bail};
 use clap::Subcommand;
 
-use super::output::print_rows;
+use super::output::{note, print_rows};
 
 const HELP: &str = "\
 Examples:
@@ -161,7 +161,7 @@ impl Serve {
         let drive = Drive::new(&recording, SensorFrame::default())?;
         let listener = TcpListener::bind(("0.0.0.0", self.port)).with_context(|| format!("port {}", self.port))?;
         let port = listener.local_addr()?.port();
-        eprintln!("serving {} revolutions on port {port}", drive.turns().len());
+        note(&format!("serving {} revolutions on port {port}", drive.turns().len()));
         let sensor = Sensor::new(
             drive,
             Options {

@@ -1,4 +1,25 @@
-//! Results on standard output.
+//! Results on standard output, and what is said beside them.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// From now on neither progress nor notes are shown.
+pub fn be_quiet() {
+    IS_QUIET.store(true, Ordering::Relaxed);
+}
+
+/// Whether neither progress nor notes are shown.
+pub fn is_quiet() -> bool {
+    IS_QUIET.load(Ordering::Relaxed)
+}
+
+/// Says something that is no result, on standard error.
+pub fn note(text: &str) {
+    if !is_quiet() {
+        eprintln!("{text}");
+    }
+}
 
 /// Prints names and values in two columns.
 pub fn print_rows(rows: &[[String; 2]]) {

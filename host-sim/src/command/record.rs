@@ -14,12 +14,12 @@ use agv_host_sim::live::{self, CanSummary, LiveError, Recorder, Summary};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{bus, log};
 use anyhow::{Context, bail};
-use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::encoder_arguments::EncoderArguments;
 use super::like;
 use super::output::print_rows;
+use super::progress;
 use super::stop;
 
 const HELP: &str = "\
@@ -87,7 +87,7 @@ impl Record {
             None => Time::from_micros(u64::MAX),
         };
         // Shown on a terminal only.
-        let progress = ProgressBar::new_spinner().with_message(format!("recording to {}", self.output.display()));
+        let progress = progress::spinner().with_message(format!("recording to {}", self.output.display()));
         progress.enable_steady_tick(Duration::from_millis(200));
         let (nav350, can) = std::thread::scope(|scope| {
             let can = scope.spawn(|| {

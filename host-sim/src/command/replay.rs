@@ -18,7 +18,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::lidar3d::relocalise::Relocalisation;
-use super::{output, progress};
+use super::{output, pose_argument, progress};
 
 const HELP: &str = "\
 Examples:
@@ -81,6 +81,8 @@ enum Landmarks {
     Features,
     /// Natural features that are found while driving.
     Dynamic,
+    /// Natural features that are found on the way, in the state of the filter.
+    Slam,
 }
 
 /// Where the vehicle is at the start.
@@ -94,13 +96,8 @@ fn start(text: &str) -> Result<Start, String> {
     if text == "recorded" {
         return Ok(Start::Recorded);
     }
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse::<f64>()).collect();
-    match numbers.as_deref() {
-        Ok(&[x, y, heading]) if [x, y, heading].iter().all(|value| value.is_finite()) => {
-            Ok(Start::Given(Pose::new(x, y, heading.to_radians())))
-        }
-        _ => Err("three numbers, or 'recorded', are expected".to_owned()),
-    }
+    let problem = || "three numbers X,Y,HEADING, or 'recorded', are expected".to_owned();
+    pose_argument::pose(text).map(Start::Given).map_err(|_| problem())
 }
 
 #[derive(Serialize)]
@@ -203,6 +200,7 @@ impl Replay {
             reflectors: has(Landmarks::Reflectors),
             features: has(Landmarks::Features),
             dynamic: has(Landmarks::Dynamic),
+            slam: has(Landmarks::Slam),
         })
     }
 

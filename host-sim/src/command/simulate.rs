@@ -6,6 +6,7 @@ use agv_host_sim::log;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 
+use super::output::note;
 use super::summary::Summary;
 
 const HELP: &str = "\
@@ -35,7 +36,7 @@ impl Simulate {
     pub fn run(self) -> anyhow::Result<()> {
         let mut scenario = Scenario::read(&self.scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
-        eprintln!("simulating {} with seed {}", self.scenario.display(), scenario.seed);
+        note(&format!("simulating {} with seed {}", self.scenario.display(), scenario.seed));
         let recording = simulate(&scenario)?.recording;
         if let Some(path) = &self.output {
             log::write(path, &recording)?;

@@ -23,6 +23,7 @@ use serde::Serialize;
 use super::board::{self, Board, BoardError, Ports};
 use super::encoder_pair::{EmulatedPair, PairError};
 use crate::bus::{Bus, SlcanBus};
+use crate::live::relay::Relay;
 use crate::live::stream::{StreamSummary, record_stream};
 use crate::log::LogError;
 use crate::provision::{ProvisionError, flash_image};
@@ -94,6 +95,8 @@ pub struct VehicleOptions<'a> {
     pub key: Option<[u8; KEY]>,
     /// Whether the flash begins with settings. If not, the controller finds the file `flash.bin` that is there.
     pub provision: bool,
+    /// Whether the controller is told where it is when it starts. If not, it has to find out.
+    pub is_told: bool,
 }
 
 /// Standard deviations of the pose that the controller is told, m and rad.
@@ -109,6 +112,8 @@ pub struct Watch<'a> {
     pub ports: Ports,
     /// Port of the emulated NAV350 on this machine.
     pub laser_port: u16,
+    /// Port of this machine where everybody may listen to the log stream.
+    pub stream_port: u16,
     /// What is wrong with the bus.
     pub trouble: &'a BusTrouble,
     /// Whether the laser answers; the connections end when it does not.
@@ -220,15 +225,26 @@ pub fn drive(
     let (trouble, is_laser_on) = (BusTrouble::default(), AtomicBool::new(true));
     let (is_streaming, stopped) = (AtomicBool::new(false), Arc::new(AtomicBool::new(false)));
     let ports = board.ports;
-    let stage = Stage { recording, settings: &settings, sensor: &sensor, heard: &heard, trouble: &trouble, first };
+    let stage = Stage {
+        recording,
+        settings: &settings,
+        sensor: &sensor,
+        heard: &heard,
+        trouble: &trouble,
+        first,
+        is_told: options.is_told,
+    };
     let stream_host = format!("127.0.0.1:{}", ports.log);
+    let relay = Relay::bind()?;
+    let stream_port = relay.port()?;
     let (outcome, stream) = std::thread::scope(|scope| {
         scope.spawn(|| serve_laser(&sensor, &listener, &is_laser_on, &stopped));
+        scope.spawn(|| relay.serve(&stopped));
         let stream = scope.spawn(|| {
             // Until the controller listens, the emulator's network resets the connection.
             loop {
                 let begun = || is_streaming.store(true, Ordering::Release);
-                match record_stream(&stream_host, &log, &stopped, begun, |_| ()) {
+                match record_stream(&stream_host, &log, &stopped, begun, |record| relay.pass(record)) {
                     Err(LogError::Empty { .. } | LogError::Io { .. }) if !stopped.load(Ordering::Relaxed) => {
                         std::thread::sleep(Duration::from_millis(20));
                     }
@@ -236,8 +252,15 @@ pub fn drive(
                 }
             }
         });
-        let watched =
-            Watch { ports, laser_port, trouble: &trouble, is_laser_on: &is_laser_on, heard: &heard, stopped: &stopped };
+        let watched = Watch {
+            ports,
+            laser_port,
+            stream_port,
+            trouble: &trouble,
+            is_laser_on: &is_laser_on,
+            heard: &heard,
+            stopped: &stopped,
+        };
         scope.spawn(move || watch(&watched));
         let outcome = stage.run(bus, board, &is_streaming, seconds);
         stopped.store(true, Ordering::Relaxed);
@@ -283,6 +306,7 @@ struct Stage<'a> {
     heard: &'a Mutex<Heard>,
     trouble: &'a BusTrouble,
     first: Time,
+    is_told: bool,
 }
 
 impl Stage<'_> {
@@ -353,7 +377,7 @@ impl Stage<'_> {
                 pair.begin(now().offset(LEAD.as_secs_f64() + shift));
                 self.heard().begin = Some(begin);
                 end = Some(begin + Duration::from_secs_f64(seconds.min(pair.duration())));
-            } else if pair.are_operational() && last_order.elapsed() > Duration::from_millis(500) {
+            } else if self.is_told && pair.are_operational() && last_order.elapsed() > Duration::from_millis(500) {
                 last_order = Instant::now();
                 orders = (orders + 1) % 16;
                 for frame in self.initial_pose(controller, orders) {

@@ -86,7 +86,7 @@ pub fn parameters(imported: &Parameters, noise: Noise) -> Parameters {
     };
     parameters.odometry_noise =
         OdometryNoise { speed, steering, slip: 0.0, side_slip: 0.0, yaw: 0.0, ..OdometryNoise::default() };
-    parameters.maps = MapUse { reflectors: true, features: false, dynamic: false };
+    parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: false };
     parameters.reflectors.range_deviation = 0.02;
     parameters.reflectors.bearing_deviation = 0.3_f64.to_radians();
     parameters.reflectors.detection = Some(ReflectorDetection::default());

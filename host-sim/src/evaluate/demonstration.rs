@@ -22,10 +22,10 @@ const MAPPING: &str = include_str!("../../scenarios/block_storage_mapping.toml")
 
 /// What the localiser may use in each replay of the drive; the last one uses everything.
 const METHODS: [(&str, MapUse); 4] = [
-    ("odometry alone", MapUse { reflectors: false, features: false, dynamic: false }),
-    ("reflectors", MapUse { reflectors: true, features: false, dynamic: false }),
-    ("static features", MapUse { reflectors: false, features: true, dynamic: false }),
-    ("mixed", MapUse { reflectors: true, features: true, dynamic: false }),
+    ("odometry alone", MapUse { reflectors: false, features: false, dynamic: false, slam: false }),
+    ("reflectors", MapUse { reflectors: true, features: false, dynamic: false, slam: false }),
+    ("static features", MapUse { reflectors: false, features: true, dynamic: false, slam: false }),
+    ("mixed", MapUse { reflectors: true, features: true, dynamic: false, slam: false }),
 ];
 
 /// The drive, localised in one way.

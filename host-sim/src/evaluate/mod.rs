@@ -17,3 +17,4 @@ pub mod places;
 pub mod repeatability;
 pub mod slam;
 pub mod warehouse;
+pub mod warehouse_disturbance;

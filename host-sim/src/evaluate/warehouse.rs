@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, PoseError, Spread, pose_error};
+use super::warehouse_disturbance::Disturbance;
 use crate::mapping::{Clustering, map_features};
 use crate::replay::{ReplayError, replay};
 use crate::simulate::block_storage::{BlockStoragePath, ReflectorPlacement};
@@ -29,6 +30,16 @@ pub enum Map {
     Static,
     /// Features found while driving, Algorithm 1 (K 5.4.1).
     Dynamic,
+    /// Features found while driving, in the state of the filter, and alignment to key scans.
+    Slam,
+    /// The same without alignment.
+    SlamFeatures,
+    /// The same without ends of faces.
+    SlamCorners,
+    /// Alignment to key scans, and no features.
+    SlamKeyScans,
+    /// Features mapped by a drive on another path, and all of [`Map::Slam`].
+    StaticSlam,
     /// Surveyed reflectors and features mapped on another path.
     Mixed,
 }
@@ -44,7 +55,15 @@ impl Map {
     }
 
     fn has_static_features(self) -> bool {
-        matches!(self, Self::Static | Self::Mixed)
+        matches!(self, Self::Static | Self::Mixed | Self::StaticSlam)
+    }
+
+    fn is_slam(self) -> bool {
+        matches!(self, Self::Slam | Self::SlamFeatures | Self::SlamCorners | Self::SlamKeyScans | Self::StaticSlam)
+    }
+
+    fn has_key_scans(self) -> bool {
+        matches!(self, Self::Slam | Self::SlamKeyScans | Self::StaticSlam)
     }
 }
 
@@ -69,7 +88,7 @@ const PRINTED_DEVIATION: f64 = 0.034;
 
 impl Method {
     /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 11] = [
         Self::mended("odometry", Map::Odometry),
         Self::mended("reflectors", Map::Reflectors),
         Self::mended("static", Map::Static),
@@ -80,6 +99,18 @@ impl Method {
             added_deviation: PRINTED_DEVIATION,
         },
         Self::mended("dynamic", Map::Dynamic),
+        Self {
+            detector: falko::Parameters { end_points: None, ..falko::Parameters::mended() },
+            ..Self::mended("slam with corners alone", Map::SlamCorners)
+        },
+        Self::mended("slam with features alone", Map::SlamFeatures),
+        Self {
+            // No return is so near.
+            detector: falko::Parameters { farthest: 0.0, ..falko::Parameters::mended() },
+            ..Self::mended("slam with key scans alone", Map::SlamKeyScans)
+        },
+        Self::mended("slam", Map::Slam),
+        Self::mended("static and slam", Map::StaticSlam),
         Self::mended("mixed", Map::Mixed),
     ];
 
@@ -95,6 +126,8 @@ pub struct Experiment {
     pub name: String,
     /// Which landmarks the localiser may use.
     pub map: Map,
+    /// In what the drive differs from the standard one.
+    pub disturbance: Disturbance,
     /// Length of the way, m.
     pub path_m: f64,
     /// Number of runs.
@@ -148,13 +181,14 @@ struct Run {
 pub fn experiment(
     (path_name, path): (&str, BlockStoragePath),
     method: &Method,
+    disturbance: Disturbance,
     seeds: Range<u64>,
     done: impl Fn() + Sync,
 ) -> Result<Experiment, WarehouseError> {
     let results: Vec<Run> = seeds
         .into_par_iter()
         .map(|seed| {
-            let run = run(path, method, seed);
+            let run = run(path, method, disturbance, seed);
             done();
             run
         })
@@ -166,6 +200,7 @@ pub fn experiment(
     Ok(Experiment {
         name: format!("{path_name} {}", method.name),
         map: method.map,
+        disturbance,
         path_m: sum(|run| run.path) / runs,
         runs: results.len(),
         ok_share: results.iter().filter(is_ok).count() as f64 / runs,
@@ -182,8 +217,13 @@ pub fn experiment(
 ///
 /// # Errors
 /// See [`WarehouseError`].
-pub fn prepare(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Simulation, WarehouseError> {
-    let mut simulation = simulate(&scenario(path, method.map, seed, seed))?;
+pub fn prepare(
+    path: BlockStoragePath,
+    method: &Method,
+    disturbance: Disturbance,
+    seed: u64,
+) -> Result<Simulation, WarehouseError> {
+    let mut simulation = simulate(&scenario(path, method.map, disturbance, seed, seed))?;
     let recording = &mut simulation.recording;
     recording.parameters.features.detector = method.detector;
     recording.parameters.features.added_deviation = method.added_deviation;
@@ -191,9 +231,19 @@ pub fn prepare(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Sim
         reflectors: method.map.uses_reflectors(),
         features: method.map.has_static_features(),
         dynamic: method.map == Map::Dynamic,
+        slam: method.map.is_slam(),
     };
+    if !method.map.has_key_scans() {
+        recording.parameters.slam.key_scans = None;
+    }
     if method.map.has_static_features() {
-        let mapping = scenario(BlockStoragePath::Mapping, method.map, seed, seed ^ MAPPING_SEED_BIT);
+        let mapping = scenario(
+            BlockStoragePath::Mapping,
+            method.map,
+            disturbance.of_the_mapping_drive(),
+            seed,
+            seed ^ MAPPING_SEED_BIT,
+        );
         let mut mapping = simulate(&mapping)?.recording;
         mapping.parameters.features.detector = method.detector;
         mapping.landmarks.clone_from(&recording.landmarks);
@@ -202,7 +252,7 @@ pub fn prepare(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Sim
     Ok(simulation)
 }
 
-fn scenario(path: BlockStoragePath, map: Map, world_seed: u64, seed: u64) -> Scenario {
+fn scenario(path: BlockStoragePath, map: Map, disturbance: Disturbance, world_seed: u64, seed: u64) -> Scenario {
     let mut scenario = Scenario::block_storage(path, seed);
     if let WorldOptions::BlockStorage(storage) = &mut scenario.world {
         storage.seed = Some(world_seed);
@@ -210,11 +260,12 @@ fn scenario(path: BlockStoragePath, map: Map, world_seed: u64, seed: u64) -> Sce
             storage.reflectors = ReflectorPlacement::AisleAndLaneEnd;
         }
     }
+    disturbance.apply(&mut scenario);
     scenario
 }
 
-fn run(path: BlockStoragePath, method: &Method, seed: u64) -> Result<Run, WarehouseError> {
-    let simulation = prepare(path, method, seed)?;
+fn run(path: BlockStoragePath, method: &Method, disturbance: Disturbance, seed: u64) -> Result<Run, WarehouseError> {
+    let simulation = prepare(path, method, disturbance, seed)?;
     let recording = &simulation.recording;
     let replay = replay(recording, |_| {})?;
     let last = replay.poses.iter().rev().find_map(|pose| pose_error(pose, &recording.truth));

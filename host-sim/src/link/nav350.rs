@@ -21,7 +21,7 @@ const LONGEST_WAIT: Duration = Duration::from_millis(50);
 /// `host` with the usual port if it states none.
 #[must_use]
 pub fn address(host: &str) -> String {
-    if host.contains(':') { host.to_owned() } else { format!("{host}:{PORT}") }
+    super::with_port(host, PORT)
 }
 
 /// What happened on the link.

@@ -2,6 +2,7 @@
 
 mod can;
 mod nav350;
+pub mod relay;
 pub mod stream;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

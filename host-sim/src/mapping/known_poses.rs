@@ -40,7 +40,7 @@ pub(super) fn by_odometry(recording: &Recording, pose: Pose) -> Recording {
     let fix = PoseFix { time: start, pose, position_deviation: 0.0, heading_deviation: 0.0 };
     recording.events.insert(0, RecordedEvent::SetPose(fix));
     let parameters = &mut recording.parameters;
-    parameters.maps = MapUse { reflectors: true, features: true, dynamic: false };
+    parameters.maps = MapUse { reflectors: true, features: true, dynamic: false, slam: false };
     parameters.consistency.least_acceptance = 0.0;
     parameters.limits.lost_after = f64::INFINITY;
     parameters.limits.largest_position_deviation = f64::INFINITY;

@@ -26,7 +26,7 @@ pub fn map_features(recording: &Recording, clustering: &Clustering) -> Result<Ve
     let mut recording = recording.clone();
     recording.landmarks.retain(|landmark| landmark.kind == LandmarkKind::Reflector);
     // Features are looked for, but there is no map that they could correct the pose with.
-    recording.parameters.maps = MapUse { reflectors: true, features: true, dynamic: false };
+    recording.parameters.maps = MapUse { reflectors: true, features: true, dynamic: false, slam: false };
     let replay = replay(&recording, |_| {})?;
     let mut reliable = replay.poses.iter().filter(|pose| pose.mode == Mode::Reflectors).peekable();
     let features = replay.uses.iter().filter(|used| used.kind != LandmarkKind::Reflector);

@@ -49,6 +49,7 @@ impl FigureError {
 pub(super) enum Mark {
     Line,
     Dashes,
+    Square,
     Point(Shape),
 }
 

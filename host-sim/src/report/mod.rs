@@ -2,7 +2,9 @@
 
 mod charts;
 mod figure;
+mod heat_map;
 mod page;
+mod pdf;
 pub mod scan_picture;
 mod state_timeline;
 mod thinning;
@@ -10,6 +12,8 @@ mod trajectories;
 
 pub use charts::{Bounds, LandmarkMark, landmark_timeline, line_chart, scatter_chart};
 pub use figure::{Figure, FigureError, PointSet, Series};
+pub use heat_map::{Cell, HeatMap, heat_map};
 pub use page::{Page, Table};
+pub use pdf::{PdfError, write_pdf};
 pub use state_timeline::{StateSpan, state_timeline};
 pub use trajectories::{Map, trajectory_plot};

@@ -11,7 +11,9 @@ const STYLE: &str = "\
 :root{color-scheme:light}\
 body{font:16px/1.5 system-ui,sans-serif;color:#1a1a1a;background:#fff;max-width:52rem;margin:0 auto;padding:1rem}\
 h1{font-size:1.6rem;line-height:1.2}h2{font-size:1.2rem;margin-top:2.2rem;border-bottom:1px solid #ddd}\
-figure{margin:1.2rem 0}figure>svg{width:100%;height:auto}figcaption{color:#333}\
+h2.part{font-size:1.4rem;border-bottom:3px solid #0072b2}\
+figure{margin:1.2rem 0;break-inside:avoid}h2{break-after:avoid}tr{break-inside:avoid}\
+@media print{body{max-width:none;font-size:11px;padding:0}.wide{overflow:visible}figure{max-width:17cm}}figure>svg{width:100%;height:auto}figcaption{color:#333}\
 .key{display:flex;flex-wrap:wrap;gap:.2rem 1.2rem;list-style:none;margin:.2rem 0;padding:0}\
 .key svg{width:1.8rem;height:.9rem;vertical-align:middle;margin-right:.4rem}\
 .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
@@ -39,6 +41,11 @@ impl Page {
     #[must_use]
     pub fn new(title: &str) -> Self {
         Self { title: title.to_owned(), body: String::new() }
+    }
+
+    /// Begins a part, which has sections.
+    pub fn part(&mut self, heading: &str) -> &mut Self {
+        self.add(&format!("<h2 class=\"part\">{}</h2>\n", escape(heading)))
     }
 
     /// Begins a section.
@@ -147,6 +154,7 @@ fn swatch(mark: Mark, RGBColor(red, green, blue): RGBColor) -> String {
         Mark::Dashes => {
             format!("<path d=\"M0 8H32\" stroke=\"{ink}\" stroke-width=\"3\" stroke-dasharray=\"8 4\"/>")
         }
+        Mark::Square => format!("<rect x=\"8\" y=\"1\" width=\"16\" height=\"14\" fill=\"{ink}\" stroke=\"#555\"/>"),
         Mark::Point(Shape::Disc) => format!("<circle cx=\"16\" cy=\"8\" r=\"5\" fill=\"{ink}\"/>"),
         Mark::Point(Shape::Cross) => {
             format!("<path d=\"M11 3L21 13M11 13L21 3\" stroke=\"{ink}\" stroke-width=\"2\"/>")

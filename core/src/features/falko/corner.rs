@@ -1,7 +1,7 @@
 //! The corner between the beams: where the lines through both sides of a candidate meet (K 3.1.2).
 
-use super::line::{Line, intersection_covariance, largest_variance};
 use super::parameters::{LineGate, Parameters};
+use crate::features::line::{Line, intersection_covariance, largest_variance};
 use crate::features::neighbourhood::Disc;
 use crate::geometry::ScanPoint;
 

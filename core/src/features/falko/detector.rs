@@ -4,11 +4,11 @@ use heapless::Vec;
 
 use super::corner::Corner;
 use super::end_point;
-use super::line::Moments;
 use super::parameters::{Parameters, SuppressionRule};
 use super::runs::Runs;
 use super::score::{SectorCounts, Sectors};
 use super::suppression::{Cost, is_best_within, walk};
+use crate::features::line::Moments;
 use crate::features::neighbourhood::{Disc, Reach, Side, beams_within};
 use crate::features::{Keypoint, KeypointKind, PointScan};
 use crate::geometry::ScanPoint;

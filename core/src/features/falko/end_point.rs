@@ -4,9 +4,9 @@
 //! meet the face's line, so half a beam beyond on average, uniformly distributed. A return of the background on the
 //! other side of the jump is where a shadow begins; it moves with the sensor and marks nothing.
 
-use super::line::{Line, Moments, largest_variance};
 use super::parameters::{EndPointParameters, Parameters};
 use super::runs::{Beams, Runs};
+use crate::features::line::{Line, Moments, largest_variance};
 use crate::features::{Keypoint, KeypointKind, PointScan};
 
 /// To which side of its last beam a face ends.

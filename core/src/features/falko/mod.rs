@@ -12,7 +12,6 @@
 mod corner;
 mod detector;
 mod end_point;
-mod line;
 mod parameters;
 mod runs;
 mod score;

@@ -1,6 +1,8 @@
 //! `agv evaluate warehouse`.
 
 use agv_host_sim::evaluate::warehouse::{Experiment, Method, PATHS, experiment};
+use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
+use clap::ValueEnum as _;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// How precisely a vehicle ends its way in the standard block storage: paths P1 to P4, each with each kind of map.
@@ -15,6 +17,15 @@ pub struct Warehouse {
     /// Only experiments whose name contains this, such as "P1" or "static".
     #[arg(long, default_value = "")]
     only: String,
+    /// Only experiments with this map, as the JSON names it, such as "slam".
+    #[arg(long)]
+    map: Option<String>,
+    /// What makes the drive harder, one or more of them, or all.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "none")]
+    disturb: Vec<Disturbance>,
+    /// Every disturbance, and the standard drive.
+    #[arg(long, conflicts_with = "disturb")]
+    disturb_all: bool,
     /// One JSON array instead of a table.
     #[arg(long)]
     json: bool,
@@ -25,19 +36,23 @@ impl Warehouse {
     pub fn run(self) -> anyhow::Result<()> {
         anyhow::ensure!(self.runs > 0, "--runs must be at least 1");
         let seeds = self.first_seed..self.first_seed.saturating_add(self.runs);
+        let disturbances = if self.disturb_all { Disturbance::ALL.to_vec() } else { self.disturb };
+        let map_name = |method: &Method| serde_json::to_value(method.map).ok()?.as_str().map(str::to_owned);
         let wanted: Vec<_> = Method::ALL
             .iter()
+            .filter(|method| self.map.is_none() || map_name(method) == self.map)
             .flat_map(|method| PATHS.map(|path| (path, method)))
             .filter(|(path, method)| format!("{} {}", path.0, method.name).contains(&self.only))
+            .flat_map(|(path, method)| disturbances.iter().map(move |disturbance| (path, method, *disturbance)))
             .collect();
-        anyhow::ensure!(!wanted.is_empty(), "no experiment's name contains '{}'", self.only);
+        anyhow::ensure!(!wanted.is_empty(), "no experiment has such a name and such a map");
         let progress = ProgressBar::new(wanted.len() as u64 * self.runs).with_style(
             ProgressStyle::with_template("{bar:30} {pos}/{len} runs, {eta} left")
                 .unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
         let experiments: Vec<Experiment> = wanted
             .into_iter()
-            .map(|(path, method)| experiment(path, method, seeds.clone(), || progress.inc(1)))
+            .map(|(path, method, disturbance)| experiment(path, method, disturbance, seeds.clone(), || progress.inc(1)))
             .collect::<Result<_, _>>()?;
         progress.finish_and_clear();
         if self.json {
@@ -51,14 +66,15 @@ impl Warehouse {
 
 fn print_table(experiments: &[Experiment]) {
     println!(
-        "{:<28} {:>4} {:>5}   {:<22} {:<22} {:>6} {:>7}",
-        "", "runs", "ok", "mm median, 95 %, max", "deg median, 95 %, max", "NEES", "speed"
+        "{:<28} {:<15} {:>4} {:>5}   {:<22} {:<22} {:>6} {:>7}",
+        "", "disturbance", "runs", "ok", "mm median, 95 %, max", "deg median, 95 %, max", "NEES", "speed"
     );
     for experiment in experiments {
         let (position, heading) = (experiment.position_mm, experiment.heading_deg);
         println!(
-            "{:<28} {:>4} {:>4.0}% {:>7.1} {:>6.1} {:>6.1}   {:>7.3} {:>6.3} {:>6.3} {:>8.1} {:>6.0}x",
+            "{:<28} {:<15} {:>4} {:>4.0}% {:>7.1} {:>6.1} {:>6.1}   {:>7.3} {:>6.3} {:>6.3} {:>8.1} {:>6.0}x",
             experiment.name,
+            experiment.disturbance.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned()),
             experiment.runs,
             100.0 * experiment.ok_share,
             position.median,

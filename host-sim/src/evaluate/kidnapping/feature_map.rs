@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::{Outcome, REVOLUTIONS, SearchedMap, Start, outcome, search};
 use crate::evaluate::falko::{BEAMS, KEYPOINTS};
 use crate::evaluate::warehouse::{Map, Method, PATHS, WarehouseError, prepare};
+use crate::evaluate::warehouse_disturbance::Disturbance;
 use crate::simulate::Simulation;
 use crate::simulate::laser::{LaserTrack, Revolution, Scene, scan};
 use crate::simulate::random::{Random, Stream};
@@ -51,7 +52,7 @@ pub fn run(
         .into_par_iter()
         .map(|number| {
             let seed = seed.wrapping_mul(1_000_003).wrapping_add(number);
-            let simulation = prepare(PATHS[0].1, &method, seed)?;
+            let simulation = prepare(PATHS[0].1, &method, Disturbance::None, seed)?;
             let count = STARTS_A_STORAGE.min(starts - number * STARTS_A_STORAGE);
             Ok(run_storage(&simulation, seed, count, parameters, &done))
         })

@@ -1,4 +1,4 @@
-//! Straight lines through one side of a corner, and their intersection.
+//! Straight lines through points, and their intersection.
 
 use crate::geometry::ScanPoint;
 
@@ -8,7 +8,7 @@ const PRIOR_WEIGHT: f32 = 8.0;
 
 /// Sums over points, relative to a point nearby so that single precision suffices.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Moments {
+pub(crate) struct Moments {
     pub count: f32,
     sum: ScanPoint,
     xx: f32,
@@ -18,7 +18,7 @@ pub(super) struct Moments {
 
 impl Moments {
     #[inline]
-    pub(super) fn add(&mut self, point: ScanPoint) {
+    pub(crate) fn add(&mut self, point: ScanPoint) {
         self.count += 1.0;
         self.sum += point;
         self.xx += point.x * point.x;
@@ -27,7 +27,7 @@ impl Moments {
     }
 
     /// The line with the smallest sum of squared distances. None for fewer than two distinct points.
-    pub(super) fn line(&self) -> Option<Line> {
+    pub(crate) fn line(&self) -> Option<Line> {
         if self.count < 2.0 {
             return None;
         }
@@ -57,7 +57,7 @@ impl Moments {
 
 /// A line through points, in the frame of the moments.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
+pub(crate) struct Line {
     pub centroid: ScanPoint,
     /// Unit direction.
     pub along: ScanPoint,
@@ -70,12 +70,12 @@ pub(super) struct Line {
 
 impl Line {
     /// Unit normal.
-    pub(super) fn normal(&self) -> ScanPoint {
+    pub(crate) fn normal(&self) -> ScanPoint {
         ScanPoint::new(-self.along.y, self.along.x)
     }
 
     /// Mean square distance of the points from the line, m^2.
-    pub(super) fn mean_square(&self) -> f32 {
+    pub(crate) fn mean_square(&self) -> f32 {
         self.squares / self.count
     }
 
@@ -87,13 +87,13 @@ impl Line {
     }
 
     /// Variance across the line of its position abreast of `point`, m^2.
-    pub(super) fn variance_at(&self, point: ScanPoint, ray: ScanPoint, range_variance: f32) -> f32 {
+    pub(crate) fn variance_at(&self, point: ScanPoint, ray: ScanPoint, range_variance: f32) -> f32 {
         let lever = (point - self.centroid).dot(&self.along);
         self.point_variance(ray, range_variance) * (1.0 / self.count + lever * lever / self.spread)
     }
 
     /// Where two lines meet. None if they are parallel.
-    pub(super) fn intersection(&self, other: &Line) -> Option<ScanPoint> {
+    pub(crate) fn intersection(&self, other: &Line) -> Option<ScanPoint> {
         let determinant = self.along.x * other.along.y - self.along.y * other.along.x;
         if libm::fabsf(determinant) < 1e-6 {
             return None;
@@ -105,7 +105,7 @@ impl Line {
 }
 
 /// Covariance xx, xy, yy, m^2, of the intersection of two lines whose positions have the given variances across.
-pub(super) fn intersection_covariance(first: (&Line, f32), second: (&Line, f32)) -> [f32; 3] {
+pub(crate) fn intersection_covariance(first: (&Line, f32), second: (&Line, f32)) -> [f32; 3] {
     let (a, b) = (first.0.along, second.0.along);
     let determinant = a.x * b.y - a.y * b.x;
     let scale = 1.0 / (determinant * determinant);
@@ -115,7 +115,7 @@ pub(super) fn intersection_covariance(first: (&Line, f32), second: (&Line, f32))
 }
 
 /// Largest eigenvalue of a covariance xx, xy, yy.
-pub(super) fn largest_variance(covariance: [f32; 3]) -> f32 {
+pub(crate) fn largest_variance(covariance: [f32; 3]) -> f32 {
     let [xx, xy, yy] = covariance;
     let difference = xx - yy;
     0.5 * (xx + yy + libm::sqrtf(difference * difference + 4.0 * xy * xy))

@@ -1,0 +1,88 @@
+//! A floor plan whose squares are coloured.
+
+use plotters::prelude::*;
+
+use super::figure::{
+    Extent, Figure, FigureError, MARGIN, MARKS, Mark, PointSet, Shape, WIDTH, X_LABELS, Y_LABELS, axes, axis_number,
+    draw,
+};
+
+/// A square of the floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Its middle in W, m.
+    pub x: f64,
+    /// See `x`.
+    pub y: f64,
+    /// Its class: the place of its name.
+    pub class: usize,
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct HeatMap<'a> {
+    /// The squares.
+    pub cells: &'a [Cell],
+    /// Their size, m.
+    pub size: f64,
+    /// Names of the classes, the best one first; an empty name is not in the legend.
+    pub classes: &'a [&'a str],
+    /// Points above the squares.
+    pub points: PointSet<'a>,
+}
+
+/// From light to dark, in order for every eye (cividis; J. Nunez, C. Anderton, R. Renslow, PLoS ONE 13(7), 2018).
+const SHADES: [RGBColor; 5] = [
+    RGBColor(255, 234, 70),
+    RGBColor(203, 186, 105),
+    RGBColor(148, 142, 119),
+    RGBColor(87, 92, 109),
+    RGBColor(0, 34, 78),
+];
+
+/// Greatest height of the plan, pixels.
+const TALLEST: f64 = 720.0;
+const SHORTEST: f64 = 160.0;
+
+/// Draws a floor plan with one scale for both axes.
+///
+/// # Errors
+/// If the picture cannot be drawn.
+pub fn heat_map(map: &HeatMap) -> Result<Figure, FigureError> {
+    let half = 0.5 * map.size;
+    let ends = |value: f64| [value - half, value + half];
+    let x =
+        Extent::of(map.cells.iter().flat_map(|cell| ends(cell.x)).chain(map.points.points.iter().map(|point| point.0)));
+    let y =
+        Extent::of(map.cells.iter().flat_map(|cell| ends(cell.y)).chain(map.points.points.iter().map(|point| point.1)));
+    let (x, y) = (x.widened(0.03), y.widened(0.03));
+    let plane_width = f64::from(WIDTH - Y_LABELS - 2 * MARGIN);
+    let height = (plane_width * y.width() / x.width()).clamp(SHORTEST, TALLEST);
+    let scale = (x.width() / plane_width).max(y.width() / height);
+    let widened = |extent: Extent, pixels: f64| extent.widened(0.5 * (scale * pixels / extent.width() - 1.0).max(0.0));
+    let (x, y) = (widened(x, plane_width), widened(y, height));
+    let shade = |class: usize| SHADES[class.min(SHADES.len() - 1)];
+    let named = map.classes.iter().enumerate().filter(|(_, name)| !name.is_empty());
+    let mut legend: Vec<_> = named.map(|(class, name)| (Mark::Square, shade(class), (*name).to_owned())).collect();
+    legend.push((Mark::Point(Shape::Disc), POINT_INK, map.points.name.to_owned()));
+    draw(height as u32 + X_LABELS + 2 * MARGIN, legend, |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(MARGIN)
+            .x_label_area_size(X_LABELS)
+            .y_label_area_size(Y_LABELS)
+            .build_cartesian_2d(x.low..x.high, y.low..y.high)
+            .map_err(|error| error.to_string())?;
+        axes(&mut chart, ["x, m", "y, m"], MARKS, &|value| axis_number(*value, x), &|value| axis_number(*value, y))?;
+        let cells = map.cells.iter().map(|cell| {
+            let corners = [(cell.x - half, cell.y - half), (cell.x + half, cell.y + half)];
+            Rectangle::new(corners, shade(cell.class).filled())
+        });
+        chart.draw_series(cells)?;
+        chart.draw_series(map.points.points.iter().map(|point| Circle::new(*point, 5, WHITE.filled())))?;
+        chart.draw_series(map.points.points.iter().map(|point| Circle::new(*point, 4, POINT_INK.filled())))?;
+        Ok(())
+    })
+}
+
+/// Colour of the points, unlike every shade.
+const POINT_INK: RGBColor = RGBColor(213, 94, 0);

@@ -1,0 +1,231 @@
+//! The page of `agv view` in a browser: a drive from a log, and one that goes on in emulation.
+
+use std::net::{Ipv4Addr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use agv_core::geometry::Pose;
+use agv_core::measurement::{PoseFix, Time};
+use agv_host_sim::emulate::vehicle::{self, VehicleOptions};
+use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
+use agv_host_sim::replay::{Replay, replay};
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+use agv_host_sim::view::{Shared, Timeline, follow, load, serve};
+use agv_host_sim::{data, log};
+use serde_json::Value;
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// Where the pictures of the page go.
+fn pictures() -> PathBuf {
+    let folder = repository("target/report");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Whether there are a browser and what drives it; if not, says that the test is skipped.
+fn has_browser(test: &str) -> bool {
+    let runs = |command: &mut Command| command.output().is_ok_and(|output| output.status.success());
+    let has_driver = runs(node().args(["-e", "require('playwright-core')"]));
+    let has_chromium = runs(Command::new(chromium()).arg("--version"));
+    if !has_driver || !has_chromium {
+        data::skip(test, "chromium, node or its package playwright-core is not there");
+    }
+    has_driver && has_chromium
+}
+
+fn chromium() -> String {
+    std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned())
+}
+
+fn node() -> Command {
+    let mut node = Command::new("node");
+    node.env("NODE_PATH", repository("target/node/node_modules"));
+    node
+}
+
+/// What the browser finds on a page that `feed` fills.
+fn browse(
+    timeline: Timeline,
+    kind: &str,
+    pictures: &str,
+    feed: impl FnOnce(&Shared, &Arc<AtomicBool>) + Send,
+) -> Value {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let url = format!("http://{}/", listener.local_addr().unwrap());
+    let shared = Shared::new(timeline);
+    let is_stopped = Arc::new(AtomicBool::new(false));
+    let output = std::thread::scope(|scope| {
+        scope.spawn(|| serve(listener, &shared, &is_stopped).unwrap());
+        scope.spawn(|| feed(&shared, &is_stopped));
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/view/browser.js");
+        let output = node().arg(script).args([&url, pictures, kind]).output().unwrap();
+        is_stopped.store(true, Ordering::Relaxed);
+        output
+    });
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{complaint}");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found["complaints"], Value::Array(Vec::new()));
+    for (size, overflow) in found["sizes"].as_object().unwrap() {
+        assert_eq!(overflow, &Value::from(0), "{size}");
+    }
+    found
+}
+
+fn hall(change: &str) -> Recording {
+    let path = repository("host-sim/scenarios/warehouse_hall.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    simulate(&Scenario::parse(&text.replace("speed = 1.2", change)).unwrap()).unwrap().recording
+}
+
+/// The hall, with somebody who states a wrong pose after 30 s and the right one after 40 s.
+fn misled() -> Recording {
+    let mut recording = hall("speed = 1.2");
+    for (seconds, error) in [(30.0, 3.0), (40.0, 0.0)] {
+        let time = Time::from_seconds(1.0 + seconds);
+        let truth = truth_at(&recording.truth, time).unwrap();
+        let pose = Pose::new(truth.x + error, truth.y - error, truth.theta + 0.3 * error);
+        let place = recording.events.iter().position(|event| event.time().is_some_and(|at| at > time)).unwrap();
+        let fix = PoseFix { time, pose, position_deviation: 0.03, heading_deviation: 0.01 };
+        recording.events.insert(place, RecordedEvent::SetPose(fix));
+    }
+    recording
+}
+
+/// The pose that was answered last by then.
+fn answered(answers: &Replay, seconds: f64) -> Pose {
+    let time = Time::from_seconds(seconds);
+    answers.poses.iter().rev().find(|pose| pose.time <= time).unwrap().pose
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn assert_shows(state: &Value, answers: &Replay) {
+    let expected = answered(answers, number(&state["time_s"]));
+    for (name, expected) in [("x_m", expected.x), ("y_m", expected.y), ("heading_rad", expected.theta)] {
+        let shown = number(&state["pose"][name]);
+        assert!((shown - expected).abs() < 1e-9, "{name} is {shown} instead of {expected} at {}", state["time_s"]);
+    }
+    // It is drawn there, too.
+    assert_eq!(state["drawn"]["vehicle"]["x"], state["pose"]["x_m"]);
+    assert!(number(&state["drawn"]["scanPoints"]) > 500.0 && number(&state["drawn"]["pathPoints"]) > 50.0, "{state}");
+}
+
+#[test]
+fn a_log_is_looked_at() {
+    if !has_browser("a_log_is_looked_at") {
+        return;
+    }
+    let recording = misled();
+    let answers = replay(&recording, |_| ()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let with_answers = folder.path().join("answered.agvlog");
+    log::write_with_outputs(&with_answers, &recording, |event| answers.output(event)).unwrap();
+    let without = folder.path().join("plain.agvlog");
+    log::write(&without, &recording).unwrap();
+    // A log without answers is replayed, and shows the same.
+    for path in [with_answers, without] {
+        let pictures = pictures();
+        let found = browse(Timeline::of_log(path.clone()), "log", pictures.to_str().unwrap(), |shared, is_stopped| {
+            load(&path, shared, is_stopped).unwrap();
+        });
+        let found_by_log = &found["found"];
+        for state in found_by_log["seeks"].as_array().unwrap() {
+            assert_shows(state, &answers);
+        }
+        for name in ["dragged", "next_event", "after_play"] {
+            assert_shows(&found_by_log[name], &answers);
+        }
+        assert_shows(&found["phone"], &answers);
+        // The slider was drawn to six tenths of its length, give or take its knob.
+        let dragged = number(&found_by_log["dragged"]["time_s"]);
+        let [start, end] = ["start_s", "end_s"].map(|name| number(&found_by_log["dragged"][name]));
+        assert!(((dragged - start) / (end - start) - 0.6).abs() < 0.02, "{dragged} of {start} to {end}");
+        // It was lost after the wrong pose, found itself with the right one, and that was a large correction or a given pose.
+        let kinds = &found_by_log["kinds"];
+        let time_of = |kind: &str| number(&kinds[kind]["first"]["time_s"]);
+        let lost = number(&kinds["lost"]["jumped"]["time_s"]);
+        assert!(lost > 31.0 && lost < 41.0 && lost == time_of("lost"), "{kinds}");
+        assert_eq!(kinds["lost"]["jumped"]["mode"], "lost");
+        assert_shows(&kinds["lost"]["jumped"], &answers);
+        let relocalised = found_by_log["kinds"]["relocalised"]["count"].as_u64().unwrap();
+        assert_eq!(relocalised, 2, "{kinds}");
+        let played = number(&found_by_log["after_play"]["time_s"]) - number(&found_by_log["before_play"]["time_s"]);
+        assert!(played >= 5.0 && played < 60.0, "{played}");
+        assert_eq!(found_by_log["after_keys"]["following"], false);
+    }
+}
+
+#[test]
+fn an_hour_is_opened_and_scrubbed() {
+    if std::env::var_os("AGV_LONG").is_none() || !has_browser("an_hour_is_opened_and_scrubbed") {
+        return;
+    }
+    let recording = hall("speed = 0.0249");
+    let answers = replay(&recording, |_| ()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hour.agvlog");
+    log::write_with_outputs(&path, &recording, |event| answers.output(event)).unwrap();
+    let mut loaded = 0.0;
+    let found = browse(Timeline::of_log(path.clone()), "log", "-", |shared, is_stopped| {
+        let start = Instant::now();
+        load(&path, shared, is_stopped).unwrap();
+        loaded = start.elapsed().as_secs_f64();
+    });
+    let seeks: Vec<f64> =
+        found["found"]["seeks"].as_array().unwrap().iter().map(|state| number(&state["seek_ms"])).collect();
+    println!("scans {}, loaded in {loaded:.2} s, opened in {} ms, seeks in {seeks:?} ms", 28_800, found["opened_ms"]);
+    assert!(loaded < 2.0 && seeks.iter().all(|seek| *seek < 100.0));
+}
+
+#[test]
+fn a_drive_in_emulation_is_looked_at() {
+    let test = "a_drive_in_emulation_is_looked_at";
+    let image = repository("target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle");
+    if !image.exists() {
+        data::skip(test, "the firmware is not built; cargo xtask firmware build");
+        return;
+    }
+    if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|output| output.status.success()) {
+        data::skip(test, "there is no qemu-system-arm");
+        return;
+    }
+    if !has_browser(test) {
+        return;
+    }
+    let recording = hall("speed = 1.2");
+    let folder = tempfile::tempdir().unwrap();
+    let image = image.canonicalize().unwrap();
+    let options = VehicleOptions { image: &image, folder: folder.path(), key: None, provision: true, is_told: true };
+    let copy = folder.path().join("copy.agvlog");
+    let mut found = Value::Null;
+    let driven = vehicle::drive(&recording, &options, 45.0, |watch| {
+        let host = format!("127.0.0.1:{}", watch.stream_port);
+        let pictures = pictures();
+        found = browse(Timeline::of_controller(&host), "live", pictures.to_str().unwrap(), |shared, is_stopped| {
+            follow(&host, Some(&copy), shared, is_stopped).unwrap();
+        });
+    })
+    .unwrap();
+    // What the page showed is what the firmware said at that time, which is in its log.
+    let contents = log::read_contents(&driven.log, |_| ()).unwrap();
+    for name in ["first", "second", "scrubbed", "again"] {
+        let state = &found["found"][name];
+        let time = Time::from_seconds(number(&state["shown_s"]));
+        let said = contents.outputs.iter().rev().find(|output| output.pose.time <= time).unwrap();
+        let shown = ["x_m", "y_m", "heading_rad"].map(|name| number(&state["pose"][name]));
+        let said = [said.pose.pose.x, said.pose.pose.y, said.pose.pose.theta];
+        assert!(shown.iter().zip(said).all(|(shown, said)| (shown - said).abs() < 1e-9), "{shown:?} {said:?}");
+    }
+    assert_eq!(found["found"]["again"]["live"], true);
+    assert!(log::read_contents(&copy, |_| ()).unwrap().outputs.len() > 100);
+}
