@@ -3,7 +3,8 @@
 use agv_lidar3d::calibration::Laser;
 use agv_lidar3d::geometry::{Offsets, point};
 use agv_lidar3d::intrinsic::{
-    AdjustmentError, Plane, Residual, Return, SegmentationError, Target, calibrate, flatness, segment,
+    AdjustmentError, Deviation, Plane, Residual, Return, SegmentationError, Target, calibrate, calibrate_near,
+    flatness, segment,
 };
 use proptest::prelude::*;
 
@@ -117,6 +118,23 @@ fn one_plane_does_not_determine_the_lasers() {
         // Theta is stated to be unknown: more than a tenth of a degree for each millimetre of noise.
         Ok(found) => assert!(found.deviations[0].unwrap().elevation / found.noise > 0.1_f64.to_radians() / 0.001),
     }
+}
+
+#[test]
+fn what_one_plane_does_not_show_stays_near_what_is_known() {
+    let truth = lasers();
+    let start = disturbed(&truth, &[[0.01, 0.001, 0.002], [-0.01, -0.001, 0.001]].repeat(4));
+    let one = scan(&truth, Offsets::Orthogonal, unit(0.1, -0.2), 8.0);
+    let prior = Deviation { distance: 0.02, elevation: 0.002, rotation: 0.005 };
+    let flat = |lasers: &[Laser]| flatness(lasers, Offsets::Orthogonal, &one.returns).unwrap().thickness();
+    let (before, targets) = (flat(&start), [one.clone()]);
+    let found = calibrate_near(&start, Offsets::Orthogonal, Residual::AlongBeam, &prior, &targets).unwrap();
+    for (start, found) in start.iter().zip(&found.lasers) {
+        assert!((start.distance - found.distance).abs() < 0.04, "{start:?} {found:?}");
+        assert!((start.elevation - found.elevation).abs() < 0.004, "{start:?} {found:?}");
+        assert!((start.rotation - found.rotation).abs() < 0.01, "{start:?} {found:?}");
+    }
+    assert!(flat(&found.lasers) < 0.2 * before, "{} {before}", flat(&found.lasers));
 }
 
 #[test]

@@ -37,8 +37,13 @@ const FACADE_CELL: f64 = 6.0;
 const FEWEST_POINTS: usize = 60;
 const FEWEST_ROWS: usize = 5;
 const LEAST_SHARE: f64 = 0.5;
-/// Half the thickness of what is cut out, m.
+/// Half the thickness of what votes for a plane, m; what is cut out reaches so many times as far as its points scatter, which
+/// is no more than this, m: kerbs, cars and bushes are no planes.
 const REACH: f64 = 0.15;
+const CUT: f64 = 3.0;
+const ROUGHEST: f64 = 0.05;
+/// The median of an absolute normal deviate.
+const MEDIAN_DEVIATE: f64 = 0.6745;
 /// Planes that are tried in a cell.
 const PROPOSALS: usize = 60;
 /// Sines of the rise of a normal: of a facade at most, of the ground at least.
@@ -180,10 +185,21 @@ fn patch(kind: Kind, seen: &[(Return, [f64; 3])], random: &mut ChaCha8Rng) -> Op
         }
     }
     let (_, first) = best?;
-    let plane =
-        Plane::fit(seen.iter().map(|(_, point)| *point).filter(|point| first.distance_of(*point).abs() < REACH))?;
+    let fit = |plane: &Plane, reach: f64| {
+        Plane::fit(seen.iter().map(|(_, point)| *point).filter(|point| plane.distance_of(*point).abs() < reach))
+    };
+    let plane = fit(&first, REACH)?;
+    let mut off: Vec<f64> = seen.iter().map(|(_, point)| plane.distance_of(*point).abs()).collect();
+    off.retain(|distance| *distance < REACH);
+    off.sort_by(f64::total_cmp);
+    let scatter = off.get(off.len() / 2)? / MEDIAN_DEVIATE;
+    if scatter > ROUGHEST {
+        return None;
+    }
+    let reach = CUT * scatter;
+    let plane = fit(&plane, reach)?;
     let returns: Vec<Return> =
-        seen.iter().filter(|(_, point)| plane.distance_of(*point).abs() < REACH).map(|(seen, _)| *seen).collect();
+        seen.iter().filter(|(_, point)| plane.distance_of(*point).abs() < reach).map(|(seen, _)| *seen).collect();
     let mut rows: Vec<usize> = returns.iter().map(|seen| seen.laser).collect();
     rows.dedup();
     let is_patch = is_allowed(&plane)

@@ -1,7 +1,7 @@
 //! Parameters of a real sensor found back from simulated scans.
 
 use agv_host_sim::data;
-use agv_host_sim::evaluate::lidar3d_calibration;
+use agv_host_sim::evaluate::{lidar3d_calibration, lidar3d_sharpness};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::intrinsic::Residual;
 
@@ -20,5 +20,14 @@ fn disturbed_parameters_of_a_real_sensor_come_back_and_their_deviations_are_hone
     // Not thinner than the truth makes them, up to a hundredth: that would be fitted noise.
     for walls in [outcome.used, outcome.held_out] {
         assert!((walls.thickness_after_m / walls.thickness_true_m - 1.0).abs() < 0.01, "{outcome:?}");
+    }
+}
+
+#[test]
+fn ground_and_facades_of_real_scans_become_thinner_where_they_were_not_used() {
+    let Some(folder) = data::for_test("lidar3d sharpness", "lidar3d/moosmann/MuehlburgerTor") else { return };
+    let outcome = lidar3d_sharpness::moosmann(&folder).unwrap();
+    for thickness in [outcome.ground_held_out, outcome.facades_held_out] {
+        assert!(thickness.patches > 100 && thickness.after_m < 0.95 * thickness.before_m, "{outcome:?}");
     }
 }

@@ -23,6 +23,9 @@ const CUT: f64 = 4.685;
 const MEDIAN_DEVIATE: f64 = 0.6745;
 /// Steps below this part of a parameter's standard deviation end it.
 const SMALL: f64 = 0.02;
+/// So do steps below this part of the standard deviation to which a parameter is known before: where surfaces are not quite
+/// planes, which points count changes a little for ever.
+const SMALL_TO_KNOWN: f64 = 0.05;
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -122,6 +125,7 @@ fn adjust(
     }
     let mut lasers = start.to_vec();
     let mut planes: Vec<Plane> = targets.iter().map(|target| target.plane).collect();
+    let known = prior.map_or(Vector3::zeros(), |prior| Vector3::new(prior.distance, prior.elevation, prior.rotation));
     for round in 1..=ROUNDS {
         let noise = noise(&lasers, offsets, residual, targets, &planes);
         let sums: Vec<PlaneSums> = targets
@@ -133,8 +137,7 @@ fn adjust(
         let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
         let observed = is_observed.iter().filter(|is_observed| **is_observed).count();
         let mut equations = LaserEquations::new(&sums, &is_observed, shift / observed as f64);
-        if let Some(prior) = prior {
-            let known = Vector3::new(prior.distance, prior.elevation, prior.rotation);
+        if prior.is_some() {
             let weights = known.map(|deviation| (noise / deviation).powi(2));
             let off = lasers.iter().zip(start).map(|(laser, start)| {
                 let by = [laser.distance - start.distance, laser.elevation - start.elevation];
@@ -149,12 +152,18 @@ fn adjust(
             laser.rotation += step[2];
         }
         for (plane, sums) in planes.iter_mut().zip(&sums) {
-            let step = sums.plane_step(&steps).ok_or(AdjustmentError::Undetermined)?;
-            *plane = plane.moved(step.into());
+            // A plane whose points all graze it or lie far off stays where it is, and moves no laser.
+            if let Some(step) = sums.plane_step(&steps) {
+                *plane = plane.moved(step.into());
+            }
         }
         let deviations: Vec<Vector3<f64>> = variances.iter().map(|variance| variance.map(libm::sqrt) * noise).collect();
-        let mut pairs = steps.iter().flatten().zip(deviations.iter().flatten());
-        if pairs.all(|(step, deviation)| step.abs() < SMALL * deviation) {
+        let is_small = |(step, deviation): (&Vector3<f64>, &Vector3<f64>)| {
+            (0..3).all(|parameter| {
+                step[parameter].abs() < (SMALL * deviation[parameter]).max(SMALL_TO_KNOWN * known[parameter])
+            })
+        };
+        if steps.iter().zip(&deviations).all(is_small) {
             let deviations = deviations.iter().zip(&is_observed).map(|(deviation, is_observed)| {
                 let [distance, elevation, rotation] = (*deviation).into();
                 is_observed.then_some(Deviation { distance, elevation, rotation })
