@@ -77,6 +77,12 @@ impl RecordedEvent {
 }
 
 impl RecordedEvent {
+    /// Whether somebody has told where the vehicle is.
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        matches!(self, Self::SetPose(_))
+    }
+
     /// When it happened; for a revolution, when it began. None for a revolution without reflectors.
     #[must_use]
     pub fn time(&self) -> Option<Time> {

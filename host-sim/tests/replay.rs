@@ -5,11 +5,12 @@ mod support;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
+use agv_core::geometry::Pose;
 use agv_core::landmarks::LandmarkKind;
 use agv_core::record::{DamageReason, Output};
 use agv_host_sim::log;
 use agv_host_sim::mapping::map_file;
-use agv_host_sim::recording::{RecordedOutput, Recording};
+use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording};
 use agv_host_sim::replay::{Replay, compare, replay};
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::scenario::{
@@ -207,6 +208,26 @@ fn a_log_without_a_pose_can_be_given_one() {
     recording.truth.clear();
     log::write(Path::new(&log), &recording).unwrap();
     assert!(refusal(&["replay", &log, "--start", "recorded"]).contains("no pose with a heading"));
+}
+
+#[test]
+fn a_vehicle_that_is_told_nonsense_finds_itself() {
+    let files = Files::new();
+    let [log, empty] = ["nonsense", "empty"].map(|name| files.path(&format!("{name}.agvlog")));
+    let mut recording = drive();
+    for event in &mut recording.events {
+        if let RecordedEvent::SetPose(fix) = event {
+            fix.pose = Pose::new(2.0, 4.0, 2.5);
+        }
+    }
+    log::write(Path::new(&log), &recording).unwrap();
+    let figures = json(&agv(&["replay", &log, "--relocalise", "reflectors", "--json"]).stdout);
+    let worst = figures["accuracy"]["position_mm"]["max"].as_f64().unwrap();
+    assert!(worst < 50.0, "{figures}");
+    recording.landmarks.clear();
+    log::write(Path::new(&empty), &recording).unwrap();
+    let refused = refusal(&["replay", &empty, "--relocalise", "reflectors"]);
+    assert!(refused.contains("the map has no reflectors"), "{refused}");
 }
 
 #[test]

@@ -28,6 +28,7 @@ Examples:
   agv replay drive.agvlog --vehicle vehicle.toml
   agv replay intel.agvlog --start recorded --landmarks dynamic
   agv replay drive.agvlog --landmarks none --output odometry.agvlog
+  agv replay drive.agvlog --relocalise reflectors
   agv replay drive.agvlog --relocalise lidar3d --places street.places3d --scans drive.pcap
 
 Keys of --json:
@@ -134,10 +135,7 @@ impl Replay {
             && self.start.is_none()
             && self.vehicle.is_none()
             && !self.relocalisation.is_wanted();
-        let fix = self.relocalisation.fix(&recording)?;
-        if let Some(fix) = fix {
-            recording.events.insert(0, RecordedEvent::SetPose(fix));
-        }
+        self.relocalisation.apply(&mut recording).with_context(|| self.log.display().to_string())?;
         if let Some(start) = self.start {
             set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
         }

@@ -1,8 +1,10 @@
 //! The core against a recording.
 
 mod comparison;
+mod start_search;
 
 pub use comparison::{Comparison, compare};
+pub use start_search::{StartSearchError, find_start};
 
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,7 @@
-//! A multi-beam lidar tells where a drive begins: `agv replay --relocalise lidar3d`.
+//! The vehicle finds out where a drive begins: `agv replay --relocalise`.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::PoseFix;
@@ -9,6 +9,7 @@ use agv_host_sim::lidar3d::Source;
 use agv_host_sim::lidar3d::place_map::{self, Limits};
 use agv_host_sim::lidar3d::signatures::Method;
 use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::replay::find_start;
 use anyhow::{Context, bail, ensure};
 
 use super::arguments::SensorArguments;
@@ -24,17 +25,23 @@ const LEAST_POSITION_DEVIATION: f64 = 0.5;
 /// Scans that are looked at for a place, at the most.
 const SCANS: usize = 20;
 
-/// Where the vehicle is at the start, from the scans of another sensor.
+/// Where the vehicle is at the start, from what its sensors see.
 #[derive(clap::Args)]
 pub struct Relocalisation {
-    /// Find the place where the drive begins.
-    #[arg(long, value_name = "SENSOR", requires = "places", requires = "scans")]
+    /// Find the place where the drive begins; poses that the log tells are not used.
+    #[arg(long, value_name = "SENSOR")]
     relocalise: Option<By>,
     /// Places with poses that 'agv lidar3d places index' has stored.
-    #[arg(long, value_name = "FILE", requires = "relocalise")]
+    #[arg(long, value_name = "FILE", requires = "relocalise", required_if_eq("relocalise", "lidar3d"))]
     places: Option<PathBuf>,
     /// Scans that were taken as the drive began: capture or folder of range images.
-    #[arg(long, value_name = "SOURCE", value_parser = Source::parse, requires = "relocalise")]
+    #[arg(
+        long,
+        value_name = "SOURCE",
+        value_parser = Source::parse,
+        requires = "relocalise",
+        required_if_eq("relocalise", "lidar3d")
+    )]
     scans: Option<Source>,
     /// Pose of that sensor on the vehicle, seen from the logical point: X,Y,HEADING in m, m and deg.
     #[arg(long, value_name = "POSE", default_value = "0,0,0", value_parser = pose, allow_hyphen_values = true)]
@@ -45,6 +52,8 @@ pub struct Relocalisation {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum By {
+    /// The reflectors of the map, as the controller does it.
+    Reflectors,
     /// Multi-beam lidar.
     Lidar3d,
 }
@@ -65,11 +74,24 @@ impl Relocalisation {
         self.relocalise.is_some()
     }
 
-    /// The pose of the logical point at the first event of a log. None if nobody asks.
-    pub fn fix(&self, recording: &Recording) -> anyhow::Result<Option<PoseFix>> {
-        let (Some(By::Lidar3d), Some(path), Some(source)) = (self.relocalise, &self.places, &self.scans) else {
-            return Ok(None);
+    /// Replaces the poses that a recording tells by the one that is found. Does nothing if nobody asks.
+    pub fn apply(&self, recording: &mut Recording) -> anyhow::Result<()> {
+        let (before, fix) = match (self.relocalise, &self.places, &self.scans) {
+            (Some(By::Reflectors), _, _) => {
+                let (event, fix) = find_start(recording).context("the vehicle does not find itself")?;
+                (event + 1, fix)
+            }
+            (Some(By::Lidar3d), Some(path), Some(source)) => (0, self.fix(recording, path, source)?),
+            _ => return Ok(()),
         };
+        let place = recording.events.iter().take(before).filter(|event| !event.is_told()).count();
+        recording.events.retain(|event| !event.is_told());
+        recording.events.insert(place, RecordedEvent::SetPose(fix));
+        Ok(())
+    }
+
+    /// The pose of the logical point at the first event of a log, by a multi-beam lidar.
+    fn fix(&self, recording: &Recording, path: &Path, source: &Source) -> anyhow::Result<PoseFix> {
         let map = place_map::read(path)?;
         let named = || path.display().to_string();
         ensure!(map.places.iter().all(|place| place.pose.is_some()), "{}: the places have no poses", named());
@@ -88,11 +110,11 @@ impl Relocalisation {
         let sensor = Pose::new(x, y, heading + answer.turn);
         let time = recording.events.iter().filter_map(RecordedEvent::time).min();
         let position_deviation = (POSITION_SHARE * map.spacing().unwrap_or(0.0)).max(LEAST_POSITION_DEVIATION);
-        Ok(Some(PoseFix {
+        Ok(PoseFix {
             time: time.context("the log has no events")?,
             pose: sensor.compose(&self.mount.inverse()),
             position_deviation,
             heading_deviation: HEADING_DEVIATION,
-        }))
+        })
     }
 }

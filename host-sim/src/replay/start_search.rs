@@ -1,0 +1,66 @@
+//! Where a drive begins, found as the controller finds it: by the reflectors that are seen.
+
+use agv_core::landmarks::{FixedMap, Landmark, LandmarkKind, MapError};
+use agv_core::localizer::{PoseFix, StartFinder, StartState};
+use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
+
+use crate::recording::Recording;
+
+/// Most reflectors of a map.
+const REFLECTORS: usize = 1000;
+
+/// Why a vehicle does not find itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StartSearchError {
+    /// The map does not fit.
+    #[error("the map has more than {REFLECTORS} reflectors, or one that is not finite")]
+    Map,
+    /// The map is empty.
+    #[error("the map has no reflectors")]
+    NoReflectors,
+    /// Two poses fit equally, all along.
+    #[error("two poses fit what is seen equally")]
+    Ambiguous,
+    /// There is nothing to tell it by.
+    #[error("too few reflectors are seen")]
+    TooFew,
+    /// The map does not explain what is seen.
+    #[error("no place of the map looks like what is seen")]
+    Unknown,
+}
+
+impl From<MapError> for StartSearchError {
+    fn from(_: MapError) -> Self {
+        Self::Map
+    }
+}
+
+/// The first pose that the vehicle finds by itself, and the number of the event after which it has it. Poses that it is
+/// told are not looked at.
+///
+/// # Errors
+/// See [`StartSearchError`].
+pub fn find_start(recording: &Recording) -> Result<(usize, PoseFix), StartSearchError> {
+    let is_reflector = |landmark: &&Landmark| landmark.kind == LandmarkKind::Reflector;
+    let reflectors: Vec<Landmark> = recording.landmarks.iter().filter(is_reflector).copied().collect();
+    if reflectors.is_empty() {
+        return Err(StartSearchError::NoReflectors);
+    }
+    let (mut map, mut index) = (Box::new(FixedMap::<REFLECTORS>::new()), Box::new(ReflectorIndex::<4096>::new()));
+    map.extend(&reflectors)?;
+    index.build(&map);
+    let reflectors = IndexedReflectors { map: &map, index: &index };
+    let mut finder = Box::new(StartFinder::<64>::new(recording.parameters, RelocalizationParameters::default()));
+    let mut reason = StartSearchError::TooFew;
+    for (number, event) in recording.events.iter().enumerate().filter(|(_, event)| !event.is_told()) {
+        finder.handle(&event.view(), &reflectors);
+        match finder.search(&reflectors, u32::MAX) {
+            StartState::Found(fix) => return Ok((number, fix)),
+            StartState::Ambiguous(..) => reason = StartSearchError::Ambiguous,
+            StartState::Unknown => reason = StartSearchError::Unknown,
+            StartState::TooFew => reason = StartSearchError::TooFew,
+            StartState::Waiting | StartState::Searching => {}
+        }
+    }
+    Err(reason)
+}
