@@ -1,7 +1,7 @@
 //! Organised clouds: a ring a row, a column a direction.
 
 use crate::calibration::Laser;
-use crate::packet::Point;
+use crate::packet::{Point, counts_between};
 
 /// A cloud of `RINGS` rings, ordered from the highest beam to the lowest, borrowed column by column.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +87,7 @@ impl RingOrder {
     pub fn put(&self, cloud: &mut [Option<[f32; 3]>], point: &Point) -> bool {
         let columns = cloud.len() / self.rings.max(1);
         let Some((ring, rotation)) = self.lasers.get(usize::from(point.laser)).copied() else { return false };
-        let direction = (u32::from(point.azimuth) + TURN - u32::from(rotation)) % TURN;
+        let direction = u32::from(counts_between(rotation, point.azimuth));
         let column = direction as usize * columns / TURN as usize;
         let Some(place) = cloud.get_mut(usize::from(ring) * columns + column) else { return false };
         let squared = |[x, y, z]: [f32; 3]| x * x + y * y + z * z;

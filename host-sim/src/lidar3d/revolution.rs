@@ -2,7 +2,7 @@
 
 use agv_core::measurement::Time;
 use agv_lidar3d::cloud::RingOrder;
-use agv_lidar3d::packet::{Decoder, Packet, Point, Tally};
+use agv_lidar3d::packet::{Decoder, Packet, Point, Tally, counts_between};
 
 use super::setup::Setup;
 
@@ -78,7 +78,7 @@ impl Revolutions {
             current.start = time;
         }
         decoder.packet(packet, |point| {
-            let turned = (point.azimuth + TURN - *beginning) % TURN;
+            let turned = counts_between(*beginning, point.azimuth);
             if last.is_some_and(|last| last > turned && last - turned > TURN / 2) {
                 let next = Revolution {
                     start: time,

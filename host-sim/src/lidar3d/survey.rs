@@ -4,7 +4,7 @@ use std::path::Path;
 
 use agv_core::measurement::Time;
 use agv_lidar3d::calibration::Calibration;
-use agv_lidar3d::packet::{Packet, Sensor, Tail, calibration_from_stream};
+use agv_lidar3d::packet::{Packet, Sensor, Tail, calibration_from_stream, counts_between};
 
 use crate::import::velodyne::{self, VelodyneError};
 
@@ -78,7 +78,7 @@ impl Surveyor {
         for block in packet.blocks() {
             let azimuth = block.azimuth();
             if let Some(last) = self.last_azimuth {
-                self.counts += u64::from((azimuth + 36_000 - last) % 36_000);
+                self.counts += u64::from(counts_between(last, azimuth));
             }
             self.last_azimuth = Some(azimuth);
         }

@@ -10,4 +10,4 @@ pub use sensor::Sensor;
 #[cfg(feature = "std")]
 pub use status::calibration_from_stream;
 pub use status::{STATUS_CYCLE, Tail};
-pub use view::{BLOCKS, Block, LENGTH, PORT, Packet, PacketError, RETURNS, Return};
+pub use view::{BLOCKS, Block, LENGTH, PORT, Packet, PacketError, RETURNS, Return, counts_between};

@@ -1,6 +1,6 @@
 //! The sensors that send these packets.
 
-use super::{BLOCKS, Packet, RETURNS};
+use super::{BLOCKS, Packet, RETURNS, counts_between};
 
 const HDL32E_ELEVATIONS: [f64; 32] = [
     -30.67, -9.33, -29.33, -8.0, -28.0, -6.67, -26.67, -5.33, -25.33, -4.0, -24.0, -2.67, -22.67, -1.33, -21.33, 0.0,
@@ -81,7 +81,7 @@ impl Sensor {
         }
         let firings = if packet.tail().status().0 == DUAL_RETURN { BLOCKS / 2 } else { BLOCKS };
         let (first, last) = (packet.azimuth(0)?, packet.azimuth(BLOCKS - 1)?);
-        Some(((u32::from(last) + 36_000 - u32::from(first)) % 36_000, firings as u32 - 1))
+        Some((u32::from(counts_between(first, last)), firings as u32 - 1))
     }
 
     /// Which share of the way to the next block's angle the head has turned when a return of a block is measured, in

@@ -17,6 +17,13 @@ const LOWER: u16 = 0xDDFF;
 /// Hundredths of a degree in a turn.
 const TURN: u16 = 36_000;
 
+/// The turn of the head from one azimuth to another, both of at most one turn, 0.01 degrees.
+#[must_use]
+pub fn counts_between(first: u16, last: u16) -> u16 {
+    let turned = u32::from(last) + u32::from(TURN) - u32::from(first % TURN);
+    (turned % u32::from(TURN)) as u16
+}
+
 /// Why bytes are no packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "std", derive(thiserror::Error))]
