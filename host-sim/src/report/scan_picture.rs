@@ -22,7 +22,7 @@ type Colour = [u8; 3];
 pub fn write(path: &Path, cloud: &[Option<[f32; 3]>], rings: usize, reach: f32) -> io::Result<()> {
     let (columns, above) = (cloud.len() / rings.max(1), rings * RING_HEIGHT);
     let mut pixels = vec![[0_u8; 3]; WIDTH * (above + WIDTH)];
-    for (row, target) in pixels[..WIDTH * above].chunks_exact_mut(WIDTH).enumerate() {
+    for (row, target) in pixels[..WIDTH * above].as_chunks_mut::<WIDTH>().0.iter_mut().enumerate() {
         let ring = &cloud[row / RING_HEIGHT * columns..][..columns];
         for (x, pixel) in target.iter_mut().enumerate() {
             // Column 0 looks ahead, columns go clockwise: ahead into the middle.
