@@ -139,15 +139,18 @@ fn thickness(patches: &[(Kind, Target)], kind: Kind, before: &[Laser], after: &[
     Thickness { patches: count, points, before_m, after_m }
 }
 
-/// A return and its position, m.
-type SeenPoint = (Return, [f64; 3]);
+/// Whether it is above the ground, and where it is, in widths of a cell.
+type Cell = (bool, i32, i32);
+
+/// A return, and where it lies.
+type Seen = (Return, [f64; 3]);
 
 /// The patches of a scan.
 fn patches(images: &RangeImages, lasers: &[Laser], scan: usize) -> anyhow::Result<Vec<(Kind, Target)>> {
     let counts = images.counts(scan)?;
     let height = f64::from(sensor_height(&images.points(scan)?));
     let columns = images.rotations.len();
-    let mut cells: BTreeMap<(bool, i32, i32), Vec<SeenPoint>> = BTreeMap::new();
+    let mut cells: BTreeMap<Cell, Vec<Seen>> = BTreeMap::new();
     for (place, count) in counts.iter().enumerate() {
         let distance = f64::from(*count) * images.resolution;
         let seen = Return { laser: place / columns, azimuth: -images.rotations[place % columns], distance };
@@ -161,7 +164,7 @@ fn patches(images: &RangeImages, lasers: &[Laser], scan: usize) -> anyhow::Resul
         cells.entry((is_facade, index(point[0]), index(point[1]))).or_default().push((seen, point));
     }
     let mut random = ChaCha8Rng::seed_from_u64(scan as u64);
-    let patch = |((is_facade, ..), seen): ((bool, i32, i32), Vec<SeenPoint>)| {
+    let patch = |((is_facade, ..), seen): (Cell, Vec<Seen>)| {
         let kind = if is_facade { Kind::Facade } else { Kind::Ground };
         Some((kind, patch(kind, &seen, &mut random)?))
     };
@@ -169,7 +172,7 @@ fn patches(images: &RangeImages, lasers: &[Laser], scan: usize) -> anyhow::Resul
 }
 
 /// The plane of a cell, if there is one.
-fn patch(kind: Kind, seen: &[SeenPoint], random: &mut ChaCha8Rng) -> Option<Target> {
+fn patch(kind: Kind, seen: &[Seen], random: &mut ChaCha8Rng) -> Option<Target> {
     if seen.len() < FEWEST_POINTS {
         return None;
     }
