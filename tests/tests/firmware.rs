@@ -55,7 +55,7 @@ fn the_emulated_controller_says_the_same_bits() {
 
 /// Most instructions that a piece of work may take: with 480 MHz, the scan cycle ends in about 10 ms.
 const BUDGETS: [(&str, u64); 7] = [
-    ("prediction", 8_000),
+    ("prediction", 4_000),
     ("one reflector update", 25_000),
     ("falko on 1440 beams", 3_000_000),
     ("scan cycle", 5_000_000),

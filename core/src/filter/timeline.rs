@@ -45,7 +45,7 @@ enum Fusion {
     Nothing,
     Correction(Correction),
     /// The state was given by a filter that knows more.
-    State(Ekf),
+    Given,
 }
 
 impl Entry {
@@ -54,8 +54,7 @@ impl Entry {
     }
 
     fn recompute(&mut self, before: &Ekf, laser: &Pose) {
-        if let Fusion::State(state) = &self.fusion {
-            self.state = *state;
+        if matches!(self.fusion, Fusion::Given) {
             return;
         }
         self.state = *before;
@@ -85,6 +84,7 @@ pub struct Timeline<const ENTRIES: usize> {
     ahead: Option<(Pose, Time)>,
     /// The last motion that the odometry reported.
     last_motion: Motion,
+    odometry_pose: Pose,
     start: Time,
     laser: Pose,
     longest_extrapolation: f64,
@@ -100,6 +100,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
             settled: 1,
             ahead: None,
             last_motion: Motion::none(time),
+            odometry_pose: Pose::default(),
             start: time,
             laser,
             longest_extrapolation,
@@ -115,6 +116,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.settled = 1;
         self.ahead = None;
         self.last_motion = Motion::none(time);
+        self.odometry_pose = state.pose;
         self.start = time;
     }
 
@@ -171,6 +173,13 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         &self.last_motion
     }
 
+    /// The pose that only the odometry has moved since the beginning, at the time of the newest entry. What lies between it
+    /// and the pose of the state is the correction by landmarks, so a controller that steers by it feels no step.
+    #[must_use]
+    pub fn odometry_pose(&self) -> &Pose {
+        &self.odometry_pose
+    }
+
     /// The state at `time`, from the entry before it and the odometry.
     ///
     /// # Errors
@@ -222,7 +231,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     pub fn set_state(&mut self, time: Time, state: Ekf) -> Result<(), TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         let parts = self.motion_to(position, time)?;
-        self.divide(position, parts, Fusion::State(state), state);
+        self.divide(position, parts, Fusion::Given, state);
         Ok(())
     }
 
@@ -242,6 +251,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         if rest.is_none() {
             let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
             self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
+            self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
         }
         let position = self.insert(position + 1, Entry { motion, fusion, state });
         if let (Some(rest), Some(next)) = (rest, self.entries.get_mut(position + 1)) {
@@ -301,6 +311,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.make_room();
         let mut entry = Entry { motion, fusion: Fusion::Nothing, state };
         entry.recompute(&state, &self.laser);
+        self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
         let _ = self.entries.push_back(entry);
         self.settled = self.entries.len();
     }

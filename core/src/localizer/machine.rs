@@ -6,7 +6,6 @@ use nalgebra::Matrix2;
 use super::maps::{Association, Maps};
 use super::output::OBSERVATIONS;
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Seen, Slam, cartesian};
-use super::smooth_pose::SmoothPose;
 use super::{Event, LandmarkSource, LandmarkUse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, detect_reflectors, falko};
 use crate::filter::{Cartesian, Consistency, Ekf, Observation, RangeBearing, Timeline};
@@ -15,8 +14,8 @@ use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, Landmark
 use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
-/// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
-const PAST: usize = 128;
+/// Entries of the filter's past: 0.36 s at 100 samples and 230 corrections a second.
+const PAST: usize = 120;
 
 /// Localises one vehicle. All of its memory is in this value.
 ///
@@ -44,7 +43,6 @@ pub struct Localizer<
     lost: Option<Reason>,
     blindness: Option<Blindness>,
     distance: DistanceSince,
-    smooth: SmoothPose,
     workspace: Workspace<BEAMS>,
     outputs: Outputs,
 }
@@ -147,7 +145,6 @@ impl<
             lost: None,
             blindness: None,
             distance: DistanceSince::NEVER,
-            smooth: SmoothPose::default(),
             workspace: Workspace {
                 points: PointScan::new(),
                 path: SensorPath::default(),
@@ -208,7 +205,7 @@ impl<
     }
 
     /// Takes one event. Events of one sensor come in order of time; those of different sensors may overtake each other
-    /// by as much as the filter remembers, about 0.4 s.
+    /// by as much as the filter remembers, a third of a second.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
         match event {
@@ -238,7 +235,7 @@ impl<
             Event::Scan(scan) => self.scan(scan),
             Event::SetPose(fix) => self.set_pose(fix),
         }
-        self.publish();
+        self.publish(matches!(event, Event::Reflectors(_) | Event::Scan(_)));
         &self.outputs
     }
 
@@ -249,7 +246,6 @@ impl<
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state);
-        self.smooth = SmoothPose::new(fix.time, fix.pose);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
         self.blindness =
@@ -542,12 +538,13 @@ impl<
         self.maps.dynamic.finish();
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, may_be_corrected: bool) {
         let Some(timeline) = self.timeline.begun_mut() else {
             return;
         };
         let state = timeline.state();
-        let correction = self.smooth.follow(timeline, &state.pose);
+        let smooth = *timeline.odometry_pose();
+        let correction = if may_be_corrected { correction(&self.outputs.pose, &state.pose, &smooth) } else { 0.0 };
         let limits = &self.parameters.limits;
         let distance = self.distance;
         if self.lost.is_none() {
@@ -577,11 +574,17 @@ impl<
             reason,
             dead_reckoning_distance: distance.any(),
             correction,
-            smooth: self.smooth.pose(),
+            smooth,
             acceptance: self.consistency.acceptance(),
             normalised_square: self.consistency.mean_normalised_square(),
         };
     }
+}
+
+/// By how far landmarks have moved the pose in W since the last output, m, beside what the odometry has.
+fn correction(last: &PoseOutput, pose: &Pose, smooth: &Pose) -> f64 {
+    let expected = last.pose.compose(&last.smooth.between(smooth));
+    libm::hypot(pose.x - expected.x, pose.y - expected.y)
 }
 
 impl<const BEAMS: usize> Workspace<BEAMS> {

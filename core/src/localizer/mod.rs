@@ -7,7 +7,6 @@ mod output;
 mod output_predictor;
 mod parameters;
 mod slam;
-mod smooth_pose;
 mod start_finder;
 
 pub use event::Event;

@@ -1,10 +1,11 @@
 //! The localiser's loop, below all interrupts.
 
-use agv_core::localizer::{Event, Localizer};
+use agv_core::localizer::Event;
 use agv_core::record::{Output, Record};
 
 use super::exchange::{self, BUS_EVENTS, BusEvent, RevolutionReceiver};
 use super::log_stream::LogWriter;
+use super::room::Localizer;
 use super::start_search::StartSearch;
 use super::supervision::{self, Task};
 

@@ -7,6 +7,7 @@ pub mod exchange;
 pub mod laser;
 pub mod localize;
 pub mod log_stream;
+pub mod room;
 pub mod service;
 pub mod settings;
 pub mod start_search;

@@ -10,6 +10,7 @@ use static_cell::ConstStaticCell;
 
 use super::exchange;
 use super::log_stream::SOFTWARE;
+use super::room::HAS_SLAM;
 
 static MAP: ConstStaticCell<Vec<Landmark, LANDMARKS>> = ConstStaticCell::new(Vec::new());
 
@@ -45,6 +46,11 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
         }
         key = store.key();
         starts = store.count_start().unwrap_or(0);
+    }
+    if settings.parameters.maps.slam && !HAS_SLAM {
+        exchange::set_settings_sound(false);
+        defmt::error!("settings: maps.slam is switched off, because this image has no room for it");
+        settings.parameters.maps.slam = false;
     }
     if !panic.is_empty() {
         defmt::error!("before this start: {}", panic);

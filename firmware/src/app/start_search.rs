@@ -1,9 +1,11 @@
 //! The search for the pose of a vehicle that does not know where it is, in slices between events.
 
-use agv_core::localizer::{Event, Localizer, Parameters, PoseFix, StartFinder, StartState};
+use agv_core::localizer::{Event, Parameters, PoseFix, StartFinder, StartState};
 use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
 use agv_core::state::Mode;
 use agv_core::wire::can::controller;
+
+use super::room::Localizer;
 
 /// Words of the rough picture of where reflectors are: 4 kB, cells of about half a metre in a hall of 100 m x 60 m.
 const WORDS: usize = 1024;

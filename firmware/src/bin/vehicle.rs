@@ -4,12 +4,13 @@
 
 use core::panic::PanicInfo;
 
-use agv_core::localizer::{Localizer, OutputPredictor, Parameters};
+use agv_core::localizer::{OutputPredictor, Parameters};
 use agv_core::wire::nav350::Revolution;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
 use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
+use agv_firmware::app::room::Localizer;
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::start_search::StartSearch;
 use agv_firmware::app::throttle::Throttle;

@@ -38,6 +38,9 @@ enum Action {
         /// Name of the image.
         #[arg(default_value = "vehicle")]
         image: String,
+        /// With room for `maps.slam`, which takes 138 kB more RAM.
+        #[arg(long)]
+        slam: bool,
     },
 }
 
@@ -47,21 +50,21 @@ impl Firmware {
         match self.action {
             Action::Build => build(),
             Action::Run { image, icount } => {
-                build_board(&AN500)?;
+                build_board(&AN500, &[])?;
                 emulate(&image, icount)
             }
             Action::Size => {
                 build()?;
                 size::print()
             }
-            Action::Flash { image } => flash(&image),
+            Action::Flash { image, slam } => flash(&image, slam),
         }
     }
 }
 
 /// Builds the images of every board, and what no image uses but every board could.
 pub fn build() -> anyhow::Result<()> {
-    BOARDS.iter().try_for_each(|board| build_board(board))?;
+    BOARDS.iter().try_for_each(|board| build_board(board, &[]))?;
     build_lidar3d()
 }
 
@@ -78,7 +81,7 @@ fn build_lidar3d() -> anyhow::Result<()> {
 
 /// The vehicle's image for the emulated board, built.
 pub fn emulated_vehicle() -> anyhow::Result<PathBuf> {
-    build_board(&AN500)?;
+    build_board(&AN500, &[])?;
     AN500.image("vehicle")
 }
 
@@ -87,7 +90,7 @@ pub fn check_sizes() -> anyhow::Result<()> {
     size::print()
 }
 
-fn build_board(board: &Board) -> anyhow::Result<()> {
+fn build_board(board: &Board, options: &[&str]) -> anyhow::Result<()> {
     if board.images.is_empty() {
         return Ok(());
     }
@@ -95,6 +98,9 @@ fn build_board(board: &Board) -> anyhow::Result<()> {
     cargo.args(["build", "--package", "agv-firmware", "--profile", "firmware"]);
     cargo.args(["--target", image::TARGET, "--features", board.feature, "--target-dir"]);
     cargo.arg(board.folder());
+    for option in options {
+        cargo.args(["--features", option]);
+    }
     for image in board.images {
         cargo.args(["--bin", image]);
     }
@@ -116,9 +122,9 @@ fn emulate(name: &str, icount: bool) -> anyhow::Result<()> {
     if status.success() { Ok(()) } else { bail!("{name} failed") }
 }
 
-fn flash(name: &str) -> anyhow::Result<()> {
+fn flash(name: &str, has_slam: bool) -> anyhow::Result<()> {
     let board = &image::H743;
-    build_board(board)?;
+    build_board(board, if has_slam { &["slam"] } else { &[] })?;
     let mut probe = Command::new("probe-rs");
     probe.args(["download", "--chip", "STM32H743ZITx"]).arg(board.image(name)?).current_dir(repository());
     let status = probe.status().context("probe-rs cannot be started; cargo install probe-rs-tools")?;

@@ -10,7 +10,7 @@ use super::image::BOARDS;
 /// Most flash of an image, bytes.
 const FLASH: u64 = 512 * 1024;
 /// Most static RAM of an image, bytes.
-const RAM: u64 = 480 * 1024;
+const RAM: u64 = 320 * 1024;
 
 /// Images that only measure need not fit a vehicle.
 const UNLIMITED: [&str; 5] = ["calibrate", "latency", "measure", "replay", "restart"];
