@@ -213,7 +213,7 @@ fn encoders_are_set_up_and_read(interface: &str) {
         });
         // Only values are judged: a busy machine may be late by any time.
         let patient =
-            SupervisionLimits { late_after: 60.0, missing_after: 60.0, ..SupervisionLimits::every_10_ms(1e6, 1e6) };
+            SupervisionLimits { late_after: 60.0, missing_after: 60.0, ..SupervisionLimits::every(0.010, 1e6, 1e6) };
         let channel = |number| ChannelSettings {
             encoder: EncoderSettings { answer_timeout: 2.0, heartbeat: 0, ..EncoderSettings::new(node(number)) },
             limits: patient,

@@ -20,7 +20,7 @@ fn at(milliseconds: u64) -> Time {
 fn channel(number: u8, reporting: Reporting) -> ChannelSettings {
     ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
-        limits: SupervisionLimits::every_10_ms(20_000.0, 25_000.0),
+        limits: SupervisionLimits::every(0.010, 20_000.0, 25_000.0),
     }
 }
 

@@ -12,7 +12,7 @@ const RANGE: CounterRange = CounterRange::BITS_24;
 
 /// A vehicle of at most 2 m/s that brakes with at most 2.5 m/s^2.
 fn limits() -> SupervisionLimits {
-    SupervisionLimits::every_10_ms(2.0 * TICKS, 2.5 * TICKS)
+    SupervisionLimits::every(0.010, 2.0 * TICKS, 2.5 * TICKS)
 }
 
 fn at(milliseconds: f64) -> Time {
@@ -43,23 +43,26 @@ fn counter(metres: f64, start: f64) -> u32 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Any top speed and direction, any start of the counter, frames that come up to 4 ms late.
+    /// Any top speed and direction, any start of the counter, any usual period, frames that come up to 4 ms late.
     #[test]
     fn a_normal_drive_raises_no_alarm(
         top in 0.02..1.9f64,
         is_backward: bool,
+        period in prop::sample::select(vec![5, 10, 20, 50, 100]),
         start in 0.0..16_777_216.0f64,
-        delays in prop::collection::vec(0.0..4.0f64, 500),
+        delays in prop::collection::vec(0.0..4.0f64, 1000),
     ) {
         let sign = if is_backward { -1.0 } else { 1.0 };
-        let mut supervisor = Supervisor::new(limits(), RANGE, at(0.0));
+        let limits = SupervisionLimits::every(f64::from(period) * 1e-3, 2.0 * TICKS, 2.5 * TICKS);
+        let mut supervisor = Supervisor::new(limits, RANGE, at(0.0));
         for millisecond in 0..5000 {
             let now = at(f64::from(millisecond));
-            let index = (millisecond / 10) as usize;
+            let index = (millisecond / period) as usize;
             let delay = delays[index];
-            if millisecond % 10 == delay as i32 {
-                let position = counter(sign * way(f64::from(millisecond / 10) * 0.01, top), start);
-                prop_assert_eq!(supervisor.reading(at(10.0 * index as f64 + delay), position), None);
+            if millisecond % period == delay as i32 {
+                let measured = f64::from(millisecond / period * period);
+                let position = counter(sign * way(measured * 1e-3, top), start);
+                prop_assert_eq!(supervisor.reading(at(measured + delay), position), None);
             }
             prop_assert_eq!(supervisor.check(now), None, "at {} ms", millisecond);
         }

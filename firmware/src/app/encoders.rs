@@ -38,7 +38,7 @@ pub fn channels(settings: &Settings) -> [ChannelSettings; 2] {
             reporting: Reporting::Timer { period: settings.encoder_period },
             ..EncoderSettings::new(node(number))
         },
-        limits: SupervisionLimits::every_10_ms(fastest, braking),
+        limits: SupervisionLimits::every(1e-3 * f64::from(settings.encoder_period), fastest, braking),
     };
     [
         channel(settings.nodes.drive, settings.parameters.limits.fastest / drive_scale, BRAKING / drive_scale),

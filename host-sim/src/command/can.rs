@@ -239,7 +239,7 @@ impl Encoders {
         let reporting = if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
         let channel = |node| ChannelSettings {
             encoder: EncoderSettings { reporting, ..EncoderSettings::new(node) },
-            limits: SupervisionLimits::every_10_ms(self.fastest, self.braking),
+            limits: SupervisionLimits::every(0.010, self.fastest, self.braking),
         };
         let mut pair = EncoderPair::new(&channel(self.drive), &channel(self.steering), 0.010, clock.now());
         let mut known = None;

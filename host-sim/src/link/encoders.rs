@@ -38,7 +38,7 @@ pub fn settings(nodes: &EncoderNodes, parameters: &Parameters) -> [ChannelSettin
     let reporting = if nodes.is_synchronous { Reporting::Synchronous } else { Reporting::Timer { period: PERIOD } };
     let channel = |node, range, (fastest, braking)| ChannelSettings {
         encoder: EncoderSettings { reporting, range, ..EncoderSettings::new(node) },
-        limits: SupervisionLimits::every_10_ms(fastest, braking),
+        limits: SupervisionLimits::every(0.010, fastest, braking),
     };
     let Vehicle::Tricycle(vehicle) = parameters.vehicle else {
         return [channel(nodes.drive, None, UNKNOWN_LIMITS), channel(nodes.steering, None, UNKNOWN_LIMITS)];

@@ -97,7 +97,7 @@ fn encoders_are_read_from_a_log_without_their_setup() {
             range: agv_core::odometry::CounterRange::new(1 << 24),
             ..EncoderSettings::new(NodeId::new(number).unwrap())
         },
-        limits: SupervisionLimits::every_10_ms(1e6, 1e6),
+        limits: SupervisionLimits::every(0.010, 1e6, 1e6),
     };
     let mut frames = Vec::new();
     for step in 0..50u32 {

@@ -31,7 +31,7 @@ fn simulated() -> (Vec<EncoderSample>, CounterRange, CounterRange) {
 fn channel(number: u8, reporting: Reporting, fastest: f64, braking: f64) -> ChannelSettings {
     ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
-        limits: SupervisionLimits::every_10_ms(fastest, braking),
+        limits: SupervisionLimits::every(0.010, fastest, braking),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Whether an encoder is to be believed.
 //!
 //! A counter cannot say that it is wrong, but a vehicle cannot do everything: it is no faster than its drive and cannot
-//! stop at once. What contradicts that, and silence, is a fault. With the default limits every fault is known at most
+//! stop at once. What contradicts that, and silence, is a fault. With readings every 10 ms every fault is known at most
 //! 50 ms after it began, if [`Supervisor::check`] is called at least every 5 ms.
 //!
 //! A counter that freezes is found by itself only while the vehicle is so fast that it could not have stopped within the
@@ -30,18 +30,18 @@ pub struct SupervisionLimits {
 }
 
 impl SupervisionLimits {
-    /// Limits for readings every 10 ms: late after 25 ms, frozen after 30 ms, missing after 45 ms, sound again after
-    /// 200 ms. `fastest` in ticks/s, `hardest_braking` in ticks/s^2.
+    /// Limits for readings every `period` seconds, by default 10 ms: late after 2.5 periods, frozen after 3, missing after
+    /// 4.5, sound again after 20. `fastest` in ticks/s, `hardest_braking` in ticks/s^2.
     #[must_use]
-    pub const fn every_10_ms(fastest: f64, hardest_braking: f64) -> Self {
+    pub const fn every(period: f64, fastest: f64, hardest_braking: f64) -> Self {
         Self {
-            period: 0.010,
-            late_after: 0.025,
-            missing_after: 0.045,
-            frozen_after: 0.030,
+            period,
+            late_after: 2.5 * period,
+            missing_after: 4.5 * period,
+            frozen_after: 3.0 * period,
             fastest,
             hardest_braking,
-            recovery: 0.200,
+            recovery: 20.0 * period,
         }
     }
 }
