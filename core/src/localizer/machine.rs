@@ -583,7 +583,8 @@ impl<
 
 /// By how far landmarks have moved the pose in W since the last output, m, beside what the odometry has.
 fn correction(last: &PoseOutput, pose: &Pose, smooth: &Pose) -> f64 {
-    let expected = last.pose.compose(&last.smooth.between(smooth));
+    let is_moved = last.smooth != *smooth;
+    let expected = if is_moved { last.pose.compose(&last.smooth.between(smooth)) } else { last.pose };
     libm::hypot(pose.x - expected.x, pose.y - expected.y)
 }
 

@@ -38,6 +38,9 @@ const OBSERVATIONS: usize = 64;
 /// Way after which what was seen before is forgotten, m: the odometry has then carried it too far.
 const LONGEST_WAY: f64 = 10.0;
 
+/// Silence after which the odometry says nothing of the present, s.
+const LONGEST_SILENCE: f64 = 0.3;
+
 /// A found pose is not surer than this, m and rad: reflectors are passed by a moving vehicle.
 const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 
@@ -82,15 +85,15 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
-                self.travel(motion);
+                self.travel(sample.time, motion);
             }
             Event::Speed(sample) => {
                 let motion = self.odometer.speed(sample);
-                self.travel(motion);
+                self.travel(sample.time, motion);
             }
             Event::Increment(increment) => {
                 let motion = self.odometer.increment(increment);
-                self.travel(motion);
+                self.travel(increment.time, motion);
             }
             Event::Reflectors(seen) => self.revolution(seen.observations, reflectors),
             Event::Scan(scan) => {
@@ -107,14 +110,21 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         }
     }
 
-    /// Forgets what was seen; a search that is under way is given up.
+    /// Forgets what was seen and how the vehicle moved; a search that is under way is given up.
     pub fn forget(&mut self) {
+        self.odometer.restart();
+        self.stand(Time::default());
+    }
+
+    /// Begins with a vehicle that stands at `time`, as nobody says otherwise.
+    fn stand(&mut self, time: Time) {
         self.snapshot.clear();
         self.since = None;
         self.way = 0.0;
+        self.last_motion = Motion::none(time);
     }
 
-    fn travel(&mut self, motion: Result<Motion, OdometryError>) {
+    fn travel(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
         match motion {
             Ok(motion) => {
                 let covariance = &motion.covariance;
@@ -128,8 +138,8 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 }
             }
             // What was seen before cannot be carried on.
-            Err(OdometryError::Implausible) => self.forget(),
-            Err(_) => {}
+            Err(OdometryError::First | OdometryError::Implausible) => self.stand(time),
+            Err(OdometryError::OutOfOrder | OdometryError::WrongVehicle) => {}
         }
     }
 
@@ -138,6 +148,12 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         observations: &[ReflectorObservation],
         reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
     ) {
+        if let Some(first) = observations.first()
+            && first.time.since(self.last_motion.end) > LONGEST_SILENCE
+        {
+            self.odometer.restart();
+            self.stand(first.time);
+        }
         self.see(observations);
         if self.since.is_none() {
             self.relocalizer.begin(&self.snapshot, reflectors);

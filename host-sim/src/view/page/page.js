@@ -211,7 +211,7 @@ function state() {
     ready: page.isReady, complete: model.status.is_complete, live: page.isLive, time_s: model.time,
     shown_s: moment ? moment.time_s : null, start_s: model.status.start_s, end_s: model.status.end_s,
     playing: page.isPlaying, speed: page.speed, following: page.isFollowing,
-    pose: pose ? { x_m: pose.pose[0], y_m: pose.pose[1], heading_rad: pose.pose[2] } : null,
+    pose: pose ? { time_s: pose.time_s, x_m: pose.pose[0], y_m: pose.pose[1], heading_rad: pose.pose[2] } : null,
     covariance: pose ? pose.covariance : null,
     truth: moment && moment.truth ? { x_m: moment.truth[0], y_m: moment.truth[1], heading_rad: moment.truth[2] } : null,
     mode: pose ? pose.mode : "not_localised", reason: pose ? pose.reason : null, health: moment ? moment.health : null,

@@ -1,0 +1,119 @@
+//! A pose that is found is true at the time that it states.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+use agv_core::geometry::{Point, Pose};
+use agv_core::landmarks::{FixedMap, Landmark};
+use agv_core::localizer::{Event, Parameters, PoseFix, StartFinder, StartState};
+use agv_core::measurement::{EncoderFault, EncoderFaults, PoseIncrement, ReflectorObservation, Reflectors, Time};
+use agv_core::odometry::Vehicle;
+use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
+use proptest::prelude::*;
+
+/// Time of a revolution, s.
+const REVOLUTION: f64 = 0.125;
+
+struct Search {
+    map: FixedMap<128>,
+    index: Box<ReflectorIndex>,
+    finder: StartFinder<64>,
+    laser: Pose,
+}
+
+impl Search {
+    fn new(positions: &[Point]) -> Self {
+        let parameters = Parameters::new(Vehicle::Increments, Pose::new(0.6, 0.1, 0.2));
+        let (mut map, mut index) = (FixedMap::new(), Box::new(ReflectorIndex::new()));
+        let reflectors: Vec<Landmark> =
+            (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.002)).collect();
+        map.extend(&reflectors).unwrap();
+        index.build(&map);
+        let finder = StartFinder::new(parameters, RelocalizationParameters::default());
+        Self { map, index, finder, laser: parameters.laser }
+    }
+
+    fn tell(&mut self, event: &Event) -> StartState {
+        let reflectors = IndexedReflectors { map: &self.map, index: &self.index };
+        self.finder.handle(event, &reflectors);
+        self.finder.search(&reflectors, u32::MAX)
+    }
+
+    /// A revolution of a laser at that place at every time.
+    fn revolution(&mut self, start: f64, place: impl Fn(f64) -> Pose) -> StartState {
+        let mut observations = Vec::new();
+        for (number, landmark) in self.map.landmarks().iter().enumerate() {
+            let time = start + REVOLUTION * number as f64 / self.map.landmarks().len() as f64;
+            let seen = place(time).compose(&self.laser).inverse_transform(&Point::new(landmark.x, landmark.y));
+            if seen.norm() < 30.0 && observations.len() < 50 {
+                observations.push(ReflectorObservation {
+                    time: Time::from_seconds(time),
+                    range: seen.norm() as f32,
+                    bearing: seen.y.atan2(seen.x) as f32,
+                });
+            }
+        }
+        self.tell(&Event::Reflectors(Reflectors { observations: &observations }))
+    }
+}
+
+fn positions() -> impl Strategy<Value = Vec<Point>> {
+    prop::collection::vec((0.0..60.0, 0.0..40.0).prop_map(|(x, y)| Point::new(x, y)), 40)
+}
+
+fn poses() -> impl Strategy<Value = Pose> {
+    (20.0..40.0, 10.0..30.0, -3.1..3.1).prop_map(|(x, y, theta)| Pose::new(x, y, theta))
+}
+
+fn found(state: StartState) -> Option<PoseFix> {
+    match state {
+        StartState::Found(fix) => Some(fix),
+        _ => None,
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn without_odometry_it_is_the_time_of_the_revolution(positions in positions(), pose in poses(), start in 1.0..1e5) {
+        let mut search = Search::new(&positions);
+        for revolution in 0..3 {
+            let start = start + f64::from(revolution) * REVOLUTION;
+            if let Some(fix) = found(search.revolution(start, |_| pose)) {
+                prop_assert!((fix.time.seconds() - start).abs() < 0.3 + REVOLUTION, "{fix:?}");
+                prop_assert!((fix.pose.x - pose.x).hypot(fix.pose.y - pose.y) < 0.01, "{fix:?}");
+                return Ok(());
+            }
+        }
+        prop_assert!(false, "the pose is not found");
+    }
+
+    /// A vehicle drives straight on, its encoders fail for a while, and it drives on.
+    #[test]
+    fn after_a_fault_what_was_before_is_not_carried_on(positions in positions(), pose in poses(), silence in 0.02..2.0) {
+        let mut search = Search::new(&positions);
+        let place = |time: f64| pose.compose(&Pose::new(time - 10.0, 0.0, 0.0));
+        let period = 0.01;
+        let drive = |search: &mut Search, from: f64, to: f64| {
+            let mut last = None;
+            let count = ((to - from) / period).round() as usize;
+            for number in 1..=count {
+                let time = Time::from_seconds(from + number as f64 * period);
+                let displacement = Pose::new(period, 0.0, 0.0);
+                last = found(search.tell(&Event::Increment(PoseIncrement { time, displacement }))).or(last);
+            }
+            last
+        };
+        drive(&mut search, 9.9, 10.0);
+        let time = Time::from_seconds(10.0);
+        let faults = EncoderFaults { time, drive: Some(EncoderFault::Missing), ..EncoderFaults::default() };
+        search.tell(&Event::EncoderFaults(faults));
+        let again = 10.0 + silence;
+        drive(&mut search, again - period, again + REVOLUTION);
+        let first = found(search.revolution(again, place));
+        let fix = first.or_else(|| drive(&mut search, again + REVOLUTION, again + 2.0 * REVOLUTION));
+        let Some(fix) = fix else { return Err(TestCaseError::fail("the pose is not found")) };
+        let there = place(fix.time.seconds());
+        prop_assert!(fix.time.seconds() > again, "{fix:?}");
+        prop_assert!((fix.pose.x - there.x).hypot(fix.pose.y - there.y) < 0.02, "{fix:?} {there:?}");
+    }
+}
