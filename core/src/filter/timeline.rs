@@ -329,11 +329,19 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     /// Puts an entry at `position` and returns where it ended, one lower if the oldest entry had to go.
     fn insert(&mut self, position: usize, entry: Entry) -> usize {
         let position = if self.make_room() { position.saturating_sub(1) } else { position };
-        let mut carried = entry;
-        for place in self.entries.iter_mut().skip(position) {
-            core::mem::swap(place, &mut carried);
+        // It makes room at the end, where it is overwritten unless it belongs there.
+        let _ = self.entries.push_back(entry);
+        let (front, back) = self.entries.as_mut_slices();
+        match position.checked_sub(front.len()) {
+            Some(position) => {
+                shift(back, position, entry);
+            }
+            None => {
+                if let Some(last) = shift(front, position, entry) {
+                    shift(back, 0, last);
+                }
+            }
         }
-        let _ = self.entries.push_back(carried);
         position
     }
 
@@ -352,4 +360,14 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         }
         self.settled = count;
     }
+}
+
+/// Moves the entries from `position` on one further and puts `entry` there. The last one falls out and is returned.
+fn shift(entries: &mut [Entry], position: usize, entry: Entry) -> Option<Entry> {
+    let entries = entries.get_mut(position..)?;
+    let (last, others) = entries.split_last()?;
+    let (last, moved) = (*last, others.len());
+    entries.copy_within(..moved, 1);
+    *entries.first_mut()? = entry;
+    Some(last)
 }

@@ -14,8 +14,8 @@ use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, Landmark
 use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
-/// Entries of the filter's past: 0.36 s at 100 samples and 230 corrections a second.
-const PAST: usize = 120;
+/// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
+const PAST: usize = 128;
 
 /// Localises one vehicle. All of its memory is in this value.
 ///
@@ -205,7 +205,7 @@ impl<
     }
 
     /// Takes one event. Events of one sensor come in order of time; those of different sensors may overtake each other
-    /// by as much as the filter remembers, a third of a second.
+    /// by as much as the filter remembers, about 0.4 s.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
         match event {

@@ -24,7 +24,7 @@ pub struct LaserMemory {
     /// Bytes to send.
     pub transmit: [u8; 1024],
     /// What was read at once.
-    pub read: [u8; 2048],
+    pub read: [u8; 1024],
 }
 
 impl LaserMemory {
@@ -32,7 +32,7 @@ impl LaserMemory {
     #[must_use]
     pub fn new() -> Self {
         let session = Session::new(Configuration::default());
-        Self { session, receive: [0; 8192], transmit: [0; 1024], read: [0; 2048] }
+        Self { session, receive: [0; 8192], transmit: [0; 1024], read: [0; 1024] }
     }
 }
 
