@@ -2,6 +2,7 @@
 
 pub mod live;
 pub mod place_map;
+pub mod refinement;
 pub mod revolution;
 pub mod setup;
 pub mod signatures;

@@ -4,6 +4,7 @@ mod calibration;
 mod command;
 mod manual;
 mod range_images;
+mod refinement;
 #[path = "../support/mod.rs"]
 mod support;
 mod velodyne_decoder;

@@ -2,7 +2,7 @@
 //!
 //! Beside the single-beam signature of M 5.3, whose distances change with every metre: directions of surfaces do not.
 
-use super::normals::{Neighbours, normals};
+use super::normals::{Neighbours, surfaces};
 use super::orientation::{DIRECTIONS, Orientation, least};
 use crate::cloud::Cloud;
 
@@ -23,7 +23,7 @@ impl Facing {
     #[must_use]
     pub fn new(cloud: &Cloud<'_>, neighbours: &Neighbours) -> Self {
         let mut counts = [0.0f32; DIRECTIONS];
-        normals(cloud, neighbours, |[x, y, z]| {
+        surfaces(cloud, neighbours, |_, [x, y, z]| {
             if z.abs() < LEVEL {
                 let direction = (libm::atan2f(y, x) / core::f32::consts::TAU + 0.5) * DIRECTIONS as f32;
                 if let Some(count) = counts.get_mut((direction as usize).min(DIRECTIONS - 1)) {

@@ -14,6 +14,6 @@ pub use facing::{Facing, relative_turn};
 pub use histogram::{BINS, Histogram, chi_square, normalised_chi_square, normalised_sorensen, sorensen};
 pub use key_signatures::KeySignatures;
 pub use loop_closure::{Limits, loop_closure};
-pub use normals::{Neighbours, vertical_parts};
+pub use normals::{Neighbours, surfaces, vertical_parts};
 pub use orientation::{DIRECTIONS, Orientation};
 pub use threshold::from_key_scans;

@@ -29,11 +29,11 @@ impl Default for Neighbours {
 
 /// Calls `take` with the vertical part of each normal, -1 to 1.
 pub fn vertical_parts(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut(f32)) {
-    normals(cloud, neighbours, |[_, _, vertical]| take(vertical));
+    surfaces(cloud, neighbours, |_, [_, _, vertical]| take(vertical));
 }
 
-/// Calls `take` with each normal, of length one; all of a surface point to the same side of it.
-pub(super) fn normals(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut([f32; 3])) {
+/// Calls `take` with each point, m, and its normal, of length one; all normals of a surface point to the same side of it.
+pub fn surfaces(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut([f32; 3], [f32; 3])) {
     let columns = cloud.columns();
     let step = libm::roundf(neighbours.angle * columns as f32 / core::f32::consts::TAU).max(1.0) as usize;
     if step >= columns {
@@ -65,7 +65,7 @@ pub(super) fn normals(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl
             }
             let length = libm::sqrtf(dot(sum, sum));
             if length > 0.0 {
-                take(sum.map(|value| value / length));
+                take(*point, sum.map(|value| value / length));
             }
         }
     }

@@ -1,15 +1,19 @@
 //! `agv lidar3d places`.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use agv_host_sim::import::poses;
 use agv_host_sim::lidar3d::Source;
-use agv_host_sim::lidar3d::place_map::{self, Limits, PlaceMap, StoredPlace};
+use agv_host_sim::lidar3d::place_map::{self, Answer, Limits, PlaceMap, StoredPlace};
+use agv_host_sim::lidar3d::refinement::{Alignment, Surfaces, Target};
 use agv_host_sim::lidar3d::signatures::{Method, Signatures, sensor_height};
 use agv_lidar3d::cloud::{Cloud, RingOrder};
 use agv_lidar3d::place::KeySignatures;
 use anyhow::{Context, ensure};
+use nalgebra::Vector3;
 use serde_json::json;
 
 use super::arguments::{SOURCES, SensorArguments};
@@ -87,13 +91,23 @@ impl Drive {
         mut take: impl FnMut(usize, Signatures) -> ControlFlow<()>,
     ) -> anyhow::Result<f32> {
         let stop = stop::on_interrupt()?;
+        self.for_each_scan(height, &stop, |scan, cloud, height| take(scan, Signatures::new(cloud, height)))
+    }
+
+    /// As [`Self::for_each`], with the points and the height of the sensor.
+    fn for_each_scan(
+        self,
+        height: Option<f32>,
+        stop: &AtomicBool,
+        mut take: impl FnMut(usize, &Cloud<'_>, f32) -> ControlFlow<()>,
+    ) -> anyhow::Result<f32> {
         let name = self.source.name();
-        let source = self.source.open(&self.sensor.options(), &stop)?;
+        let source = self.source.open(&self.sensor.options(), stop)?;
         let setup = source.setup()?;
         let order = RingOrder::new(&setup.lasers);
         let bar = progress::bar("signatures", source.length().unwrap_or(0));
         let (mut number, mut height, mut columns) = (0, height, None);
-        source.revolutions(&stop, |revolution| {
+        source.revolutions(stop, |revolution| {
             bar.inc(1);
             if !revolution.is_whole {
                 return ControlFlow::Continue(());
@@ -102,7 +116,7 @@ impl Drive {
             let Some(cloud) = Cloud::new(&points, order.rings()) else { return ControlFlow::Continue(()) };
             let height = *height.get_or_insert_with(|| sensor_height(&points));
             number += 1;
-            take(number - 1, Signatures::new(&cloud, height))
+            take(number - 1, &cloud, height)
         })?;
         bar.finish_and_clear();
         height.with_context(|| format!("{name}: there is no whole revolution"))
@@ -190,14 +204,17 @@ impl Index {
 
 const FIND_HELP: &str = "\
 Each scan is looked at by itself. An answer is 'found' if its signature is nearer to that of the place than those of any two
-different places are to each other, else 'unsure'. The turn is how far the sensor has turned to the left since.
+different places are to each other, else 'unsure'. The turn is how far the sensor has turned to the left since. With the
+scans that the places are of, --refine aligns what is found to them, point to plane; where that cannot tell the pose, it is
+that of the place.
 
 Examples:
   agv lidar3d places find street.places3d today.pcap --calibration db.xml
+  agv lidar3d places find street.places3d today.pcap --calibration db.xml --refine drive.pcap
   agv lidar3d places find street.places3d velodyne_dist --every 10 --json
 
-Keys of --json, one object a scan: scan, answer, place, place_scan, distance, turn_deg, x_m, y_m, heading_deg; the last three
-are null for places without poses.";
+Keys of --json, one object a scan: scan, answer, place, place_scan, distance, turn_deg, x_m, y_m, heading_deg, share_on_surfaces,
+deviation_m; positions are null for places without poses, the last two for scans that were not aligned.";
 
 /// Find out at which stored place each scan was taken.
 #[derive(clap::Args)]
@@ -216,6 +233,9 @@ struct Find {
     /// Believe an answer only if the walls face the same way as well, against places that look alike.
     #[arg(long)]
     check: bool,
+    /// The scans that the places are of: refines the poses of what is found.
+    #[arg(long, value_name = "SOURCE", value_parser = Source::parse)]
+    refine: Option<Source>,
     /// Only every so many scans.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -236,30 +256,42 @@ impl Find {
             )
         })?;
         let limits = Limits { distance: threshold, facing: if self.check { map.facing_threshold() } else { None } };
+        let sensor = self.drive.sensor.clone();
         let mut answers = Vec::new();
-        self.drive.for_each(Some(map.sensor_height), |scan, signatures| {
-            if scan % self.every as usize == 0
-                && let Some(answer) = map.find(method, &limits, &signatures)
-            {
-                answers.push((scan, answer));
+        let stop = stop::on_interrupt()?;
+        self.drive.for_each_scan(Some(map.sensor_height), &stop, |scan, cloud, height| {
+            if scan % self.every as usize != 0 {
+                return ControlFlow::Continue(());
+            }
+            if let Some(answer) = map.find(method, &limits, &Signatures::new(cloud, height)) {
+                let is_aligned = self.refine.is_some() && answer.is_believed;
+                let surfaces = is_aligned.then(|| Surfaces::new(cloud).thinned());
+                answers.push(Found { scan, answer, surfaces, alignment: None });
             }
             ControlFlow::Continue(())
         })?;
+        if let Some(source) = self.refine {
+            refine(&map, Drive { source, sensor }, &stop, &mut answers)?;
+        }
         if self.json {
             let objects: Vec<_> = answers
                 .iter()
-                .map(|(scan, answer)| {
+                .map(|found| {
+                    let Found { scan, answer, alignment, .. } = found;
                     let place = &map.places[answer.place];
+                    let pose = found.pose(place);
                     json!({
                         "scan": scan,
                         "answer": if answer.is_believed { "found" } else { "unsure" },
                         "place": answer.place,
                         "place_scan": place.scan,
                         "distance": answer.distance,
-                        "turn_deg": answer.turn.to_degrees(),
-                        "x_m": place.pose.map(|pose| pose[0]),
-                        "y_m": place.pose.map(|pose| pose[1]),
-                        "heading_deg": place.pose.map(|pose| (pose[2] + answer.turn).to_degrees()),
+                        "turn_deg": found.turn().to_degrees(),
+                        "x_m": pose.map(|pose| pose[0]),
+                        "y_m": pose.map(|pose| pose[1]),
+                        "heading_deg": pose.map(|pose| pose[2].to_degrees()),
+                        "share_on_surfaces": alignment.map(|alignment| alignment.share),
+                        "deviation_m": alignment.map(|alignment| alignment.deviation),
                     })
                 })
                 .collect();
@@ -267,13 +299,60 @@ impl Find {
             return Ok(());
         }
         println!("scan   answer  place  distance     turn        x        y");
-        for (scan, answer) in answers {
+        for found in answers {
+            let Found { scan, answer, .. } = &found;
             let name = if answer.is_believed { "found" } else { "unsure" };
-            let [x, y, _] = map.places[answer.place].pose.unwrap_or([f64::NAN; 3]);
+            let [x, y, _] = found.pose(&map.places[answer.place]).unwrap_or([f64::NAN; 3]);
             let at = if x.is_nan() { String::new() } else { format!(" {x:>8.2} {y:>8.2}") };
-            let (place, distance, turn) = (answer.place, answer.distance, answer.turn.to_degrees());
+            let (place, distance, turn) = (answer.place, answer.distance, found.turn().to_degrees());
             println!("{scan:<6} {name:<7} {place:>5} {distance:>9.4} {turn:>7.1}°{at}");
         }
         Ok(())
     }
+}
+
+/// What was found for a scan.
+struct Found {
+    scan: usize,
+    answer: Answer,
+    /// Points that are still to be aligned.
+    surfaces: Option<Surfaces>,
+    alignment: Option<Alignment>,
+}
+
+impl Found {
+    /// By which the sensor has turned to the left since, rad.
+    fn turn(&self) -> f64 {
+        self.alignment.map_or(self.answer.turn, |alignment| alignment.turn())
+    }
+
+    /// x, y (m) and heading (rad) of the sensor, if that of the place is known.
+    fn pose(&self, place: &StoredPlace) -> Option<[f64; 3]> {
+        let [x, y, heading] = place.pose?;
+        let shift = self.alignment.map_or(Vector3::zeros(), |alignment| alignment.pose.translation.vector);
+        let (sin, cos) = heading.sin_cos();
+        Some([x + cos * shift.x - sin * shift.y, y + sin * shift.x + cos * shift.y, heading + self.turn()])
+    }
+}
+
+/// Aligns what was found to the scans of the places.
+fn refine(map: &PlaceMap, drive: Drive, stop: &AtomicBool, answers: &mut [Found]) -> anyhow::Result<()> {
+    let name = drive.source.name();
+    let mut of_scan: BTreeMap<usize, Vec<&mut Found>> = BTreeMap::new();
+    for found in answers.iter_mut().filter(|found| found.surfaces.is_some()) {
+        of_scan.entry(map.places[found.answer.place].scan).or_default().push(found);
+    }
+    drive.for_each_scan(Some(map.sensor_height), stop, |scan, cloud, _| {
+        let wanted = of_scan.remove(&scan).unwrap_or_default();
+        if let Some(target) = (!wanted.is_empty()).then(|| Target::new(Surfaces::new(cloud))).flatten() {
+            for found in wanted {
+                let surfaces = found.surfaces.take();
+                found.alignment = surfaces.and_then(|surfaces| target.align(&surfaces, found.answer.turn));
+            }
+        }
+        if of_scan.is_empty() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    let is_stopped = stop.load(Ordering::Relaxed);
+    ensure!(is_stopped || of_scan.is_empty(), "{name}: it has fewer scans than the places are of");
+    Ok(())
 }
