@@ -4,8 +4,8 @@ use std::f32::consts::TAU;
 
 use agv_lidar3d::cloud::Cloud;
 use agv_lidar3d::place::{
-    BINS, Enriched, Facing, Histogram, KeySignatures, Limits, Neighbours, Orientation, chi_square, from_key_scans,
-    loop_closure, normalised_chi_square, normalised_sorensen, relative_turn, sorensen, vertical_parts,
+    BINS, Enriched, Facing, Histogram, KeySignatures, Limits, Neighbours, Orientation, chi_square, fitted_surfaces,
+    from_key_scans, loop_closure, normalised_chi_square, normalised_sorensen, relative_turn, sorensen, vertical_parts,
 };
 use proptest::prelude::*;
 
@@ -117,6 +117,24 @@ proptest! {
         let many = Histogram(a.0.map(|count| count * f64::from(scale))).normalised();
         prop_assert!(normalised_chi_square(&p, &many) < 1e-24 && normalised_sorensen(&p, &many) < 1e-12);
     }
+}
+
+#[test]
+fn planes_through_neighbours_are_the_ground_and_the_walls() {
+    let points = yard([12.0, 9.0, 15.0, 6.0]);
+    let (mut planes, mut level, mut upright) = (0, 0, 0);
+    fitted_surfaces(&Cloud::new(&points, RINGS).unwrap(), &Neighbours::default(), |point, normal| {
+        let dot: f32 = point.iter().zip(normal).map(|(a, b)| a * b).sum();
+        let length: f32 = normal.iter().map(|value| value * value).sum();
+        assert!(dot <= 0.0 && (length - 1.0).abs() < 1e-4, "{point:?} {normal:?}");
+        planes += 1;
+        level += usize::from(normal[2] > 0.9999 && point[2] < -0.99 * HEIGHT);
+        // The walls stand along the axes.
+        upright += usize::from(normal[0].abs().max(normal[1].abs()) > 0.9999 && normal[2].abs() < 0.01);
+    });
+    assert!(planes > 3000 && level > 1000 && upright > 1000, "{planes} {level} {upright}");
+    // Only at the edges between them neighbours belong to two.
+    assert!(10 * (level + upright) > 8 * planes, "{planes} {level} {upright}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{DIRECTIONS, from_key_scans};
+use agv_lidar3d::place::{DIRECTIONS, Histogram, Neighbours, chi_square, from_key_scans};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -54,14 +54,74 @@ pub struct Outcome {
 /// The signatures of a scan and what they cost.
 struct Described {
     signatures: Signatures,
-    /// Seconds for the histogram, and for the enriched signature with it.
-    seconds: [f64; 2],
+    /// The thesis's histogram of fitted planes.
+    planes: Histogram,
+    /// Seconds for the histogram, for the enriched signature with it, and for the histogram of planes.
+    seconds: [f64; 3],
+}
+
+/// What is measured.
+#[derive(Clone, Copy)]
+enum Experiment {
+    Method(Method),
+    /// A method of the thesis with the check of the walls against look-alike places.
+    Checked(Method),
+    /// The thesis's histogram of fitted planes, chi-square of counts.
+    Planes,
+}
+
+impl Experiment {
+    fn all() -> impl Iterator<Item = Self> {
+        let checked = Method::ALL.into_iter().filter(|method| *method != Method::Enriched);
+        let methods = Method::ALL.into_iter().map(Self::Method);
+        methods.chain(checked.map(Self::Checked)).chain([Self::Planes])
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Method(method) => method.name(),
+            Self::Checked(method) => method.checked_name(),
+            Self::Planes => "thesis chi-square, plane fit",
+        }
+    }
+
+    fn is_checked(self) -> bool {
+        matches!(self, Self::Checked(_))
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::Method(method) => method.bytes(),
+            Self::Checked(method) => method.bytes() + DIRECTIONS,
+            Self::Planes => Method::ChiSquare.bytes(),
+        }
+    }
+
+    fn distance(self, one: &Described, other: &Described) -> f64 {
+        match self {
+            Self::Method(method) | Self::Checked(method) => method.distance(&one.signatures, &other.signatures),
+            Self::Planes => chi_square(&one.planes, &other.planes),
+        }
+    }
+
+    /// Seconds for the signature of a scan.
+    fn seconds(self, described: &Described) -> f64 {
+        let [histogram, enriched, planes] = described.seconds;
+        match self {
+            Self::Method(Method::Enriched) => enriched,
+            Self::Method(_) | Self::Checked(_) => histogram,
+            Self::Planes => planes,
+        }
+    }
 }
 
 impl Described {
     fn new(points: &[Option<[f32; 3]>], rings: usize, sensor_height: f32) -> Option<Self> {
-        let (signatures, seconds) = Signatures::timed(&Cloud::new(points, rings)?, sensor_height);
-        Some(Self { signatures, seconds })
+        let cloud = Cloud::new(points, rings)?;
+        let (signatures, [histogram, enriched]) = Signatures::timed(&cloud, sensor_height);
+        let start = Instant::now();
+        let planes = Histogram::of_planes(&cloud, &Neighbours::default());
+        Some(Self { signatures, planes, seconds: [histogram, enriched, start.elapsed().as_secs_f64()] })
     }
 }
 
@@ -111,10 +171,10 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
             (0..keys.len()).step_by(spacing).filter(|index| keys[*index].travelled <= 150.0).collect();
         let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
         for half_columns in [false, true] {
-            for (method, is_checked) in experiments() {
+            for experiment in Experiment::all() {
                 let asked = if half_columns { &half } else { &whole };
                 let test = Test { keys: &keys, map: &map, queries: &queries, stored: &whole, asked, right };
-                let mut outcome = test.run(method, is_checked);
+                let mut outcome = test.run(experiment);
                 outcome.protocol = protocol;
                 outcome.half_columns = half_columns;
                 outcome.orientation_within_2_deg = orientation(&test, &asked_turn, &turns);
@@ -123,12 +183,6 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
         }
     }
     Ok(outcomes)
-}
-
-/// All methods, and those of the thesis with the check of the walls against look-alike places.
-fn experiments() -> impl Iterator<Item = (Method, bool)> {
-    let checked = Method::ALL.into_iter().filter(|method| *method != Method::Enriched);
-    Method::ALL.into_iter().map(|method| (method, false)).chain(checked.map(|method| (method, true)))
 }
 
 struct Test<'a> {
@@ -152,7 +206,8 @@ impl Test<'_> {
         nearest.filter(|node| self.apart(query, *node) <= self.right)
     }
 
-    fn run(&self, method: Method, is_checked: bool) -> Outcome {
+    fn run(&self, experiment: Experiment) -> Outcome {
+        let is_checked = experiment.is_checked();
         let places: Vec<[f64; 2]> = self.map.iter().map(|node| self.keys[*node].position).collect();
         let facing = |one: usize, other: usize| {
             let [one, other] = [one, other].map(|place| &self.stored[self.map[place]].signatures.facing);
@@ -162,10 +217,8 @@ impl Test<'_> {
         let start = Instant::now();
         let mut found = Vec::new();
         for &query in self.queries {
-            let distances = self
-                .map
-                .iter()
-                .map(|&node| (method.distance(&self.asked[query].signatures, &self.stored[node].signatures), node));
+            let distances =
+                self.map.iter().map(|&node| (experiment.distance(&self.asked[query], &self.stored[node]), node));
             if let Some((distance, node)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 found.push((distance, query, node));
             }
@@ -182,7 +235,7 @@ impl Test<'_> {
             .map(|(distance, query, node)| (distance, self.apart(query, node) <= self.right))
             .collect();
         let threshold = from_key_scans(&places, APART, |one, other| {
-            method.distance(&self.stored[self.map[one]].signatures, &self.stored[self.map[other]].signatures)
+            experiment.distance(&self.stored[self.map[one]], &self.stored[self.map[other]])
         })
         .unwrap_or(0.0);
         answers.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -206,11 +259,10 @@ impl Test<'_> {
             }
         }
         let (learned_precision, learned_recall) = score(answers.partition_point(|(distance, _)| *distance < threshold));
-        let part = usize::from(method == Method::Enriched);
-        let mut seconds: Vec<f64> = self.asked.iter().map(|described| described.seconds[part]).collect();
+        let mut seconds: Vec<f64> = self.asked.iter().map(|described| experiment.seconds(described)).collect();
         seconds.sort_by(f64::total_cmp);
         Outcome {
-            method: if is_checked { method.checked_name() } else { method.name() },
+            method: experiment.name(),
             protocol: "",
             half_columns: false,
             recall_at_full_precision,
@@ -220,7 +272,7 @@ impl Test<'_> {
             signature_ms: 1e3 * seconds[seconds.len() / 2],
             compare_us,
             orientation_within_2_deg: 0.0,
-            bytes: method.bytes() + if is_checked { DIRECTIONS } else { 0 },
+            bytes: experiment.bytes(),
             queries: self.queries.len(),
             answerable,
         }

@@ -1,6 +1,7 @@
 //! The thesis's signature: a histogram of how upright the surfaces are (M 5.1.3), and its distances (M 5.1, 5.2).
 
 use super::normals::{Neighbours, vertical_parts};
+use super::plane_fit::fitted_surfaces;
 use crate::cloud::Cloud;
 
 /// Bins between -1 and 1.
@@ -14,8 +15,18 @@ impl Histogram {
     /// The histogram of a scan.
     #[must_use]
     pub fn new(cloud: &Cloud<'_>, neighbours: &Neighbours) -> Self {
+        Self::counted(|count| vertical_parts(cloud, neighbours, count))
+    }
+
+    /// The histogram of a scan by its normals of fitted planes (M 5.1.2.1).
+    #[must_use]
+    pub fn of_planes(cloud: &Cloud<'_>, neighbours: &Neighbours) -> Self {
+        Self::counted(|count| fitted_surfaces(cloud, neighbours, |_, [_, _, part]| count(part)))
+    }
+
+    fn counted(each: impl FnOnce(&mut dyn FnMut(f32))) -> Self {
         let mut counts = [0u32; BINS];
-        vertical_parts(cloud, neighbours, |part| {
+        each(&mut |part| {
             let bin = ((part + 1.0) * (0.5 * BINS as f32)) as usize;
             if let Some(count) = counts.get_mut(bin.min(BINS - 1)) {
                 *count += 1;

@@ -7,6 +7,7 @@ mod key_signatures;
 mod loop_closure;
 mod normals;
 mod orientation;
+mod plane_fit;
 mod threshold;
 
 pub use enriched::{ENRICHED_LENGTH, Enriched};
@@ -16,4 +17,5 @@ pub use key_signatures::KeySignatures;
 pub use loop_closure::{Limits, loop_closure};
 pub use normals::{Neighbours, surfaces, vertical_parts};
 pub use orientation::{DIRECTIONS, Orientation};
+pub use plane_fit::fitted_surfaces;
 pub use threshold::from_key_scans;

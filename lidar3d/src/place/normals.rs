@@ -27,6 +27,19 @@ impl Default for Neighbours {
     }
 }
 
+impl Neighbours {
+    /// Columns to the left and right neighbours, of so many in a turn.
+    pub(super) fn columns(&self, columns: usize) -> usize {
+        libm::roundf(self.angle * columns as f32 / core::f32::consts::TAU).max(1.0) as usize
+    }
+
+    /// Whether a point is neither too near nor too far.
+    pub(super) fn takes(&self, point: &[f32; 3]) -> bool {
+        let squared = dot(*point, *point);
+        squared >= self.near * self.near && squared <= self.far * self.far
+    }
+}
+
 /// Calls `take` with the vertical part of each normal, -1 to 1.
 pub fn vertical_parts(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut(f32)) {
     surfaces(cloud, neighbours, |_, [_, _, vertical]| take(vertical));
@@ -35,7 +48,7 @@ pub fn vertical_parts(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl
 /// Calls `take` with each point, m, and its normal, of length one; all normals of a surface point to the same side of it.
 pub fn surfaces(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut([f32; 3], [f32; 3])) {
     let columns = cloud.columns();
-    let step = libm::roundf(neighbours.angle * columns as f32 / core::f32::consts::TAU).max(1.0) as usize;
+    let step = neighbours.columns(columns);
     if step >= columns {
         return;
     }
@@ -44,8 +57,7 @@ pub fn surfaces(cloud: &Cloud<'_>, neighbours: &Neighbours, mut take: impl FnMut
             (cloud.ring(ring - neighbours.rings), cloud.ring(ring), cloud.ring(ring + neighbours.rings));
         for (column, (point, (up, down))) in here.iter().zip(above.iter().zip(below)).enumerate() {
             let (Some(point), Some(up), Some(down)) = (point, up, down) else { continue };
-            let squared = dot(*point, *point);
-            if squared < neighbours.near * neighbours.near || squared > neighbours.far * neighbours.far {
+            if !neighbours.takes(point) {
                 continue;
             }
             let left = if column < step { column + columns - step } else { column - step };
