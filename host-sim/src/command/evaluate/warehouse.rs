@@ -3,7 +3,8 @@
 use agv_host_sim::evaluate::warehouse::{Experiment, Method, PATHS, experiment};
 use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
 use clap::ValueEnum as _;
-use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::command::progress;
 
 /// How precisely a vehicle ends its way in the standard block storage: paths P1 to P4, each with each kind of map.
 #[derive(clap::Args)]
@@ -46,10 +47,7 @@ impl Warehouse {
             .flat_map(|(path, method)| disturbances.iter().map(move |disturbance| (path, method, *disturbance)))
             .collect();
         anyhow::ensure!(!wanted.is_empty(), "no experiment has such a name and such a map");
-        let progress = ProgressBar::new(wanted.len() as u64 * self.runs).with_style(
-            ProgressStyle::with_template("{bar:30} {pos}/{len} runs, {eta} left")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
+        let progress = progress::bar("runs", wanted.len() as u64 * self.runs);
         let experiments: Vec<Experiment> = wanted
             .into_iter()
             .map(|(path, method, disturbance)| experiment(path, method, disturbance, seeds.clone(), || progress.inc(1)))
