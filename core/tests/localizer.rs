@@ -44,13 +44,15 @@ struct Drive {
     step: u64,
     /// How far the true vehicle is beside what its encoders say, m.
     offset: f64,
+    /// Encoder samples for which the vehicle has stood, before it drove.
+    stood: u64,
 }
 
 impl Drive {
     fn start() -> Self {
         let mut localizer = Box::new(Small::new(parameters()));
         localizer.add_landmarks(&reflectors()).unwrap();
-        Self { localizer, step: 0, offset: 0.0 }
+        Self { localizer, step: 0, offset: 0.0, stood: 0 }
     }
 
     fn time(&self) -> Time {
@@ -58,7 +60,7 @@ impl Drive {
     }
 
     fn truth(&self, time: Time) -> Pose {
-        Pose::new(time.since(Time::from_micros(1_000_000)), self.offset, 0.0)
+        Pose::new(time.since(Time::from_micros(1_000_000 + self.stood * 10_000)), self.offset, 0.0)
     }
 
     fn set_pose(&mut self, pose: Pose) -> PoseOutput {
@@ -72,17 +74,50 @@ impl Drive {
             let start = self.time();
             for _ in 0..12 {
                 self.step += 1;
-                let drive = (self.step as f64 * 0.01 / TICK).round() as u32;
+                let drive = ((self.step - self.stood) as f64 * 0.01 / TICK).round() as u32;
                 self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive, steering: 0 }));
             }
-            let observations: Vec<_> = reflectors()
-                .iter()
-                .filter(|reflector| sees(reflector.id))
-                .filter_map(|reflector| self.observe(start, reflector))
-                .collect();
-            self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
+            self.see(start, &sees);
         }
         self.localizer.outputs().pose
+    }
+
+    /// Takes the reflectors of the revolution that has just ended.
+    fn look(&mut self, sees: impl Fn(u16) -> bool) -> PoseOutput {
+        let start = self.time().offset(-0.12);
+        self.see(start, &sees);
+        self.localizer.outputs().pose
+    }
+
+    fn see(&mut self, start: Time, sees: &impl Fn(u16) -> bool) {
+        let observations: Vec<_> = reflectors()
+            .iter()
+            .filter(|reflector| sees(reflector.id))
+            .filter_map(|reflector| self.observe(start, reflector))
+            .collect();
+        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
+    }
+
+    /// A revolution of a vehicle that stands at the origin.
+    fn stand(&mut self, sees: impl Fn(u16) -> bool) {
+        let start = self.time();
+        for _ in 0..12 {
+            self.step += 1;
+            self.stood += 1;
+            self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive: 0, steering: 0 }));
+        }
+        let laser = parameters().laser;
+        let observations: Vec<_> = reflectors()
+            .iter()
+            .filter(|reflector| sees(reflector.id))
+            .map(|reflector| laser.inverse_transform(&nalgebra::Vector2::new(reflector.x, reflector.y)))
+            .map(|seen| ReflectorObservation {
+                time: start.offset(0.06),
+                range: seen.norm() as f32,
+                bearing: seen.y.atan2(seen.x) as f32,
+            })
+            .collect();
+        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
     }
 
     fn observe(&self, start: Time, reflector: &Landmark) -> Option<ReflectorObservation> {
@@ -117,6 +152,52 @@ fn reflectors_correct_a_start_beside_the_truth() {
     let error = (output.pose.x - truth.x).hypot(output.pose.y - truth.y);
     assert!(error < 0.004 && output.pose.theta.abs() < 1e-3, "{error} m, {} rad", output.pose.theta);
     assert!(output.acceptance > 0.99 && output.dead_reckoning_distance < 0.2);
+}
+
+#[test]
+fn a_vehicle_that_stands_among_reflectors_says_when_its_pose_is_good() {
+    let mut drive = Drive::start();
+    let told = drive.set_pose(Pose::new(0.04, -0.03, 0.008));
+    assert!(!told.is_good());
+    let mut revolutions = 0;
+    while !drive.localizer.outputs().pose.is_good() {
+        drive.stand(|id| id < 8);
+        revolutions += 1;
+        assert!(revolutions < 40, "{:?}", drive.localizer.outputs().pose);
+    }
+    assert!(revolutions > 1, "one revolution is not enough");
+    let pose = drive.localizer.outputs().pose.pose;
+    assert!(pose.x.hypot(pose.y) < 0.005 && pose.theta.abs() < 0.524e-3, "{pose:?}");
+    // Without reflectors it stays so only for a while.
+    assert!(!drive.revolutions(40, |_| false).is_good());
+}
+
+#[test]
+fn corrections_are_said_and_leave_no_step_in_the_smooth_pose() {
+    let mut drive = Drive::start();
+    let start = Pose::new(0.04, -0.03, 0.008);
+    assert_eq!(drive.set_pose(start).correction, 0.0);
+    // Straight on by what the encoders say since their first sample, whatever the reflectors do.
+    let smooth = |drive: &Drive| start.compose(&Pose::new((drive.step - 1) as f64 * 0.01, 0.0, 0.0));
+    let is_smooth = |drive: &Drive, output: &PoseOutput| {
+        let off = smooth(drive).between(&output.smooth);
+        off.x.hypot(off.y) < 2.0 * TICK && off.theta.abs() < 1e-9
+    };
+    drive.revolutions(1, |_| false);
+    let before = drive.localizer.outputs().pose;
+    assert!(is_smooth(&drive, &before) && before.correction == 0.0 && !before.has_jumped());
+    let after = drive.look(|_| true);
+    let moved = (after.pose.x - before.pose.x).hypot(after.pose.y - before.pose.y);
+    assert!(is_smooth(&drive, &after) && after.has_jumped() && (after.correction - moved).abs() < 1e-9, "{after:?}");
+    for _ in 0..20 {
+        let output = drive.revolutions(1, |_| true);
+        assert!(is_smooth(&drive, &output), "{output:?}");
+    }
+    assert!(!drive.localizer.outputs().pose.has_jumped());
+    // Both together are the pose.
+    let output = drive.localizer.outputs().pose;
+    let together = output.smooth_offset().compose(&output.smooth);
+    assert!((together.x - output.pose.x).hypot(together.y - output.pose.y) < 1e-9);
 }
 
 #[test]

@@ -41,6 +41,21 @@ impl PoseOutput {
         self.correction > Self::NOTABLE_CORRECTION
     }
 
+    /// A position that is no less sure than this in any direction, m, and a heading, rad, are good enough to leave the
+    /// reflectors: on a way of 12 m by features alone they leave most of 2 cm and 0.1 deg to the drive.
+    pub const GOOD_DEVIATIONS: (f64, f64) = (0.005, 0.524e-3);
+
+    /// Whether the pose is good enough to begin a drive without reflectors. A vehicle that stands among them becomes surer
+    /// with every revolution until it is.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        let is_localised = !matches!(self.mode, Mode::NotLocalised | Mode::Lost | Mode::WithoutOdometry);
+        let [xx, xy, yy, _, _, heading] = self.covariance;
+        let (position_limit, heading_limit) = Self::GOOD_DEVIATIONS;
+        let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);
+        is_localised && worst <= position_limit * position_limit && heading <= heading_limit * heading_limit
+    }
+
     /// The frame of the smooth pose in W.
     #[must_use]
     pub fn smooth_offset(&self) -> Pose {

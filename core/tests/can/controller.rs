@@ -57,6 +57,13 @@ fn literal_frames() {
     // Mode 3, reason 0, 87 %, 43 steps, steering frozen (3), laser sound (1), layer 3, too few reflectors (3).
     let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 3 << 37 | 3 << 53 | 5u64 << 60;
     assert_eq!(status, Frame::of(standard_id(0x490), payload.to_le_bytes()));
+    // Sure to 5 mm and 0.03 deg, and corrected by 2 cm: one bit each.
+    let sure = PoseOutput { covariance: [2e-5, 0.0, 1e-5, 0.0, 0.0, 2e-7], correction: 0.02, ..pose() };
+    let [.., status] = contents(&sure, &health()).map(|content| content.encode(node(), 5));
+    assert_eq!(status, Frame::of(standard_id(0x490), (payload | 3 << 56).to_le_bytes()));
+    // Sure along the axes only.
+    let slanted = PoseOutput { covariance: [2e-5, 1.9e-5, 2e-5, 0.0, 0.0, 2e-7], ..sure };
+    assert!(sure.is_good() && !slanted.is_good() && !PoseOutput { mode: Mode::Lost, ..sure }.is_good());
 }
 
 #[test]

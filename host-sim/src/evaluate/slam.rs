@@ -86,7 +86,11 @@ impl OfficeDrive {
     /// # Errors
     /// If the log cannot be read.
     pub fn of_carmen(log: &Path) -> Result<Self, TextFileError> {
-        let log = carmen::read(log)?.front;
+        let path = log;
+        let log = carmen::read(path)?.front;
+        if log.increments.is_empty() {
+            return Err(TextFileError::of_line(path, 1, "this log has scans but no raw odometry (ODOM)"));
+        }
         let times: Vec<Time> = log.scans.iter().map(|scan| scan.scan.start).collect();
         let odometry = odometry_at(&log, &times);
         let odometry =

@@ -6,9 +6,10 @@
 use agv_core::features::falko;
 use agv_core::filter::BiasDeviations;
 use agv_core::geometry::{Pose, difference};
-use agv_core::localizer::{MapUse, Mode, Parameters, PoseFix};
+use agv_core::localizer::{KeyScanParameters, MapUse, Mode, Parameters, PoseFix};
 use agv_core::measurement::PoseIncrement;
 use agv_core::odometry::{OdometryNoise, Vehicle};
+use agv_core::places::{SurfaceAlignmentParameters, SurfaceParameters};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -65,18 +66,31 @@ impl Candidate {
         parameters.maps = self.maps;
         parameters.features.detector = self.detector;
         parameters.features.motion_correction = false;
-        parameters.odometry_noise =
-            OdometryNoise { slip: 0.03, side_slip: 0.01, yaw: 0.02, ..OdometryNoise::default() };
-        parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 1e-6 };
+        // From scan to scan, a third of a metre, the heading of such robots is wrong by 1.4 deg in the median, and by 6 deg
+        // at the 95 % mark, which hides any bias.
+        parameters.odometry_noise = OdometryNoise { slip: 0.1, side_slip: 0.1, yaw: 0.1, ..OdometryNoise::default() };
+        parameters.slam.biases = BiasDeviations { scale: 1e-6, steering: 1e-6, laser_yaw: 1e-6 };
         parameters.limits.longest_extrapolation = 1.0;
         // Nothing tells the vehicle where it is, so it may grow uncertain.
         parameters.limits.largest_heading_deviation = 1.0;
         parameters.limits.largest_position_deviation = 10.0;
-        if !self.has_key_scans {
-            parameters.slam.key_scans = None;
-        }
+        parameters.slam.key_scans = self.has_key_scans.then(key_scans);
         parameters
     }
+}
+
+/// For a laser with a beam a degree or half of it and 1 to 2 cm of noise, and scans far apart.
+fn key_scans() -> KeyScanParameters {
+    let surfaces = SurfaceParameters { radius: 0.2, growth: 0.03, residual: 0.03 };
+    let alignment = SurfaceAlignmentParameters {
+        reach: 0.5,
+        tolerance: 0.1,
+        iterations: 12,
+        every: 1,
+        range_deviation: 0.02,
+        ..SurfaceAlignmentParameters::default()
+    };
+    KeyScanParameters { surfaces, alignment, least_share: 0.4, gate: 30.0, ..KeyScanParameters::default() }
 }
 
 /// How the odometry is made worse.

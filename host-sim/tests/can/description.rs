@@ -129,6 +129,8 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 acceptance: 0.5,
                 normalised_square: 2.0,
                 health: Health { drive, steering, laser, layer: 40_000, start_search },
+                is_good: index % 2 == 0,
+                has_jumped: index % 3 == 0,
             };
             let names = BTreeMap::from([
                 ("Mode", format!("{mode:?}")),
@@ -138,6 +140,8 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 ("Laser", format!("{laser:?}")),
                 ("Layer", "40000".to_owned()),
                 ("StartSearch", format!("{start_search:?}")),
+                ("PoseIsGood", u8::from(index % 2 == 0).to_string()),
+                ("Corrected", u8::from(index % 3 == 0).to_string()),
             ]);
             (status, names)
         })

@@ -117,6 +117,8 @@ const STEERING_FAULT: Field = Field::unsigned(31, 4, 1.0);
 const LASER: Field = Field::unsigned(35, 2, 1.0);
 const LAYER: Field = Field::unsigned(37, 16, 1.0);
 const START_SEARCH: Field = Field::unsigned(53, 3, 1.0);
+const POSE_IS_GOOD: Field = Field::unsigned(56, 1, 1.0);
+const CORRECTED: Field = Field::unsigned(57, 1, 1.0);
 const INITIAL_POSITION_DEVIATION: Field = Field::unsigned(24, 16, 1e-3);
 const INITIAL_HEADING_DEVIATION: Field = Field::unsigned(40, 16, 1e-4);
 const WANTED_MODE: Field = Field::unsigned(0, 4, 1.0);
@@ -288,6 +290,10 @@ pub enum Content {
         normalised_square: f64,
         /// State of encoders, laser and search.
         health: Health,
+        /// Whether the pose is good enough to leave the reflectors: [`PoseOutput::is_good`].
+        is_good: bool,
+        /// Whether landmarks have moved the position notably: [`PoseOutput::has_jumped`].
+        has_jumped: bool,
     },
     /// Position where the vehicle shall believe to be.
     InitialPosition {
@@ -359,7 +365,7 @@ impl Content {
                 let payload = CORRELATION_X_HEADING.put(payload, x_heading);
                 CORRELATION_Y_HEADING.put(payload, y_heading)
             }
-            Self::Status { mode, reason, acceptance, normalised_square, health } => {
+            Self::Status { mode, reason, acceptance, normalised_square, health, is_good, has_jumped } => {
                 let payload = MODE.put_raw(payload, number_of(&MODES, &mode, MODE));
                 let payload = REASON.put_raw(payload, number_of(&REASONS, &reason, REASON));
                 let payload = ACCEPTANCE.put(payload, acceptance);
@@ -372,7 +378,10 @@ impl Content {
                 let payload = STEERING_FAULT.put_raw(payload, fault(health.steering, STEERING_FAULT));
                 let payload = LASER.put_raw(payload, number_of(&LASERS, &health.laser, LASER));
                 let payload = LAYER.put_raw(payload, u64::from(health.layer));
-                START_SEARCH.put_raw(payload, number_of(&START_SEARCHES, &health.start_search, START_SEARCH))
+                let search = number_of(&START_SEARCHES, &health.start_search, START_SEARCH);
+                let payload = START_SEARCH.put_raw(payload, search);
+                let payload = POSE_IS_GOOD.put_raw(payload, u64::from(is_good));
+                CORRECTED.put_raw(payload, u64::from(has_jumped))
             }
             Self::InitialHeading { heading, position_deviation, heading_deviation } => {
                 let payload = HEADING.put(payload, heading);
@@ -424,6 +433,8 @@ impl Content {
                     layer: LAYER.take_raw(payload) as u16,
                     start_search: value_of(&START_SEARCHES, START_SEARCH.take_raw(payload))?,
                 },
+                is_good: POSE_IS_GOOD.take_raw(payload) == 1,
+                has_jumped: CORRECTED.take_raw(payload) == 1,
             },
             (None, Some(1)) => Self::InitialPosition { x: X.take(payload), y: Y.take(payload) },
             (None, Some(2)) => Self::InitialHeading {
@@ -503,6 +514,8 @@ pub fn contents(pose: &PoseOutput, health: &Health) -> [Content; 4] {
             acceptance: pose.acceptance,
             normalised_square: pose.normalised_square,
             health: *health,
+            is_good: pose.is_good(),
+            has_jumped: pose.has_jumped(),
         },
     ]
 }
@@ -528,6 +541,10 @@ pub struct PublishedPose {
     pub reason: Reason,
     /// State of encoders and laser.
     pub health: Health,
+    /// Whether the pose is good enough to leave the reflectors.
+    pub is_good: bool,
+    /// Whether landmarks have moved the position notably.
+    pub has_jumped: bool,
 }
 
 /// Puts the four frames of a pose together.
@@ -564,7 +581,7 @@ impl PoseReceiver {
             Some(Content::Position { x, y }),
             Some(Content::Heading { heading, time, dead_reckoning_distance }),
             Some(Content::Covariance { deviations, correlations }),
-            Some(Content::Status { mode, reason, health, .. }),
+            Some(Content::Status { mode, reason, health, is_good, has_jumped, .. }),
         ] = self.contents
         else {
             return None;
@@ -581,6 +598,8 @@ impl PoseReceiver {
             mode,
             reason,
             health,
+            is_good,
+            has_jumped,
         })
     }
 }
