@@ -1,12 +1,20 @@
 //! The experiments, held to what they must show.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use agv_core::geometry::{Point, Pose};
+use agv_core::localizer::{MapUse, Mode, PoseOutput};
 use agv_host_sim::data;
 use agv_host_sim::evaluate::carpark::{self, Knowledge, Noise};
+use agv_host_sim::evaluate::slam::OfficeDrive;
 use agv_host_sim::evaluate::warehouse::{Map, Method, PATHS, experiment};
 use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
+use agv_host_sim::evaluate::windows::{Candidate, Worsening, drift};
+use agv_host_sim::recording::truth_at;
+use agv_host_sim::replay::replay;
+use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
+use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
+use agv_host_sim::simulate::simulate;
 
 fn carpark_folder(test: &str) -> Option<PathBuf> {
     let folder = data::folder();
@@ -76,6 +84,64 @@ fn a_static_map_holds_five_millimetres() {
 fn features_found_on_the_way_bring_the_vehicle_twelve_metres_within_the_requirement() {
     let (position, heading, ok) = worst("slam", 6);
     assert!(position <= 20.0 && heading <= 0.1 && ok >= 0.8, "{position} mm, {heading} deg, {ok}");
+}
+
+#[test]
+fn it_goes_into_the_storage_and_out_again_without_a_jump() {
+    let scenario = |name: &str| Scenario::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name).as_path()).unwrap();
+    // 4 m of aisle with reflectors, 8 m of lane without any, and back.
+    let mut there_and_back = scenario("../host-sim/scenarios/block_storage_p1.toml");
+    let way_in = simulate(&there_and_back).unwrap().recording.truth;
+    let (start, end) = (way_in[0].pose, way_in[way_in.len() - 1].pose);
+    let ahead = start.between(&end).x;
+    let directions = [Direction::Forward, Direction::Backward];
+    let [there, back] = if ahead > 0.0 { directions } else { [directions[1], directions[0]] };
+    let leg = |direction| Leg { direction, segments: vec![PathSegment::straight(ahead.abs())] };
+    let start = PoseOptions { x: start.x, y: start.y, heading_deg: start.theta.to_degrees() };
+    there_and_back.path = PathOptions { kind: PathKind::Legs, start, legs: vec![leg(there), leg(back)] };
+    let mut recording = simulate(&there_and_back).unwrap().recording;
+    recording.parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: true };
+    let poses = replay(&recording, |_| ()).unwrap().poses;
+    let settled = poses.iter().skip_while(|pose| !pose.is_good());
+    let (mut modes, mut largest, mut worst) = (Vec::new(), 0.0_f64, 0.0_f64);
+    for pose in settled {
+        largest = largest.max(pose.correction);
+        let truth = truth_at(&recording.truth, pose.time).unwrap();
+        worst = worst.max((pose.pose.x - truth.x).hypot(pose.pose.y - truth.y));
+        if modes.last() != Some(&pose.mode) {
+            modes.push(pose.mode);
+        }
+    }
+    println!("{modes:?}, corrected by {largest:.4} m at most, {worst:.4} m off at most");
+    assert!(modes.ends_with(&[Mode::Mixed, Mode::Features, Mode::Mixed]), "{modes:?}");
+    assert!(largest < PoseOutput::NOTABLE_CORRECTION && worst < 0.02, "{largest} m, {worst} m");
+}
+
+#[test]
+fn moved_pallets_are_no_reason_to_be_five_centimetres_off() {
+    let method = Method::ALL.iter().find(|method| method.name == "static and slam").unwrap();
+    for path in PATHS {
+        let outcome = experiment(path, method, Disturbance::MovedPallets, 1..5, || ()).unwrap();
+        println!("{outcome:?}");
+        assert!(outcome.position_mm.max < 10.0 && outcome.heading_deg.max < 0.05, "{outcome:?}");
+    }
+}
+
+#[test]
+fn scans_alone_bring_robots_further_than_their_odometry_in_offices_that_were_not_tuned_on() {
+    let test = "scans_alone_bring_robots_further_than_their_odometry_in_offices_that_were_not_tuned_on";
+    for (log, share) in [("aces", 0.8), ("fhw", 0.5)] {
+        let Some(log) = data::for_test(test, &format!("scans2d/{log}-corrected.log.gz")) else { return };
+        let drive = OfficeDrive::of_carmen(&log).unwrap();
+        let drift = |name: &str| {
+            let candidate = Candidate::ALL.iter().find(|candidate| candidate.name == name).unwrap();
+            drift(&drive, 12.0, candidate, &Worsening::ALL[0]).unwrap()
+        };
+        let (odometry, slam) = (drift("odometry"), drift("slam"));
+        println!("{odometry:?}\n{slam:?}");
+        assert!(slam.windows > 40 && slam.lost_share < 0.05);
+        assert!(slam.position_m.median < share * odometry.position_m.median);
+    }
 }
 
 #[test]
