@@ -33,6 +33,28 @@ fn every_command_explains_itself() {
 }
 
 #[test]
+fn candidates_of_the_block_storage_are_compared_on_a_page() {
+    let files = Files::new();
+    let report = files.path("candidates.html");
+    let wanted = ["--map", "odometry", "--only", "P4", "--runs", "2", "--disturb", "none,scale"];
+    let run = agv(&[&["evaluate", "warehouse", "--quiet", "--json", "--report", &report], &wanted[..]].concat());
+    assert!(run.status.success() && run.stderr.is_empty(), "{}", text(&run.stderr));
+    let experiments: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    let html = std::fs::read_to_string(&report).unwrap();
+    for experiment in experiments.as_array().unwrap() {
+        let row = format!(
+            "<td>{}</td><td>{}</td>",
+            experiment["name"].as_str().unwrap(),
+            experiment["disturbance"].as_str().unwrap()
+        );
+        assert!(html.contains(&row), "{row} is not in {html}");
+    }
+    // One path, so the worst path is this one.
+    let p95 = format!(">{:.1}</td>", experiments[1]["position_mm"]["p95"].as_f64().unwrap());
+    assert!(html.contains(&p95), "{p95} is not in {html}");
+}
+
+#[test]
 fn import_refuses_bad_input_in_one_line() {
     let files = Files::new();
     let output = files.path("out.agvlog");

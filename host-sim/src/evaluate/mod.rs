@@ -18,4 +18,5 @@ pub mod repeatability;
 pub mod slam;
 pub mod warehouse;
 pub mod warehouse_disturbance;
+pub mod warehouse_page;
 pub mod windows;

@@ -50,6 +50,12 @@ impl Disturbance {
         Self::LaserYaw,
     ];
 
+    /// Its name, as the JSON has it.
+    #[must_use]
+    pub fn name(self) -> String {
+        serde_json::to_value(self).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+    }
+
     /// What disturbs the drive by which the map is made: what moves comes later.
     pub(super) fn of_the_mapping_drive(self) -> Self {
         match self {

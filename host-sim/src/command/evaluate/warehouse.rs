@@ -1,7 +1,11 @@
 //! `agv evaluate warehouse`.
 
+use std::path::PathBuf;
+
 use agv_host_sim::evaluate::warehouse::{Experiment, Method, PATHS, experiment};
 use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
+use agv_host_sim::evaluate::warehouse_page::page;
+use anyhow::Context as _;
 use clap::ValueEnum as _;
 
 use crate::command::progress;
@@ -30,6 +34,9 @@ pub struct Warehouse {
     /// One JSON array instead of a table.
     #[arg(long)]
     json: bool,
+    /// Write a page that compares all of them.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 impl Warehouse {
@@ -53,6 +60,9 @@ impl Warehouse {
             .map(|(path, method, disturbance)| experiment(path, method, disturbance, seeds.clone(), || progress.inc(1)))
             .collect::<Result<_, _>>()?;
         progress.finish_and_clear();
+        if let Some(report) = &self.report {
+            page(&experiments).write(report).with_context(|| report.display().to_string())?;
+        }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&experiments)?);
         } else {
