@@ -140,7 +140,7 @@ impl<
                 dynamic: DynamicMap::new(parameters.dynamic_map),
             },
             timeline: Timeline::new(parameters.laser, parameters.limits.longest_extrapolation),
-            slam: Slam::new(&parameters.slam),
+            slam: Slam::new(),
             consistency: Consistency::new(parameters.consistency),
             lost: None,
             blindness: None,
@@ -245,7 +245,7 @@ impl<
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
         self.timeline.begin(fix.time, state);
-        self.slam.begin(fix.time, &state);
+        self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
         self.blindness =

@@ -33,6 +33,7 @@ pub const SLAM_ENTRIES: usize = packed_entries(SLAM_STATES);
 #[derive(Clone, Debug)]
 pub(super) struct Slam<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize> {
     filter: Augmented<KEYS, LANDMARKS, STATES, ENTRIES>,
+    has_biases: bool,
     book: LandmarkBook<LANDMARKS>,
     key_scans: KeyScans<KEYS>,
     /// Time at which the filter stands.
@@ -71,11 +72,10 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     Slam<KEYS, LANDMARKS, STATES, ENTRIES>
 {
     #[inline(always)]
-    pub(super) fn new(parameters: &SlamParameters) -> Self {
-        let mut filter = Augmented::new();
-        filter.begin_biases(&parameters.biases);
+    pub(super) fn new() -> Self {
         Self {
-            filter,
+            filter: Augmented::new(),
+            has_biases: false,
             book: LandmarkBook::new(),
             key_scans: KeyScans::new(),
             time: Time::default(),
@@ -84,7 +84,12 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// Begins at a pose that is true at `time`. The biases belong to the vehicle and are kept.
-    pub(super) fn begin(&mut self, time: Time, state: &Ekf) {
+    pub(super) fn begin(&mut self, time: Time, state: &Ekf, parameters: &SlamParameters) {
+        // Not when it is made: a filter that is changed before it is in its place would be on the stack.
+        if !self.has_biases {
+            self.filter.begin_biases(&parameters.biases);
+            self.has_biases = true;
+        }
         self.filter.begin(state);
         self.book.clear();
         self.key_scans.clear();
