@@ -51,7 +51,7 @@ fn decode(frame: &Frame) {
 fuzz_target!(|bytes: &[u8]| {
     let channel = |number, reporting| ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(node(number)) },
-        limits: SupervisionLimits::every_10_ms(20_000.0, 25_000.0),
+        limits: SupervisionLimits::every(0.01, 20_000.0, 25_000.0),
     };
     let mut now = Time::from_micros(1_000_000);
     let drive = channel(1, Reporting::Synchronous);

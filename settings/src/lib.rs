@@ -5,6 +5,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod encoders;
 pub mod leaf;
 mod leaves;
 pub mod service;

@@ -8,6 +8,7 @@ mod output_predictor;
 mod parameters;
 mod slam;
 mod start_finder;
+mod start_search;
 
 pub use event::Event;
 pub use machine::Localizer;
@@ -17,6 +18,7 @@ pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, P
 
 pub use slam::{KeyScanParameters, SLAM_ENTRIES, SLAM_STATES, SlamParameters};
 pub use start_finder::{StartFinder, StartState};
+pub use start_search::{EFFORT_A_REVOLUTION, StartSearch};
 
 pub use crate::measurement::PoseFix;
 pub use crate::state::{Mode, PoseOutput, Reason};

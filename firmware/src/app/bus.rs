@@ -10,11 +10,11 @@ use agv_core::wire::can::controller_node::ControllerNode;
 use agv_core::wire::can::emcy::Emergency;
 use agv_core::wire::can::encoder_pair::EncoderPair;
 use agv_settings::Settings;
+use agv_settings::encoders::{SYNC_PERIOD, channels, node};
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
 
 use super::can_port::CanPort;
-use super::encoders::{SYNC_PERIOD, channels, node};
 use super::exchange::{self, BusEvent, now};
 use super::supervision::{self, Task};
 

@@ -1,12 +1,11 @@
 //! The localiser's loop, below all interrupts.
 
-use agv_core::localizer::Event;
+use agv_core::localizer::{Event, StartSearch};
 use agv_core::record::{Output, Record};
 
 use super::exchange::{self, BUS_EVENTS, BusEvent, RevolutionReceiver};
 use super::log_stream::LogWriter;
 use super::room::Localizer;
-use super::start_search::StartSearch;
 use super::supervision::{self, Task};
 
 /// What handles events.
@@ -59,13 +58,14 @@ impl Localization {
         let outputs = self.localizer.handle(event);
         exchange::update(&outputs.pose);
         self.log.write(&Record::Output(Output::from(outputs)));
-        self.search.handle(self.localizer, event);
+        let mode = self.localizer.outputs().pose.mode;
+        self.search.handle(event, mode, self.localizer.reflectors());
     }
 
     /// Goes on with the search for a pose. A pose that is found is an event like any other, so that a replay of the log
     /// needs no search.
     fn search(&mut self) -> bool {
-        let (is_busy, found) = self.search.advance(self.localizer);
+        let (is_busy, found) = self.search.advance(self.localizer.reflectors());
         if let Some(fix) = found {
             self.handle(&Event::SetPose(fix));
         }

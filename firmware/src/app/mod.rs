@@ -2,7 +2,6 @@
 
 pub mod bus;
 pub mod can_port;
-pub mod encoders;
 pub mod exchange;
 pub mod laser;
 pub mod localize;
@@ -10,6 +9,5 @@ pub mod log_stream;
 pub mod room;
 pub mod service;
 pub mod settings;
-pub mod start_search;
 pub mod supervision;
 pub mod throttle;

@@ -7,14 +7,13 @@
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
-use agv_core::localizer::{Event, OutputPredictor};
+use agv_core::localizer::{Event, OutputPredictor, StartSearch};
 use agv_core::measurement::{EncoderSample, Scan};
 use agv_core::record::Record;
 use agv_firmware::app::exchange;
 use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogWriter};
 use agv_firmware::app::room::Localizer;
-use agv_firmware::app::start_search::StartSearch;
 use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
 use agv_firmware::board::an500::log_file::LogBuffer;

@@ -4,7 +4,7 @@
 
 use core::panic::PanicInfo;
 
-use agv_core::localizer::{OutputPredictor, Parameters};
+use agv_core::localizer::{OutputPredictor, Parameters, StartSearch};
 use agv_core::wire::nav350::Revolution;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
@@ -12,7 +12,6 @@ use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::room::Localizer;
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
-use agv_firmware::app::start_search::StartSearch;
 use agv_firmware::app::throttle::Throttle;
 use agv_firmware::app::{bus, exchange, laser, log_stream, service, settings, supervision};
 use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, Watchdog};

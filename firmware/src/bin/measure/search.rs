@@ -2,11 +2,11 @@
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::landmarks::{FixedMap, Landmark};
+use agv_core::localizer::EFFORT_A_REVOLUTION;
 use agv_core::places::{
     IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
 };
-use agv_firmware::app::start_search::EFFORT_A_REVOLUTION;
 use agv_firmware::board::an500::stopwatch::Stopwatch;
 use heapless::Vec;
 use static_cell::StaticCell;

@@ -5,7 +5,8 @@ use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
 use agv_core::wire::can::encoder_pair::ChannelSettings;
 use agv_core::wire::can::supervision::SupervisionLimits;
-use agv_settings::Settings;
+
+use crate::Settings;
 
 /// Time between SYNC messages if encoders want them, s.
 pub const SYNC_PERIOD: f64 = 0.010;

@@ -1,11 +1,9 @@
 //! The search for the pose of a vehicle that does not know where it is, in slices between events.
 
-use agv_core::localizer::{Event, Parameters, PoseFix, StartFinder, StartState};
-use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
-use agv_core::state::Mode;
-use agv_core::wire::can::controller;
-
-use super::room::Localizer;
+use super::{Event, Mode, Parameters, PoseFix, StartFinder, StartState};
+use crate::landmarks::FixedMap;
+use crate::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
+use crate::wire::can::controller;
 
 /// Words of the rough picture of where reflectors are: 4 kB, cells of about half a metre in a hall of 100 m x 60 m.
 const WORDS: usize = 1024;
@@ -18,6 +16,7 @@ const SLICE: u32 = 2_000;
 pub const EFFORT_A_REVOLUTION: u32 = 1_600_000;
 
 /// Searches among the reflectors of the map while the localiser has no pose.
+#[derive(Clone, Debug)]
 pub struct StartSearch {
     finder: StartFinder,
     index: ReflectorIndex<WORDS>,
@@ -42,8 +41,8 @@ impl StartSearch {
     }
 
     /// Makes ready for the reflectors that the localiser has.
-    pub fn index(&mut self, localizer: &Localizer) {
-        self.index.build(localizer.reflectors());
+    pub fn index<const REFLECTORS: usize>(&mut self, reflectors: &FixedMap<REFLECTORS>) {
+        self.index.build(reflectors);
     }
 
     /// How far it has come.
@@ -52,11 +51,11 @@ impl StartSearch {
         self.state
     }
 
-    /// Takes an event that the localiser has taken.
-    pub fn handle(&mut self, localizer: &Localizer, event: &Event) {
-        let is_lost = matches!(localizer.outputs().pose.mode, Mode::NotLocalised | Mode::Lost);
+    /// Takes an event that the localiser has taken; `mode` is what it has said, `reflectors` is its map.
+    pub fn handle<const REFLECTORS: usize>(&mut self, event: &Event, mode: Mode, reflectors: &FixedMap<REFLECTORS>) {
+        let is_lost = matches!(mode, Mode::NotLocalised | Mode::Lost);
         if self.is_wanted && is_lost {
-            let reflectors = IndexedReflectors { map: localizer.reflectors(), index: &self.index };
+            let reflectors = IndexedReflectors { map: reflectors, index: &self.index };
             self.finder.handle(event, &reflectors);
             if matches!(event, Event::Reflectors(_) | Event::Scan(_)) {
                 self.left = EFFORT_A_REVOLUTION;
@@ -68,12 +67,12 @@ impl StartSearch {
     }
 
     /// Searches for a while. Whether there is more to do, and the pose if it is found.
-    pub fn advance(&mut self, localizer: &Localizer) -> (bool, Option<PoseFix>) {
+    pub fn advance<const REFLECTORS: usize>(&mut self, reflectors: &FixedMap<REFLECTORS>) -> (bool, Option<PoseFix>) {
         if self.left == 0 {
             return (false, None);
         }
         self.left = self.left.saturating_sub(SLICE);
-        let reflectors = IndexedReflectors { map: localizer.reflectors(), index: &self.index };
+        let reflectors = IndexedReflectors { map: reflectors, index: &self.index };
         let state = self.finder.search(&reflectors, SLICE);
         // While it searches anew, the last answer stands.
         self.state = match (&state, self.state) {

@@ -1,0 +1,113 @@
+//! What an emulated sensor will see: the drive, turn by turn.
+
+use agv_core::geometry::Pose;
+use agv_core::measurement::{ReflectorObservation, Time};
+use agv_core::wire::nav350::{Distance, IdentifiedLandmark, Milliangle, SensorFrame};
+
+use crate::layout_file;
+use crate::recording::{RecordedEvent, RecordedScan, Recording};
+
+/// What the sensor measured in one turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turn {
+    /// When its first beam was measured, in the time of the drive.
+    pub start: Time,
+    /// Range of each beam, mm.
+    pub ranges: Vec<u32>,
+    /// Strength of each echo, or empty.
+    pub remission: Vec<u16>,
+    /// Direction of the first beam.
+    pub first: Milliangle,
+    /// Angle between beams, thousandths of a degree.
+    pub resolution: u16,
+    /// Reflectors.
+    pub reflectors: Vec<ReflectorObservation>,
+    /// True pose of S at the end.
+    pub pose: Option<Pose>,
+}
+
+/// What the sensor will see.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    pub(super) turns: Vec<Turn>,
+    layout: Vec<IdentifiedLandmark>,
+    pub(super) frame: SensorFrame,
+}
+
+/// Why a recording cannot be served.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DriveError {
+    /// It has no scans and no reflectors.
+    #[error("the drive has neither scans nor reflectors")]
+    Empty,
+}
+
+fn millimetres(range: f32) -> u32 {
+    Distance::from_metres(f64::from(range)).0
+}
+
+impl Drive {
+    /// The scans and reflectors of a recording, turn by turn.
+    ///
+    /// # Errors
+    /// If it has neither.
+    pub fn new(recording: &Recording, frame: SensorFrame) -> Result<Self, DriveError> {
+        let mut turns: Vec<Turn> = Vec::new();
+        let empty = |start| Turn {
+            start,
+            ranges: Vec::new(),
+            remission: Vec::new(),
+            first: Milliangle(0),
+            resolution: 250,
+            reflectors: Vec::new(),
+            pose: None,
+        };
+        for event in &recording.events {
+            let RecordedEvent::Scan(scan) = event else { continue };
+            let RecordedScan { start, first_bearing, bearing_step, ranges, intensities, .. } = scan;
+            turns.push(Turn {
+                ranges: ranges.iter().copied().map(millimetres).collect(),
+                remission: intensities.clone(),
+                first: Milliangle::from_radians(agv_core::geometry::wrap(frame.angle(*first_bearing))),
+                resolution: Milliangle::from_radians(bearing_step.abs()).0.try_into().unwrap_or(u16::MAX),
+                ..empty(*start)
+            });
+        }
+        let has_scans = !turns.is_empty();
+        turns.sort_by_key(|turn| turn.start);
+        for event in &recording.events {
+            let RecordedEvent::Reflectors(observations) = event else { continue };
+            let Some(first) = observations.first() else { continue };
+            if has_scans {
+                let index = turns.partition_point(|turn| turn.start <= first.time).saturating_sub(1);
+                turns[index].reflectors.extend(observations);
+            } else {
+                turns.push(Turn { reflectors: observations.clone(), ..empty(first.time) });
+            }
+        }
+        for turn in &mut turns {
+            let end = turn.start.offset(frame.period);
+            let index = recording.truth.partition_point(|truth| truth.time <= end);
+            let truth = recording.truth.get(index.saturating_sub(1));
+            turn.pose = truth.map(|truth| truth.pose.compose(&recording.parameters.laser));
+        }
+        let layout = layout_file::layout(&recording.landmarks);
+        if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, layout, frame }) }
+    }
+
+    /// What the sensor will see, turn by turn.
+    #[must_use]
+    pub fn turns(&self) -> &[Turn] {
+        &self.turns
+    }
+
+    /// What the sensor was taught.
+    #[must_use]
+    pub fn layout(&self) -> &[IdentifiedLandmark] {
+        &self.layout
+    }
+
+    pub(super) fn first_start(&self) -> Time {
+        self.turns.first().map_or(Time::default(), |turn| turn.start)
+    }
+}

@@ -1,0 +1,137 @@
+//! A NAV350 on TCP that sees what a recorded or simulated drive has seen.
+//!
+//! It speaks both dialects, has the sensor's operating modes, user levels, settings and layout, and answers the reads
+//! that its maker's client makes at start-up. The drive begins with the first question for data, or when it is told to;
+//! until then the first revolution is repeated, and the last one when it is over.
+
+mod drive;
+mod promise;
+mod sensor;
+
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use agv_core::wire::cola::Dialect;
+use agv_core::wire::nav350::{IdentifiedLandmark, SpeedReport};
+
+pub use drive::{Drive, DriveError, Turn};
+pub use sensor::{Connection, Sensor, SensorClockOptions};
+
+/// How the sensor behaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// How much faster than real time the drive goes.
+    pub speed: f64,
+    /// What the sensor's clock shows at its start, ms.
+    pub clock_start: u32,
+    /// The only dialect that is understood; both if None.
+    pub dialect: Option<Dialect>,
+    /// Whether the vehicle stands until [`Nav350::begin`].
+    pub stands: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { speed: 1.0, clock_start: 0, dialect: None, stands: false }
+    }
+}
+
+/// An emulated sensor.
+pub struct Nav350 {
+    speed: f64,
+    started: Instant,
+    sensor: Mutex<Sensor>,
+}
+
+impl Nav350 {
+    /// A sensor that was just started.
+    #[must_use]
+    pub fn new(drive: Drive, options: Options) -> Self {
+        let clock = SensorClockOptions { start: options.clock_start, ..SensorClockOptions::default() };
+        let sensor = Mutex::new(Sensor::new(drive, clock, options.dialect, options.stands));
+        Self { speed: options.speed, started: Instant::now(), sensor }
+    }
+
+    /// The speed that the sensor was told last.
+    #[must_use]
+    pub fn speed(&self) -> Option<SpeedReport> {
+        self.sensor().speed()
+    }
+
+    /// The layout as it is now.
+    #[must_use]
+    pub fn layout(&self) -> Vec<IdentifiedLandmark> {
+        self.sensor().layout().to_vec()
+    }
+
+    /// Lets the vehicle of a sensor that stands drive off at `time`.
+    pub fn begin(&self, time: Instant) {
+        let seconds = time.saturating_duration_since(self.started).as_secs_f64() * self.speed;
+        self.sensor().begin(seconds);
+    }
+
+    /// Serves every connection, until `is_stopped`.
+    ///
+    /// # Errors
+    /// If the listener fails.
+    pub fn serve(&self, listener: &TcpListener, is_stopped: &AtomicBool) -> io::Result<()> {
+        listener.set_nonblocking(true)?;
+        std::thread::scope(|scope| {
+            while !is_stopped.load(Ordering::Relaxed) {
+                match listener.accept() {
+                    Ok((stream, _)) => {
+                        scope.spawn(move || {
+                            // A connection that fails is the client's affair.
+                            let _ = self.converse(stream, is_stopped);
+                        });
+                    }
+                    Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                        std::thread::sleep(Duration::from_millis(5));
+                    }
+                    Err(error) => return Err(error),
+                }
+            }
+            Ok(())
+        })
+    }
+
+    fn sensor(&self) -> MutexGuard<'_, Sensor> {
+        self.sensor.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Seconds of the sensor since its start.
+    fn now(&self) -> f64 {
+        self.started.elapsed().as_secs_f64() * self.speed
+    }
+
+    fn converse(&self, mut stream: TcpStream, is_stopped: &AtomicBool) -> io::Result<()> {
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        let mut connection = Connection::default();
+        let mut buffer = vec![0; 1 << 16];
+        while !is_stopped.load(Ordering::Relaxed) {
+            let promised = connection.poll(&self.sensor(), self.now());
+            if let Some(bytes) = promised {
+                stream.write_all(&bytes)?;
+                continue;
+            }
+            let wait = connection.due().map_or(LONGEST_WAIT, |due| (due - self.now()) / self.speed);
+            stream.set_read_timeout(Some(Duration::from_secs_f64(wait.clamp(1e-4, LONGEST_WAIT))))?;
+            let count = match stream.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(count) => count,
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => continue,
+                Err(error) => return Err(error),
+            };
+            let answers = connection.receive(&mut self.sensor(), &buffer[..count], self.now());
+            stream.write_all(&answers)?;
+        }
+        Ok(())
+    }
+}
+
+/// Waits are cut into pieces of this length, s, so that the sensor can be stopped.
+const LONGEST_WAIT: f64 = 0.02;
