@@ -1,12 +1,16 @@
 //! The machine that owns all below: one event in, outputs out.
 
 mod event;
+mod evidence;
+mod fusion;
 mod machine;
 mod maps;
 mod output;
 mod output_predictor;
 mod parameters;
+mod sighting;
 mod slam;
+mod slam_fusion;
 mod start_finder;
 mod start_search;
 

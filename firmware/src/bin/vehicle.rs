@@ -145,7 +145,7 @@ fn start() -> Vehicle {
         exchange::set_settings_sound(false);
     }
     let search = build_search(&settings.parameters, settings.start_search);
-    search.index(localizer);
+    search.index(localizer.reflectors());
     exchange::start(OutputPredictor::new(&settings.parameters));
     exchange::update(&localizer.outputs().pose);
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));

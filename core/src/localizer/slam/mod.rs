@@ -20,6 +20,7 @@ use crate::localizer::{LandmarkSource, Parameters};
 use crate::measurement::Time;
 use crate::odometry::{Motion, OdometryBias};
 
+use super::evidence::Fate;
 use super::maps::Maps;
 use key_scans::KeyScans;
 use landmark_book::LandmarkBook;
@@ -49,16 +50,6 @@ pub(super) struct Seen {
     pub cartesian: Cartesian,
     /// Direction in S, rad.
     pub orientation: f32,
-}
-
-/// What became of something that was seen.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Fate {
-    pub verdict: Verdict,
-    /// The landmark that it was compared with, and the outcome of the comparison.
-    pub landmark: Option<(LandmarkSource, u16, Innovation)>,
-    /// Where it is in W, m, from the pose before it was used.
-    pub located: Point,
 }
 
 /// A landmark that something seen may be.

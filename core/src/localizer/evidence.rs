@@ -1,0 +1,113 @@
+//! What the sightings of one event say of the pose.
+
+use super::sighting::Sighting;
+use super::{LandmarkSource, LandmarkUse, Outputs, Reason};
+use crate::filter::{Consistency, Innovation};
+use crate::geometry::Point;
+use crate::landmarks::{LandmarkKind, Verdict};
+
+/// What became of something that was seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fate {
+    pub verdict: Verdict,
+    /// The landmark that it was compared with, and the outcome of the comparison.
+    pub landmark: Option<(LandmarkSource, u16, Innovation)>,
+    /// Where it is in W, m, from the pose before it was used.
+    pub located: Point,
+}
+
+/// Way since something last happened, m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DistanceSince {
+    pub reflector: f64,
+    pub feature: f64,
+    pub fix: f64,
+}
+
+impl DistanceSince {
+    pub const NEVER: Self = Self { reflector: f64::INFINITY, feature: f64::INFINITY, fix: f64::INFINITY };
+
+    pub fn any(&self) -> f64 {
+        self.reflector.min(self.feature).min(self.fix)
+    }
+
+    pub fn advance(&mut self, distance: f64) {
+        self.reflector += distance;
+        self.feature += distance;
+        self.fix += distance;
+    }
+}
+
+/// Counts what the sightings of one event say, and tells it in the outputs.
+pub(super) struct Evidence<'a> {
+    outputs: &'a mut Outputs,
+    distance: &'a mut DistanceSince,
+    gate: f64,
+    /// Whether a reflector must belong to a landmark.
+    are_reflectors_expected: bool,
+    expected: usize,
+    accepted: usize,
+    used: usize,
+    square_sum: f64,
+}
+
+impl<'a> Evidence<'a> {
+    pub fn new(
+        outputs: &'a mut Outputs,
+        distance: &'a mut DistanceSince,
+        gate: f64,
+        are_reflectors_expected: bool,
+    ) -> Self {
+        Self { outputs, distance, gate, are_reflectors_expected, expected: 0, accepted: 0, used: 0, square_sum: 0.0 }
+    }
+
+    /// Takes one sighting and what became of it; it was accepted if it has corrected the filter.
+    pub fn add(&mut self, sighting: &Sighting, fate: &Fate, is_accepted: bool) {
+        let is_fixed = fate.landmark.is_none_or(|(source, ..)| source == LandmarkSource::Fixed);
+        let is_reflector = sighting.kind == LandmarkKind::Reflector;
+        // Two landmarks that fit equally say nothing against the pose, nor does a feature that no map has.
+        let is_evidence = is_fixed
+            && !matches!(fate.verdict, Verdict::Ambiguous | Verdict::OutOfTime)
+            && ((is_reflector && self.are_reflectors_expected) || fate.landmark.is_some());
+        if is_evidence {
+            self.expected += 1;
+            self.accepted += usize::from(is_accepted);
+        }
+        if let Some((_, _, innovation)) = fate.landmark.filter(|_| is_accepted) {
+            self.used += 1;
+            self.square_sum += innovation.normalised_square;
+            if is_reflector {
+                self.distance.reflector = 0.0;
+            } else {
+                self.distance.feature = 0.0;
+            }
+        }
+        let position = sighting.observation.position();
+        let innovation = fate.landmark.map(|(_, _, innovation)| innovation);
+        let _ = self.outputs.uses.push(LandmarkUse {
+            time: sighting.time,
+            kind: sighting.kind,
+            landmark: fate.landmark.map(|(source, id, _)| (source, id)),
+            verdict: fate.verdict,
+            position: [position.x as f32, position.y as f32],
+            located: fate.located.into(),
+            residual: innovation.map_or([0.0; 2], |innovation| innovation.residual.into()),
+            residual_deviation: innovation.map_or([0.0; 2], |innovation| {
+                [libm::sqrt(innovation.covariance.m11), libm::sqrt(innovation.covariance.m22)]
+            }),
+            test_ratio: innovation.map_or(0.0, |innovation| innovation.normalised_square / self.gate),
+        });
+    }
+
+    /// Adds the event to the evidence of those before, and says why the vehicle is lost if they are against the pose.
+    pub fn judge(self, consistency: &mut Consistency) -> Option<Reason> {
+        consistency.add(self.expected, self.accepted, self.used, self.square_sum);
+        if consistency.is_rejecting() {
+            Some(Reason::LandmarksRejected)
+        } else if consistency.is_surprised() {
+            Some(Reason::InnovationsTooLarge)
+        } else {
+            None
+        }
+    }
+}

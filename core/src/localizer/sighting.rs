@@ -1,0 +1,105 @@
+//! What is seen in one event, as the filter takes it.
+
+use heapless::Vec;
+use nalgebra::Matrix2;
+
+use super::Parameters;
+use super::output::OBSERVATIONS;
+use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, falko};
+use crate::filter::{Cartesian, Observation, RangeBearing};
+use crate::geometry::{Point, difference};
+use crate::landmarks::{LandmarkKind, Verdict};
+use crate::measurement::{ReflectorObservation, Scan, Time};
+
+/// Memory that is used within one event only.
+#[derive(Clone, Debug)]
+pub(super) struct Workspace<const BEAMS: usize> {
+    pub points: PointScan<BEAMS>,
+    pub path: SensorPath,
+    pub detector: falko::Detector<BEAMS>,
+    pub keypoints: Vec<Keypoint, OBSERVATIONS>,
+    pub reflectors: Vec<ReflectorObservation, OBSERVATIONS>,
+    pub sightings: Vec<Sighting, OBSERVATIONS>,
+}
+
+/// One observation of one event.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sighting {
+    pub time: Time,
+    pub kind: LandmarkKind,
+    pub observation: Observation,
+    /// Direction of a feature in S, rad.
+    pub orientation: f32,
+    /// What is left to do for the dynamic map: the landmark that it belongs to, or none if it is new.
+    pub matched: Option<u16>,
+    pub verdict: Verdict,
+}
+
+impl<const BEAMS: usize> Workspace<BEAMS> {
+    /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
+    /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two.
+    pub fn see_features(&mut self, parameters: &Parameters, scan: &Scan) {
+        let features = &parameters.features;
+        self.points.set(scan, features.nearest, features.farthest);
+        if features.motion_correction {
+            self.path.correct(scan, &mut self.points);
+        }
+        self.detector.detect(&self.points, &mut self.keypoints);
+        self.keypoints.sort_unstable_by_key(|keypoint| keypoint.beam);
+        self.sightings.clear();
+        let added = features.added_deviation * features.added_deviation;
+        for keypoint in &self.keypoints {
+            let beam = usize::from(keypoint.beam);
+            let position = Point::new(f64::from(keypoint.position.x), f64::from(keypoint.position.y));
+            let position = if features.motion_correction {
+                self.path.from_start(beam as f64 * scan.beam_interval, &position)
+            } else {
+                position
+            };
+            let [xx, xy, yy] = keypoint.covariance.map(f64::from);
+            let _ = self.sightings.push(Sighting {
+                time: scan.beam_time(beam),
+                kind: match keypoint.kind {
+                    KeypointKind::Corner => LandmarkKind::Corner,
+                    KeypointKind::EndPoint => LandmarkKind::EndPoint,
+                },
+                observation: Observation::Cartesian(Cartesian {
+                    position,
+                    covariance: Matrix2::new(xx + added, xy, xy, yy + added),
+                }),
+                orientation: keypoint.orientation,
+                matched: None,
+                verdict: Verdict::Unknown,
+            });
+        }
+    }
+}
+
+/// Observations of reflectors as the filter takes them.
+pub(super) fn see_reflectors(
+    parameters: &Parameters,
+    observations: &[ReflectorObservation],
+    sightings: &mut Vec<Sighting, OBSERVATIONS>,
+) {
+    let reflectors = &parameters.reflectors;
+    for observation in observations {
+        if !(observation.range.is_finite() && observation.bearing.is_finite()) {
+            continue;
+        }
+        let observation_model = Observation::RangeBearing(RangeBearing {
+            range: f64::from(observation.range),
+            bearing: difference(f64::from(observation.bearing), 0.0),
+            range_variance: reflectors.range_deviation * reflectors.range_deviation,
+            bearing_variance: reflectors.bearing_deviation * reflectors.bearing_deviation,
+        });
+        // A revolution with more reflectors than there is room for keeps the first ones.
+        let _ = sightings.push(Sighting {
+            time: observation.time,
+            kind: LandmarkKind::Reflector,
+            observation: observation_model,
+            orientation: 0.0,
+            matched: None,
+            verdict: Verdict::Unknown,
+        });
+    }
+}

@@ -1,0 +1,95 @@
+//! Fusing what is seen into the filter with landmarks and past poses, a scan at a time.
+
+use super::Localizer;
+use super::evidence::Evidence;
+use super::slam::{Seen, cartesian};
+use crate::landmarks::{LandmarkKind, Verdict};
+use crate::measurement::{Scan, Time};
+
+impl<
+    const BEAMS: usize,
+    const REFLECTORS: usize,
+    const FEATURES: usize,
+    const DYNAMIC: usize,
+    const KEYS: usize,
+    const LANDMARKS: usize,
+    const STATES: usize,
+    const ENTRIES: usize,
+> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
+{
+    /// Fuses the reflectors of the workspace, all at the time of the one in the middle.
+    pub(super) fn fuse_reflectors_by_slam(&mut self) {
+        let sightings = &self.workspace.sightings;
+        let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
+        let (start, end) = (first.time, last.time);
+        let time = start.offset(0.5 * end.since(start));
+        let Some(timeline) = self.timeline.begun() else { return };
+        self.workspace.path.set(start, &self.parameters.laser, timeline.relative_path(start, end));
+        if self.begin_slam(time, end) {
+            self.fuse_by_slam(start);
+            self.end_slam();
+        }
+    }
+
+    /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
+    pub(super) fn fuse_scan_by_slam(&mut self, scan: &Scan) {
+        self.workspace.see_features(&self.parameters, scan);
+        if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
+            return;
+        }
+        if !self.slam.wants_scan(&self.parameters.slam) {
+            return;
+        }
+        let place = self.workspace.path.place(self.slam.time().since(scan.start));
+        self.slam.align(&self.workspace.points, &place, &self.parameters);
+        self.fuse_by_slam(scan.start);
+        self.slam.finish(&self.parameters.slam);
+        self.slam.keep(&self.workspace.points, &place, &self.parameters);
+        self.end_slam();
+    }
+
+    /// Brings the filter to `time`, or where it is if that is later, but not beyond `latest`. False if it cannot be there.
+    fn begin_slam(&mut self, time: Time, latest: Time) -> bool {
+        let Some(timeline) = self.timeline.begun().filter(|_| self.lost.is_none()) else { return false };
+        if self.slam.time() > latest {
+            return false;
+        }
+        self.slam.advance(time, timeline, self.parameters.vehicle.steering_lever());
+        true
+    }
+
+    fn end_slam(&mut self) {
+        // The filter's time is one that the timeline remembers.
+        let _ = self.timeline.set_state(self.slam.time(), self.slam.state());
+    }
+
+    /// Fuses the sightings of the workspace at the filter's time; its path begins at `start`.
+    fn fuse_by_slam(&mut self, start: Time) {
+        // A vehicle without a map of reflectors finds them on its way.
+        let reflectors_are_given = !self.maps.reflectors.landmarks().is_empty();
+        let gate = self.parameters.association.gate;
+        let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, reflectors_are_given);
+        let now = self.slam.time().since(start);
+        let path = &self.workspace.path;
+        for sighting in &mut self.workspace.sightings {
+            let mut seen = cartesian(&sighting.observation);
+            seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
+            let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
+            let fate = self.slam.see(&seen, &self.maps, &self.parameters);
+            sighting.verdict = fate.verdict;
+            evidence.add(sighting, &fate, fate.verdict == Verdict::Accepted);
+        }
+        let lost = evidence.judge(&mut self.consistency);
+        // What fits no landmark is new, once the whole scan has corrected the pose.
+        for sighting in &self.workspace.sightings {
+            let may_be_new = sighting.kind != LandmarkKind::Reflector || !reflectors_are_given;
+            if may_be_new && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
+                let mut seen = cartesian(&sighting.observation);
+                seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
+                let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
+                self.slam.discover(&seen, &self.parameters);
+            }
+        }
+        self.lost = lost;
+    }
+}

@@ -1,0 +1,41 @@
+//! How wrong a pose may be.
+
+use super::PoseOutput;
+
+/// Bounds that the errors of a pose exceed with a small probability (the protection levels of satellite navigation,
+/// RTCA DO-229, appendix J).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProtectionLevel {
+    /// Of the position, m.
+    pub position: f64,
+    /// Of the heading, rad.
+    pub heading: f64,
+}
+
+impl ProtectionLevel {
+    /// Probability that one of the bounds is exceeded although nothing is wrong with vehicle, sensors and map.
+    pub const RISK: f64 = 1e-7;
+}
+
+/// Deviations in the bound of the position: a distance in the plane exceeds them with half of the risk,
+/// exp(-k^2 / 2) = risk / 2.
+const POSITION_FACTOR: f64 = 5.80;
+/// Deviations in the bound of the heading: a normal number exceeds them with half of the risk, on either side.
+const HEADING_FACTOR: f64 = 5.45;
+/// What calibration and survey leave that no covariance knows, m and rad.
+const POSITION_ALLOWANCE: f64 = 0.010;
+const HEADING_ALLOWANCE: f64 = 0.002;
+
+impl PoseOutput {
+    /// How wrong the pose may be: from its covariance, made larger by as much as the innovations are larger than expected.
+    #[must_use]
+    pub fn protection_level(&self) -> ProtectionLevel {
+        let [xx, xy, yy, _, _, heading] = self.covariance;
+        let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);
+        let surprise = libm::sqrt((0.5 * self.normalised_square).max(1.0));
+        ProtectionLevel {
+            position: POSITION_FACTOR * surprise * libm::sqrt(worst) + POSITION_ALLOWANCE,
+            heading: HEADING_FACTOR * surprise * libm::sqrt(heading) + HEADING_ALLOWANCE,
+        }
+    }
+}
