@@ -4,6 +4,7 @@
 //! progress and notes to standard error.
 
 pub mod calibrate;
+pub mod campaign;
 pub mod can;
 pub mod completion;
 pub mod ctl;

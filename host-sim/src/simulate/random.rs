@@ -32,6 +32,12 @@ pub enum Stream {
     LaserParameters = 13,
     /// Noise of a multi-beam lidar's distances.
     MultiBeam = 12,
+    /// What is made wrong of a drive.
+    Faults = 14,
+    /// What is made wrong of telegrams.
+    Telegrams = 15,
+    /// What is made wrong of frames on the bus.
+    Frames = 16,
 }
 
 /// One sequence of random numbers.

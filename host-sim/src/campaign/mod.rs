@@ -1,0 +1,139 @@
+//! Fault campaigns: seeded drives in simulated time, through the wire code of the controller, in which something goes
+//! wrong.
+
+pub mod controller;
+pub mod fault;
+pub mod rig;
+pub mod verdict;
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::simulate::random::{Random, Stream};
+use crate::simulate::scenario::{Scenario, ScenarioError};
+use crate::simulate::{SimulateError, simulate};
+use fault::{Fault, window};
+use rig::RigError;
+use verdict::{AlertLimits, Judge, Verdict};
+
+/// A campaign as a file states it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Campaign {
+    /// The drive, relative to the file.
+    pub scenario: PathBuf,
+    /// How long each run lasts, s.
+    pub seconds: f64,
+    /// Seeds of each fault: 1 and so on.
+    pub runs: u64,
+    /// What the vehicle can live with.
+    #[serde(default)]
+    pub limits: AlertLimits,
+    /// What goes wrong.
+    #[serde(rename = "fault")]
+    pub faults: Vec<Fault>,
+}
+
+/// Why a campaign cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The file cannot be read.
+    #[error("the campaign {path} cannot be read")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The text is not a campaign.
+    #[error("this is not a campaign, line {line}: {problem}")]
+    Parse {
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Two faults have the same name, or none has any.
+    #[error("every fault of a campaign has a name of its own; {0:?} is there twice or empty")]
+    Name(String),
+    /// The scenario makes no sense.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The drive cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The run cannot be made.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+/// One run: which faults, and the seed of everything.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Run {
+    /// Indices of the faults in the campaign, one or two.
+    pub faults: Vec<usize>,
+    /// The seed.
+    pub seed: u64,
+}
+
+impl Campaign {
+    /// Reads a campaign and its scenario.
+    ///
+    /// # Errors
+    /// See [`CampaignError`].
+    pub fn read(path: &Path) -> Result<(Self, Scenario), CampaignError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| CampaignError::Read { path: path.to_path_buf(), source })?;
+        let campaign: Self = toml::from_str(&text).map_err(|error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let problem = error.message().replace('\n', ", ");
+            CampaignError::Parse { line: before.matches('\n').count() + 1, problem }
+        })?;
+        for (index, fault) in campaign.faults.iter().enumerate() {
+            let is_known = campaign.faults[..index].iter().any(|known| known.name == fault.name);
+            if fault.name.is_empty() || is_known {
+                return Err(CampaignError::Name(fault.name.clone()));
+            }
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let scenario = Scenario::read(&folder.join(&campaign.scenario))?;
+        Ok((campaign, scenario))
+    }
+
+    /// The runs with each fault alone.
+    #[must_use]
+    pub fn alone(&self) -> Vec<Run> {
+        let of_fault = |fault| (1..=self.runs).map(move |seed| Run { faults: vec![fault], seed });
+        (0..self.faults.len()).flat_map(of_fault).collect()
+    }
+
+    /// The runs with every two of them, each pair with one seed.
+    #[must_use]
+    pub fn pairs(&self) -> Vec<Run> {
+        let count = self.faults.len();
+        let pair = |first| (first + 1..count).map(move |second| vec![first, second]);
+        (0..count)
+            .flat_map(pair)
+            .zip(0..)
+            .map(|(faults, number)| Run { faults, seed: 1 + number % self.runs.max(1) })
+            .collect()
+    }
+
+    /// Makes a run.
+    ///
+    /// # Errors
+    /// See [`CampaignError`].
+    pub fn run(&self, scenario: &Scenario, run: &Run) -> Result<Verdict, CampaignError> {
+        let faults: Vec<&Fault> = run.faults.iter().filter_map(|&index| self.faults.get(index)).collect();
+        let simulation = simulate(&Scenario { seed: run.seed, ..scenario.clone() })?;
+        let mut recording = simulation.recording;
+        let mut random = Random::new(run.seed, Stream::Faults);
+        for fault in &faults {
+            fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);
+            fault.mislead(&mut recording, &mut random);
+        }
+        let judge = Judge::new(self.limits, window(&faults).0);
+        Ok(rig::drive(&recording, &faults, self.seconds, run.seed, judge)?)
+    }
+}
