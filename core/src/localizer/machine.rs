@@ -8,9 +8,9 @@ use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
 use super::{Event, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{PointScan, SensorPath, detect_reflectors, falko};
-use crate::filter::{Consistency, Ekf, Timeline};
+use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline};
 use crate::geometry::{Point, Pose};
-use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
+use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
@@ -40,11 +40,37 @@ pub struct Localizer<
     pub(super) timeline: Timeline<PAST>,
     pub(super) slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
     pub(super) consistency: Consistency,
+    motion_check: MotionCheck,
+    drift_check: DriftCheck,
+    /// Pose by odometry at the last revolution that has corrected the pose.
+    corrected_at: Option<Pose>,
     pub(super) lost: Option<Reason>,
     blindness: Option<Blindness>,
     pub(super) distance: DistanceSince,
     pub(super) workspace: Workspace<BEAMS>,
     pub(super) outputs: Outputs,
+}
+
+/// Below this share of accepted landmarks the map may be another one that looks alike.
+const DOUBTFUL_ACCEPTANCE: f64 = 0.6;
+
+/// Where the vehicle is, and where it would be by odometry alone.
+#[derive(Clone, Copy, Debug)]
+struct Estimate {
+    pose: Pose,
+    smooth: Pose,
+}
+
+/// A knocked laser stays within this, m and rad, of where it was; a vehicle that is further off was carried.
+const LARGEST_KNOCK: (f64, f64) = (0.5, 0.55);
+/// A vehicle whose wheel has spun or slid is off by no more than this to the side, m, and in its heading, rad.
+const LARGEST_SLIP: (f64, f64) = (0.05, 0.026);
+
+/// Whether the laser may have been knocked, if it has made the vehicle seem to jump by so much in R.
+fn is_knock(jump: &Pose) -> bool {
+    let (way, turn) = (libm::hypot(jump.x, jump.y), libm::fabs(jump.theta));
+    let is_slip = libm::fabs(jump.y) < LARGEST_SLIP.0 && turn < LARGEST_SLIP.1;
+    !is_slip && way < LARGEST_KNOCK.0 && turn < LARGEST_KNOCK.1
 }
 
 /// The odometry is not believed.
@@ -78,6 +104,7 @@ impl<
             dead_reckoning_distance: 0.0,
             correction: 0.0,
             smooth: Pose::default(),
+            drift: [0.0; 2],
             acceptance: 1.0,
             normalised_square: 2.0,
         };
@@ -96,6 +123,9 @@ impl<
             timeline: Timeline::new(parameters.laser, parameters.limits.longest_extrapolation),
             slam: Slam::new(),
             consistency: Consistency::new(parameters.consistency),
+            motion_check: MotionCheck::new(),
+            drift_check: DriftCheck::new(),
+            corrected_at: None,
             lost: None,
             blindness: None,
             distance: DistanceSince::NEVER,
@@ -162,6 +192,8 @@ impl<
     /// by as much as the filter remembers, about 0.4 s.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
+        let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
+        let before = if sees { self.estimate() } else { None };
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
@@ -189,7 +221,10 @@ impl<
             Event::Scan(scan) => self.scan(scan),
             Event::SetPose(fix) => self.set_pose(fix),
         }
-        self.publish(matches!(event, Event::Reflectors(_) | Event::Scan(_)));
+        if let Some(before) = before {
+            self.check_motion(&before);
+        }
+        self.publish(sees);
         &self.outputs
     }
 
@@ -198,6 +233,15 @@ impl<
             return;
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
+        if self.lost == Some(Reason::MotionDisagrees)
+            && let Some(before) = self.estimate()
+            && is_knock(&before.pose.between(&fix.pose))
+        {
+            self.drift_check.suspect_laser();
+        }
+        self.motion_check.clear();
+        self.drift_check.restart();
+        self.corrected_at = None;
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.consistency = Consistency::new(self.parameters.consistency);
@@ -293,6 +337,40 @@ impl<
         }
     }
 
+    /// The pose for now, and that by odometry alone.
+    fn estimate(&mut self) -> Option<Estimate> {
+        let timeline = self.timeline.begun_mut()?;
+        Some(Estimate { pose: timeline.state().pose, smooth: *timeline.odometry_pose() })
+    }
+
+    /// Compares what a revolution has shown with what the odometry says; `before` is the estimate before it was used.
+    fn check_motion(&mut self, before: &Estimate) {
+        let Some(after) = self.estimate() else { return };
+        let to_odometry = before.smooth.compose(&before.pose.inverse());
+        let mut is_corrected = false;
+        self.motion_check.begin(self.timeline.now());
+        for use_ in &self.outputs.uses {
+            is_corrected |= use_.verdict == Verdict::Accepted;
+            if use_.kind == LandmarkKind::Reflector {
+                let [x, y] = use_.position.map(f64::from);
+                let place = to_odometry.transform(&use_.located.into());
+                self.motion_check.see(&place, libm::hypot(x, y));
+            }
+        }
+        if self.lost.is_none() && self.motion_check.disagrees() {
+            self.lost = Some(Reason::MotionDisagrees);
+        }
+        if !is_corrected {
+            return;
+        }
+        if let Some(last) = self.corrected_at {
+            // What was extrapolated behind the last sample is in both.
+            let expected = before.pose.compose(&before.smooth.between(&after.smooth));
+            self.drift_check.add(&last.between(&after.smooth), &expected.between(&after.pose));
+        }
+        self.corrected_at = Some(after.smooth);
+    }
+
     fn publish(&mut self, may_be_corrected: bool) {
         let Some(timeline) = self.timeline.begun_mut() else {
             return;
@@ -313,13 +391,18 @@ impl<
         }
         let by_reflectors = distance.reflector <= limits.dead_reckoning_from;
         let by_features = distance.feature <= limits.dead_reckoning_from;
+        let suspect = self.drift_check.suspect();
+        let remark = if suspect == Some(Suspect::Odometry) { Reason::OdometryDisagrees } else { Reason::None };
+        let acceptance = self.consistency.acceptance();
         let (mode, reason) = match (self.lost, self.blindness, by_reflectors, by_features) {
             (Some(reason), ..) => (Mode::Lost, reason),
             (None, Some(blindness), ..) => (Mode::WithoutOdometry, blindness.reason),
-            (None, None, true, true) => (Mode::Mixed, Reason::None),
-            (None, None, true, false) => (Mode::Reflectors, Reason::None),
-            (None, None, false, true) => (Mode::Features, Reason::None),
             (None, None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
+            (None, None, ..) if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
+            (None, None, ..) if acceptance < DOUBTFUL_ACCEPTANCE => (Mode::Degraded, Reason::LandmarksRejected),
+            (None, None, true, true) => (Mode::Mixed, remark),
+            (None, None, true, false) => (Mode::Reflectors, remark),
+            (None, None, false, true) => (Mode::Features, remark),
         };
         self.outputs.pose = PoseOutput {
             time: timeline.now(),
@@ -330,7 +413,8 @@ impl<
             dead_reckoning_distance: distance.any(),
             correction,
             smooth,
-            acceptance: self.consistency.acceptance(),
+            drift: self.drift_check.trend(),
+            acceptance,
             normalised_square: self.consistency.mean_normalised_square(),
         };
     }

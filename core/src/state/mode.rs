@@ -21,6 +21,9 @@ pub enum Mode {
     WithoutOdometry,
     /// The pose is wrong or too uncertain; it must be given again.
     Lost,
+    /// Landmarks correct the pose, but something contradicts it: it may be further off than its covariance says, and the
+    /// vehicle should stop or creep.
+    Degraded,
 }
 
 /// Why the mode is what it is.
@@ -45,4 +48,10 @@ pub enum Reason {
     DriveEncoder,
     /// The encoder of the steering has a fault.
     SteeringEncoder,
+    /// The laser has moved otherwise than the odometry says: the vehicle has slid or was carried, or the laser was knocked.
+    MotionDisagrees,
+    /// The laser looks askew, or stands elsewhere on the vehicle than is believed.
+    LaserMoved,
+    /// The odometry's scale or steering is not what is believed; landmarks make up for it.
+    OdometryDisagrees,
 }

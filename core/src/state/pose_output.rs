@@ -27,6 +27,8 @@ pub struct PoseOutput {
     pub smooth: Pose,
     /// Share of the observations of fixed landmarks that were accepted lately, 0 to 1.
     pub acceptance: f64,
+    /// By how much landmarks have lately corrected position, m, and heading, rad, in one direction.
+    pub drift: [f64; 2],
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
 }
@@ -49,7 +51,8 @@ impl PoseOutput {
     /// with every revolution until it is.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        let is_localised = !matches!(self.mode, Mode::NotLocalised | Mode::Lost | Mode::WithoutOdometry);
+        let is_localised =
+            !matches!(self.mode, Mode::NotLocalised | Mode::Lost | Mode::WithoutOdometry | Mode::Degraded);
         let [xx, xy, yy, _, _, heading] = self.covariance;
         let (position_limit, heading_limit) = Self::GOOD_DEVIATIONS;
         let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);

@@ -22,20 +22,24 @@ impl ProtectionLevel {
 const POSITION_FACTOR: f64 = 5.80;
 /// Deviations in the bound of the heading: a normal number exceeds them with half of the risk, on either side.
 const HEADING_FACTOR: f64 = 5.45;
-/// What calibration and survey leave that no covariance knows, m and rad.
-const POSITION_ALLOWANCE: f64 = 0.010;
-const HEADING_ALLOWANCE: f64 = 0.002;
+/// What calibration, survey and clocks may be wrong by without that any check tells it soon, m and rad.
+const POSITION_ALLOWANCE: f64 = 0.060;
+const HEADING_ALLOWANCE: f64 = 0.0175;
+/// The filter lags behind a steady drift by at most so many times what it corrects in its trend.
+const LAG: f64 = 2.0;
 
 impl PoseOutput {
-    /// How wrong the pose may be: from its covariance, made larger by as much as the innovations are larger than expected.
+    /// How wrong the pose may be: from its covariance, made larger by as much as the innovations are larger
+    /// than expected, from the trend of the corrections, and from what no check tells soon.
     #[must_use]
     pub fn protection_level(&self) -> ProtectionLevel {
         let [xx, xy, yy, _, _, heading] = self.covariance;
         let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);
+        let [drift, heading_drift] = self.drift;
         let surprise = libm::sqrt((0.5 * self.normalised_square).max(1.0));
         ProtectionLevel {
-            position: POSITION_FACTOR * surprise * libm::sqrt(worst) + POSITION_ALLOWANCE,
-            heading: HEADING_FACTOR * surprise * libm::sqrt(heading) + HEADING_ALLOWANCE,
+            position: POSITION_FACTOR * surprise * libm::sqrt(worst) + LAG * drift + POSITION_ALLOWANCE,
+            heading: HEADING_FACTOR * surprise * libm::sqrt(heading) + LAG * heading_drift + HEADING_ALLOWANCE,
         }
     }
 }

@@ -30,6 +30,9 @@ impl Default for AlertLimits {
 /// An output older than this, s, says nothing of the present.
 const STALE: f64 = 0.1;
 
+/// A vehicle that is further away after a hundredth of a second, m, was carried.
+const CARRIED: f64 = 0.1;
+
 /// What the controller says at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Claim {
@@ -132,6 +135,8 @@ impl Judge {
         let Some(here) = truth(now) else { return };
         let (step, way) =
             self.last.map_or((0.0, 0.0), |(last, pose)| (time - last, pose.between(&here).position().norm()));
+        // A vehicle that is carried does not drive.
+        let way = if way > CARRIED { 0.0 } else { way };
         self.last = Some((time, here));
         self.seconds += step;
         let judged = output.and_then(|output| {

@@ -470,7 +470,7 @@ fn diagnostics(now: Time, output: &PoseOutput, faults: &EncoderFaults) -> Diagno
     let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
     let level = match output.mode {
         Mode::Reflectors | Mode::Features | Mode::Mixed => Level::Ok,
-        Mode::NotLocalised | Mode::DeadReckoning => Level::Warning,
+        Mode::NotLocalised | Mode::DeadReckoning | Mode::Degraded => Level::Warning,
         Mode::WithoutOdometry | Mode::Lost => Level::Error,
     };
     let localisation = DiagnosticStatus {

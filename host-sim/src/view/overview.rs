@@ -39,8 +39,9 @@ fn gravity(mode: Mode) -> u8 {
         Mode::Features => 2,
         Mode::NotLocalised => 3,
         Mode::DeadReckoning => 4,
-        Mode::WithoutOdometry => 5,
-        Mode::Lost => 6,
+        Mode::Degraded => 5,
+        Mode::WithoutOdometry => 6,
+        Mode::Lost => 7,
     }
 }
 

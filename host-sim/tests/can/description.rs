@@ -92,6 +92,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Mode::DeadReckoning,
         Mode::Lost,
         Mode::WithoutOdometry,
+        Mode::Degraded,
     ];
     let reasons = [
         Reason::None,
@@ -103,6 +104,9 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Reason::OdometryImplausible,
         Reason::DriveEncoder,
         Reason::SteeringEncoder,
+        Reason::MotionDisagrees,
+        Reason::LaserMoved,
+        Reason::OdometryDisagrees,
     ];
     let faults = [
         None,
@@ -117,10 +121,10 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
     let searches =
         [StartSearch::Idle, StartSearch::Searching, StartSearch::Ambiguous, StartSearch::TooFew, StartSearch::Unknown];
-    (0..9)
+    (0..12)
         .map(|index| {
-            let (mode, reason) = (modes[index % 7], reasons[index]);
-            let (drive, steering, laser) = (faults[index % 8], faults[(15 - index) % 8], lasers[index % 4]);
+            let (mode, reason) = (modes[index % 8], reasons[index]);
+            let (drive, steering, laser) = (faults[index % 8], faults[(23 - index) % 8], lasers[index % 4]);
             let start_search = searches[index % 5];
             let fault = |fault: Option<EncoderFault>| fault.map_or("None".to_owned(), |fault| format!("{fault:?}"));
             let status = Content::Status {

@@ -126,7 +126,7 @@ const WANTED_LAYER: Field = Field::unsigned(4, 16, 1.0);
 const STANDSTILL: Field = Field::unsigned(20, 1, 1.0);
 
 /// Numbers of the modes on the bus.
-const MODES: [(u64, Mode); 7] = [
+const MODES: [(u64, Mode); 8] = [
     (0, Mode::NotLocalised),
     (1, Mode::Reflectors),
     (2, Mode::Features),
@@ -134,10 +134,11 @@ const MODES: [(u64, Mode); 7] = [
     (4, Mode::DeadReckoning),
     (5, Mode::Lost),
     (6, Mode::WithoutOdometry),
+    (7, Mode::Degraded),
 ];
 
 /// Numbers of the reasons on the bus.
-const REASONS: [(u64, Reason); 9] = [
+const REASONS: [(u64, Reason); 12] = [
     (0, Reason::None),
     (1, Reason::NoPose),
     (2, Reason::NoLandmarks),
@@ -147,6 +148,9 @@ const REASONS: [(u64, Reason); 9] = [
     (6, Reason::OdometryImplausible),
     (7, Reason::DriveEncoder),
     (8, Reason::SteeringEncoder),
+    (9, Reason::MotionDisagrees),
+    (10, Reason::LaserMoved),
+    (11, Reason::OdometryDisagrees),
 ];
 
 /// Numbers of the encoder faults on the bus; 0 is none.

@@ -18,8 +18,9 @@ const FITTED_DRIFT: f64 = 30e-6;
 const SIMILAR: f64 = 0.5e-3;
 /// No crystal drifts by more.
 const GREATEST_DRIFT: f64 = 500e-6;
-/// An exchange that disagrees by more than this and half of its round trip, s, is of a clock that was started again.
-const RESTART: f64 = 0.05;
+/// An exchange that disagrees by more than this, s, and what it and the line are uncertain by, is of a clock that was
+/// started again or set.
+const RESTART: f64 = 0.005;
 /// Exchanges that took longer, s, are of no use.
 const SLOWEST: f64 = 1.0;
 
@@ -49,6 +50,9 @@ struct Line {
     device: f64,
     local: f64,
     drift: f64,
+    /// How wrong it may be at the newest exchange, s, and how much more with each second.
+    uncertainty: f64,
+    unknown_drift: f64,
 }
 
 /// Keeps the offset between the sensor's clock and the vehicle's.
@@ -94,9 +98,11 @@ impl SensorClock {
             return Err(ClockError::RoundTrip);
         }
         let middle = sent.offset(0.5 * round_trip);
-        let is_restarted = self
-            .to_local(device)
-            .is_some_and(|expected| libm::fabs(expected.since(middle)) > RESTART + 0.5 * round_trip);
+        let is_restarted = self.line.zip(self.to_local(device)).is_some_and(|(line, expected)| {
+            let age = self.newest.map_or(0.0, |(newest, _)| 1e-3 * libm::fabs(f64::from(device.since(newest))));
+            let uncertainty = line.uncertainty + line.unknown_drift * age + 0.5 * round_trip;
+            libm::fabs(expected.since(middle)) > RESTART + uncertainty
+        });
         if is_restarted {
             *self = Self::new();
         }
@@ -165,7 +171,8 @@ impl SensorClock {
             let (device, lead) = lead(exchange);
             (count + 1.0, sum + lead - drift * device)
         });
-        Some(Line { device: origin.device as f64, local: origin.local as f64 + sum / count * 1e6, drift })
+        let local = origin.local as f64 + sum / count * 1e6;
+        Some(Line { device: origin.device as f64, local, drift, uncertainty: least + SIMILAR, unknown_drift })
     }
 
     /// Slope of the leads of the exchanges with small round trips; None if they are too few or too near.

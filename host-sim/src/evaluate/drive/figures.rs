@@ -109,12 +109,13 @@ pub struct Accuracy {
 }
 
 /// All modes, in the order in which they are shown.
-pub const MODES: [Mode; 7] = [
+pub const MODES: [Mode; 8] = [
     Mode::NotLocalised,
     Mode::Reflectors,
     Mode::Features,
     Mode::Mixed,
     Mode::DeadReckoning,
+    Mode::Degraded,
     Mode::WithoutOdometry,
     Mode::Lost,
 ];

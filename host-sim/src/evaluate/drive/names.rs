@@ -13,6 +13,7 @@ pub fn mode_name(mode: Mode) -> &'static str {
         Mode::Mixed => "mixed",
         Mode::DeadReckoning => "dead reckoning",
         Mode::WithoutOdometry => "without odometry",
+        Mode::Degraded => "degraded",
         Mode::Lost => "lost",
     }
 }
@@ -30,6 +31,9 @@ pub fn reason_name(reason: Reason) -> &'static str {
         Reason::OdometryImplausible => "odometry implausible",
         Reason::DriveEncoder => "the drive encoder has a fault",
         Reason::SteeringEncoder => "the steering encoder has a fault",
+        Reason::MotionDisagrees => "laser and odometry saw different motions",
+        Reason::LaserMoved => "the laser has moved on the vehicle",
+        Reason::OdometryDisagrees => "odometry is not as believed",
     }
 }
 
