@@ -26,6 +26,9 @@ const HEALED: f64 = 0.6;
 const SCALE: f64 = 0.03;
 const BEND: f64 = 0.01;
 
+/// Way after which the heading has been corrected, m.
+const BEND_LAG: f64 = 0.5;
+
 /// Which of the two is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspect {
@@ -115,6 +118,9 @@ impl DriftCheck {
     fn judge_laser(&self) -> Option<bool> {
         let (askew, forward) = self.solve(&self.side);
         let (_, sideward) = self.solve(&self.along);
+        // Before the heading is corrected, a bent steering leads the vehicle aside, too.
+        let (bend, _) = self.solve(&self.heading);
+        let askew = askew.map(|askew| (libm::fabs(askew) - BEND_LAG * libm::fabs(bend.unwrap_or(0.0))).max(0.0));
         let is_beyond = |value: Option<f64>, limit: f64| value.is_some_and(|value| libm::fabs(value) > limit);
         let is_below = |value: Option<f64>, limit: f64| value.is_some_and(|value| libm::fabs(value) < HEALED * limit);
         if is_beyond(askew, ASKEW) || is_beyond(forward, ELSEWHERE) || is_beyond(sideward, ELSEWHERE) {

@@ -233,7 +233,13 @@ impl<
             return;
         }
         let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
-        if self.lost == Some(Reason::MotionDisagrees)
+        let is_contradicted = matches!(
+            self.lost,
+            Some(Reason::MotionDisagrees | Reason::LandmarksRejected | Reason::InnovationsTooLarge)
+        );
+        // Who was never right after the last pose was told it wrongly.
+        if is_contradicted
+            && self.corrected_at.is_some()
             && let Some(before) = self.estimate()
             && is_knock(&before.pose.between(&fix.pose))
         {

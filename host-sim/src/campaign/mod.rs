@@ -126,7 +126,10 @@ impl Campaign {
     /// See [`CampaignError`].
     pub fn run(&self, scenario: &Scenario, run: &Run) -> Result<Verdict, CampaignError> {
         let faults: Vec<&Fault> = run.faults.iter().filter_map(|&index| self.faults.get(index)).collect();
-        let simulation = simulate(&Scenario { seed: run.seed, ..scenario.clone() })?;
+        let mut scenario = Scenario { seed: run.seed, ..scenario.clone() };
+        // The controller of a campaign has a map of reflectors only; scans would cost ten times as much.
+        scenario.laser.scans = false;
+        let simulation = simulate(&scenario)?;
         let mut recording = simulation.recording;
         let mut random = Random::new(run.seed, Stream::Faults);
         for fault in &faults {

@@ -230,6 +230,7 @@ fn kidnap(recording: &mut Recording, from: f64, seconds: f64, range: CounterRang
                     observation.time = earlier(observation.time);
                 }
             }
+            RecordedEvent::Scan(scan) if time >= end => scan.start = earlier(scan.start),
             _ => {}
         }
         is_before || time >= end
