@@ -153,16 +153,6 @@ impl Controller {
 
     fn handle(&mut self, event: &Event) {
         let output = self.localizer.handle(event).pose;
-            if let Event::Reflectors(r) = event {
-                eprintln!(
-                    "{:.3} REFL {} first {:?} uses {:?}",
-                    output.time.micros() as f64 * 1e-6 - 5.0,
-                    r.observations.len(),
-                    r.observations.first().map(|o| o.time.micros() as f64 * 1e-6 - 5.0),
-                    self.localizer.outputs().uses.iter().map(|u| u.verdict).collect::<Vec<_>>()
-                );
-            }
-        }
         self.predictor.update(&output);
         self.search.handle(event, output.mode, self.localizer.reflectors());
     }

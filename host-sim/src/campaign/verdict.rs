@@ -145,20 +145,6 @@ impl Judge {
         });
         let (claim, (position, heading), level) =
             judged.unwrap_or((Claim::Degraded, (0.0, 0.0), ProtectionLevel { position: 0.0, heading: 0.0 }));
-            if let Some(o) = output {
-                eprintln!(
-                    "{time:.2} {:?} {:?} acc {:.2} nis {:.2} pl {:.3} {:.4} err {position:.3} {heading:.4} drift {:.3} {:.4}",
-                    o.mode,
-                    o.reason,
-                    o.acceptance,
-                    o.normalised_square,
-                    level.position,
-                    level.heading,
-                    o.drift[0],
-                    o.drift[1]
-                );
-            }
-        }
         let is_right = claim == Claim::Right;
         if !is_right {
             self.degraded_seconds += step;
