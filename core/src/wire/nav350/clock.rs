@@ -18,7 +18,8 @@ const FITTED_DRIFT: f64 = 30e-6;
 const SIMILAR: f64 = 0.5e-3;
 /// No crystal drifts by more.
 const GREATEST_DRIFT: f64 = 500e-6;
-/// An exchange that disagrees by more than this and half of its round trip, s, is of a clock that was started again.
+/// An exchange that disagrees with those before by more than this and what both may be wrong by, s, is of a clock that was
+/// started again.
 const RESTART: f64 = 0.05;
 /// Exchanges that took longer, s, are of no use.
 const SLOWEST: f64 = 1.0;
@@ -49,6 +50,8 @@ struct Line {
     device: f64,
     local: f64,
     drift: f64,
+    /// How wrong the best exchange may be, s.
+    uncertainty: f64,
 }
 
 /// Keeps the offset between the sensor's clock and the vehicle's.
@@ -94,9 +97,10 @@ impl SensorClock {
             return Err(ClockError::RoundTrip);
         }
         let middle = sent.offset(0.5 * round_trip);
+        let known = self.line.map_or(0.0, |line| line.uncertainty);
         let is_restarted = self
             .to_local(device)
-            .is_some_and(|expected| libm::fabs(expected.since(middle)) > RESTART + 0.5 * round_trip);
+            .is_some_and(|expected| libm::fabs(expected.since(middle)) > RESTART + known + 0.5 * round_trip);
         if is_restarted {
             *self = Self::new();
         }
@@ -165,10 +169,12 @@ impl SensorClock {
             let (device, lead) = lead(exchange);
             (count + 1.0, sum + lead - drift * device)
         });
-        Some(Line { device: origin.device as f64, local: origin.local as f64 + sum / count * 1e6, drift })
+        let local = origin.local as f64 + sum / count * 1e6;
+        Some(Line { device: origin.device as f64, local, drift, uncertainty: least })
     }
 
-    /// Slope of the leads of the exchanges with small round trips; None if they are too few or too near.
+    /// Slope of the leads of the exchanges with small round trips; None if they are too few or too near, or their round
+    /// trips too long for the time between them.
     fn measure_drift(&self, lead: impl Fn(&Exchange) -> (f64, f64)) -> Option<f64> {
         let smallest = self.exchanges.iter().map(|exchange| exchange.round_trip).min()?;
         let good = || self.exchanges.iter().filter(|exchange| exchange.round_trip <= 2 * smallest + 1000).map(&lead);
@@ -176,7 +182,9 @@ impl SensorClock {
         let (first, last) = good().fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), (device, _)| {
             (libm::fmin(first, device), libm::fmax(last, device))
         });
-        if count < DRIFT_EXCHANGES || last - first < DRIFT_SPAN {
+        // Round trips that are not small against the span make a slope by themselves.
+        let is_told = 1e-6 * smallest as f64 <= UNKNOWN_DRIFT * (last - first);
+        if count < DRIFT_EXCHANGES || last - first < DRIFT_SPAN || !is_told {
             return None;
         }
         let (device_sum, lead_sum) = good().fold((0.0, 0.0), |sum, (device, lead)| (sum.0 + device, sum.1 + lead));
