@@ -1,5 +1,6 @@
 //! The project's own commands: `cargo xtask --help`.
 
+mod audit;
 mod emulate;
 mod firmware;
 mod fuzz;
@@ -21,6 +22,7 @@ struct Xtask {
 
 #[derive(Subcommand)]
 enum Command {
+    Audit(audit::Audit),
     Emulate(emulate::Emulate),
     Firmware(firmware::Firmware),
     Fuzz(fuzz::Fuzz),
@@ -30,6 +32,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
+        Command::Audit(audit) => audit.run(),
         Command::Emulate(emulate) => emulate.run(),
         Command::Firmware(firmware) => firmware.run(),
         Command::Fuzz(fuzz) => fuzz.run(),

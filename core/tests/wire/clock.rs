@@ -92,3 +92,32 @@ fn exchanges_that_are_too_slow_or_backwards_are_refused() {
     assert_eq!(clock.record(late, early, DeviceTime(1)), Err(ClockError::RoundTrip));
     assert!(!clock.is_known());
 }
+
+/// The clocks agree, and the network holds back each packet for up to 200 ms: the answer is wrong by half of the best round
+/// trip, and by what unknown clocks may have drifted since.
+#[test]
+fn jitter_is_not_taken_for_drift() {
+    let mut state = 1_u64;
+    let mut delay = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % 200_000
+    };
+    for _ in 0..200 {
+        let mut clock = SensorClock::new();
+        let mut halves: Vec<u64> = Vec::new();
+        for second in 0..120_u64 {
+            let (sent, there, back) = (10_000_000 + 1_000_000 * second, delay(), delay());
+            let received = Time::from_micros(sent + there + back);
+            // Nor for a restart.
+            assert_eq!(clock.record(Time::from_micros(sent), received, device(sent + there, 0, 0.0)), Ok(()));
+            assert_eq!(clock.drift(), 0.0);
+            halves.push((there + back) / 2);
+            let remembered = halves.iter().rev().take(32).zip(0_u32..);
+            let least = remembered.map(|(half, age)| 1e-6 * *half as f64 + 200e-6 * f64::from(age));
+            let bound = least.fold(f64::INFINITY, f64::min);
+            let error = clock.to_local(device(sent, 0, 0.0)).unwrap().since(Time::from_micros(sent));
+            // Exchanges that are nearly as good count too, and the sensor rounds down twice.
+            assert!(error.abs() < bound + 2.5e-3, "{error} {bound}");
+        }
+    }
+}

@@ -1,19 +1,20 @@
 //! The service port.
 //!
-//! Two connections at once, so that one that was left open locks nobody out. A connection that says nothing for ten
-//! seconds is closed, and requests are answered no faster than one in two milliseconds: whoever floods the port waits.
+//! Two connections at once, so that one that was left open locks nobody out. A connection whose next request is not whole
+//! ten seconds after the last answer is closed, as is one that does not take an answer for as long: neither silence nor
+//! single bytes hold it open. Requests are answered no faster than one in two milliseconds: whoever floods the port waits.
 
 use agv_settings::service::{Action, Controller, Frames, LONGEST_MESSAGE, Session};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
-use embassy_time::{Duration, Timer, with_timeout};
+use embassy_time::{Duration, Instant, Timer, with_deadline, with_timeout};
 use embedded_storage::nor_flash::NorFlash;
 
 use super::exchange::{self, BusEvent, now};
 
-/// How long a connection may be silent.
+/// How long a peer may take for a request, from the last answer on, and to take an answer.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// Least time between answers.
 const PACE: Duration = Duration::from_millis(2);
@@ -94,8 +95,9 @@ async fn converse<F: NorFlash>(
 ) -> Result<(), Gone> {
     let mut session = Session::new();
     frames.clear();
+    let mut request_due = Instant::now() + PATIENCE;
     loop {
-        let count = match with_timeout(PATIENCE, socket.read(read)).await {
+        let count = match with_deadline(request_due, socket.read(read)).await {
             Ok(Ok(count)) if count > 0 => count,
             _ => return Err(Gone),
         };
@@ -123,13 +125,15 @@ async fn converse<F: NorFlash>(
                 }
             }
             Timer::after(PACE).await;
+            request_due = Instant::now() + PATIENCE;
         }
     }
 }
 
 async fn send(socket: &mut TcpSocket<'_>, mut bytes: &[u8]) -> Result<(), Gone> {
+    let due = Instant::now() + PATIENCE;
     while !bytes.is_empty() {
-        match with_timeout(PATIENCE, socket.write(bytes)).await {
+        match with_deadline(due, socket.write(bytes)).await {
             Ok(Ok(count)) if count > 0 => bytes = bytes.get(count..).unwrap_or_default(),
             _ => return Err(Gone),
         }

@@ -3,4 +3,5 @@
 pub mod board;
 pub mod encoder;
 pub mod encoder_pair;
+pub mod foreign_traffic;
 pub mod vehicle;

@@ -22,6 +22,7 @@ use serde::Serialize;
 
 use super::board::{self, Board, BoardError, Ports};
 use super::encoder_pair::{EmulatedPair, PairError};
+use super::foreign_traffic::ForeignTraffic;
 use crate::bus::{Bus, SlcanBus};
 use crate::live::relay::Relay;
 use crate::live::stream::{StreamSummary, record_stream};
@@ -81,6 +82,10 @@ pub struct BusTrouble {
     pub is_drive_silent: AtomicBool,
     /// Of so many frames to the controller one has a wrong bit; none if 0.
     pub corrupted_in: AtomicU32,
+    /// Frames of other nodes in each second.
+    pub foreign: AtomicU32,
+    /// How many of them were sent.
+    pub foreign_sent: AtomicU32,
     /// Whether somebody is about to tell the vehicle where it is; off again when that was done.
     pub is_pose_told: AtomicBool,
 }
@@ -103,6 +108,8 @@ pub struct VehicleOptions<'a> {
 const START_DEVIATIONS: [f64; 2] = [0.05, 0.02];
 /// How long the controller may take to localise.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// Most frames of other nodes at once.
+const LONGEST_BURST: f64 = 20.0;
 /// How long the vehicle stands when everything is ready.
 const LEAD: Duration = Duration::from_millis(500);
 
@@ -159,6 +166,11 @@ impl Watch<'_> {
     #[must_use]
     pub fn emergencies(&self) -> Vec<HeardEmergency> {
         self.with(|heard| heard.emergencies.clone())
+    }
+
+    /// Ends the emulation before its time.
+    pub fn end(&self) {
+        self.stopped.store(true, Ordering::Relaxed);
     }
 
     /// Whether the emulation has ended.
@@ -231,6 +243,7 @@ pub fn drive(
         sensor: &sensor,
         heard: &heard,
         trouble: &trouble,
+        stopped: &stopped,
         first,
         is_told: options.is_told,
     };
@@ -305,6 +318,7 @@ struct Stage<'a> {
     sensor: &'a Nav350,
     heard: &'a Mutex<Heard>,
     trouble: &'a BusTrouble,
+    stopped: &'a AtomicBool,
     first: Time,
     is_told: bool,
 }
@@ -329,15 +343,26 @@ impl Stage<'_> {
         let mut orders = 0_u8;
         let mut sent = 0_u32;
         let mut looked = start;
+        let own = [nodes.drive, nodes.steering, nodes.controller].map(node);
+        let mut foreign = ForeignTraffic::new(1, &own);
+        let mut foreign_due = 0.0_f64;
         loop {
             let now_looked = Instant::now();
+            let rate = f64::from(self.trouble.foreign.load(Ordering::Relaxed));
+            // What a stall has held up is left out: a bus takes no more frames than it has time for.
+            foreign_due = (foreign_due + rate * (now_looked - looked).as_secs_f64()).min(LONGEST_BURST);
             if end.is_some() {
                 let mut heard = self.heard();
                 heard.longest_stall = heard.longest_stall.max((now_looked - looked).as_secs_f64());
             }
             looked = now_looked;
-            if end.is_some_and(|end| Instant::now() > end) {
+            if self.stopped.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() > end) {
                 return Ok(());
+            }
+            while foreign_due >= 1.0 {
+                foreign_due -= 1.0;
+                bus.send(&foreign.next_frame().into()).map_err(BoardError::from)?;
+                self.trouble.foreign_sent.fetch_add(1, Ordering::Relaxed);
             }
             if !board.is_running() {
                 return Err(BoardError::Ended.into());

@@ -1,6 +1,6 @@
 //! `cargo xtask firmware`.
 
-mod image;
+pub mod image;
 mod size;
 mod toolchain;
 

@@ -175,7 +175,8 @@ impl SensorClock {
         Some(Line { device: origin.device as f64, local, drift, uncertainty: least + SIMILAR, unknown_drift })
     }
 
-    /// Slope of the leads of the exchanges with small round trips; None if they are too few or too near.
+    /// Slope of the leads of the exchanges with small round trips; None if they are too few or too near, or their round
+    /// trips too long for the time between them.
     fn measure_drift(&self, lead: impl Fn(&Exchange) -> (f64, f64)) -> Option<f64> {
         let smallest = self.exchanges.iter().map(|exchange| exchange.round_trip).min()?;
         let good = || self.exchanges.iter().filter(|exchange| exchange.round_trip <= 2 * smallest + 1000).map(&lead);
@@ -183,7 +184,9 @@ impl SensorClock {
         let (first, last) = good().fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), (device, _)| {
             (libm::fmin(first, device), libm::fmax(last, device))
         });
-        if count < DRIFT_EXCHANGES || last - first < DRIFT_SPAN {
+        // Round trips that are not small against the span make a slope by themselves.
+        let is_told = 1e-6 * smallest as f64 <= UNKNOWN_DRIFT * (last - first);
+        if count < DRIFT_EXCHANGES || last - first < DRIFT_SPAN || !is_told {
             return None;
         }
         let (device_sum, lead_sum) = good().fold((0.0, 0.0), |sum, (device, lead)| (sum.0 + device, sum.1 + lead));
