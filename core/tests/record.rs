@@ -128,11 +128,12 @@ fn landmark_kind() -> impl Strategy<Value = LandmarkKind> {
 }
 
 fn pose_output() -> impl Strategy<Value = PoseOutput> {
-    let mode = prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Lost)];
+    let mode =
+        prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Degraded)];
     let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible), Just(Reason::SteeringEncoder)];
-    let numbers = prop::array::uniform10(number());
+    let numbers = prop::array::uniform12(number());
     (time(), [pose(), pose()], mode, reason, numbers).prop_map(|(time, [pose, smooth], mode, reason, numbers)| {
-        let [a, b, c, d, e, f, g, h, i, correction] = numbers;
+        let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
         PoseOutput {
             time,
             pose,
@@ -142,6 +143,7 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
             dead_reckoning_distance: g,
             correction,
             smooth,
+            drift: [drift, heading_drift],
             acceptance: h,
             normalised_square: i,
         }

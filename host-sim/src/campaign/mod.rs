@@ -3,7 +3,9 @@
 
 pub mod controller;
 pub mod fault;
+pub mod results;
 pub mod rig;
+pub mod table;
 pub mod verdict;
 
 use std::path::{Path, PathBuf};
@@ -14,6 +16,8 @@ use crate::simulate::random::{Random, Stream};
 use crate::simulate::scenario::{Scenario, ScenarioError};
 use crate::simulate::{SimulateError, simulate};
 use fault::{Fault, window};
+use rayon::prelude::*;
+use results::Row;
 use rig::RigError;
 use verdict::{AlertLimits, Judge, Verdict};
 
@@ -77,6 +81,39 @@ pub struct Run {
     pub seed: u64,
 }
 
+/// A part of a campaign's runs: every `of`th, from `number` on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which part, from 0.
+    pub number: usize,
+    /// Of how many parts.
+    pub of: usize,
+}
+
+impl Shard {
+    /// All of it.
+    pub const ALL: Self = Self { number: 0, of: 1 };
+
+    /// Whether a run is in it.
+    #[must_use]
+    pub fn has(&self, run: usize) -> bool {
+        run % self.of.max(1) == self.number
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    /// "i/n", with i from 0.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((number, of)) if number < of => Ok(Self { number, of }),
+            _ => Err(format!("{text:?} is not a shard; the third of four is 2/4")),
+        }
+    }
+}
+
 impl Campaign {
     /// Reads a campaign and its scenario.
     ///
@@ -117,6 +154,31 @@ impl Campaign {
             .flat_map(pair)
             .zip(0..)
             .map(|(faults, number)| Run { faults, seed: 1 + number % self.runs.max(1) })
+            .collect()
+    }
+
+    /// Makes those runs that are `of` this shard, on all cores, and returns them in order. `done` is called after each.
+    ///
+    /// # Errors
+    /// See [`CampaignError`].
+    pub fn rows(
+        &self,
+        scenario: &Scenario,
+        runs: &[Run],
+        shard: Shard,
+        done: impl Fn() + Sync,
+    ) -> Result<Vec<Row>, CampaignError> {
+        let name =
+            |run: &Run, place| run.faults.get(place).map_or("", |&fault: &usize| self.faults[fault].name.as_str());
+        let of_shard: Vec<(usize, &Run)> = runs.iter().enumerate().filter(|(run, _)| shard.has(*run)).collect();
+        of_shard
+            .into_par_iter()
+            .map(|(number, run)| {
+                let verdict = self.run(scenario, run)?;
+                done();
+                let can_recover = run.faults.iter().all(|&fault| self.faults[fault].can_recover);
+                Ok(Row::new(number, [name(run, 0), name(run, 1)], run.seed, can_recover, &verdict))
+            })
             .collect()
     }
 

@@ -2,70 +2,86 @@
 
 use std::path::PathBuf;
 
-use agv_host_sim::campaign::verdict::{Class, Verdict};
-use agv_host_sim::campaign::{Campaign as Plan, CampaignError, Run};
-use rayon::prelude::*;
+use agv_host_sim::campaign::results::{self, Row};
+use agv_host_sim::campaign::table::table;
+use agv_host_sim::campaign::{Campaign as Plan, Shard};
+use anyhow::Context as _;
 
 use crate::command::progress;
 
 /// Let things go wrong in simulated drives, through the controller's wire code, and say how it takes them.
+///
+/// Each fault is there alone, with as many seeds as the file says; with --pairs every two of them, each pair with one seed.
+/// The same campaign gives the same table on every machine, however it is cut into shards.
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct Campaign {
-    /// The campaign, such as host-sim/scenarios/faults.toml.
-    file: PathBuf,
-    /// Every two faults together, each pair with one seed, instead of each alone.
+    /// The campaign, such as host-sim/scenarios/faults.toml; or tables of results, to put together.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Every two faults together instead of each alone.
     #[arg(long)]
     pairs: bool,
     /// Seeds of each fault, instead of what the file says.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     runs: Option<u64>,
     /// Only faults whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
+    /// Only a part of the runs: 2/4 is the third of four.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Write every run, as Apache Parquet.
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// One JSON array with an object a run, instead of the table.
+    #[arg(long)]
+    json: bool,
 }
+
+const HELP: &str = "\
+Examples:
+  agv campaign host-sim/scenarios/faults.toml
+  agv campaign host-sim/scenarios/faults.toml --only laser --runs 5
+  agv campaign host-sim/scenarios/faults.toml --shard 0/2 --output 0.parquet
+  agv campaign 0.parquet 1.parquet";
 
 impl Campaign {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let (mut plan, scenario) = Plan::read(&self.file)?;
+        let is_table = |file: &PathBuf| file.extension().is_some_and(|extension| extension == "parquet");
+        let mut rows = if self.files.iter().all(is_table) {
+            let mut rows = Vec::new();
+            for file in &self.files {
+                rows.extend(results::read(file)?);
+            }
+            rows
+        } else {
+            self.make()?
+        };
+        rows.sort_by_key(|row| row.run);
+        if let Some(output) = &self.output {
+            results::write(output, &rows)?;
+        }
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&rows)?);
+        } else {
+            print!("{}", table(&rows));
+        }
+        Ok(())
+    }
+
+    fn make(&self) -> anyhow::Result<Vec<Row>> {
+        let [file] = &self.files[..] else { anyhow::bail!("one campaign at a time, or tables of results (.parquet)") };
+        let (mut plan, scenario) = Plan::read(file).with_context(|| file.display().to_string())?;
         plan.runs = self.runs.unwrap_or(plan.runs);
         let mut runs = if self.pairs { plan.pairs() } else { plan.alone() };
         runs.retain(|run| run.faults.iter().any(|&fault| plan.faults[fault].name.contains(&self.only)));
-        let progress = progress::bar("runs", runs.len() as u64);
-        let verdicts: Vec<(Run, Verdict)> = runs
-            .into_par_iter()
-            .map(|run| {
-                let verdict = plan.run(&scenario, &run)?;
-                progress.inc(1);
-                Ok((run, verdict))
-            })
-            .collect::<Result<_, CampaignError>>()?;
+        anyhow::ensure!(!runs.is_empty(), "no fault has such a name");
+        let shard = self.shard.unwrap_or(Shard::ALL);
+        let progress = progress::bar("runs", (0..runs.len()).filter(|run| shard.has(*run)).count() as u64);
+        let rows = plan.rows(&scenario, &runs, shard, || progress.inc(1))?;
         progress.finish_and_clear();
-        for (index, fault) in plan.faults.iter().enumerate() {
-            let of: Vec<&Verdict> =
-                verdicts.iter().filter(|(run, _)| run.faults == [index]).map(|(_, verdict)| verdict).collect();
-            if of.is_empty() {
-                continue;
-            }
-            let count = |class: Class| of.iter().filter(|verdict| verdict.class == class).count();
-            let most = |value: &dyn Fn(&Verdict) -> f64| of.iter().map(|verdict| value(verdict)).fold(0.0, f64::max);
-            println!(
-                "{:<38} {:>3} {:>3} {:>3} {:>3}  late {:>5.2} s {:>5.2} m  rec {:>2}/{:>2} {:>5.1} s  worst {:>6.3} m {:>6.2} deg  degraded {:>5.1} s",
-                fault.name,
-                count(Class::Unimpressed),
-                count(Class::Said),
-                count(Class::Late),
-                count(Class::Misleading),
-                most(&|verdict| verdict.late_s),
-                most(&|verdict| verdict.late_m),
-                of.iter().filter(|verdict| verdict.is_recovered).count(),
-                of.len(),
-                most(&|verdict| verdict.recovered_after_s.unwrap_or(0.0)),
-                most(&|verdict| verdict.worst_position_m),
-                most(&|verdict| verdict.worst_heading_deg),
-                most(&|verdict| verdict.degraded_s),
-            );
-        }
-        Ok(())
+        Ok(rows)
     }
 }
