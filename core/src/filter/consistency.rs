@@ -39,13 +39,18 @@ pub struct Consistency {
     accepted: f64,
     used: f64,
     normalised_square: f64,
+    /// The same as `expected` and `accepted` with the longer memory.
+    steady: [f64; 2],
 }
+
+/// How many scans the longer memory of the acceptance reaches back.
+const STEADY: f64 = 12.0;
 
 impl Consistency {
     /// No evidence yet.
     #[must_use]
     pub fn new(parameters: ConsistencyParameters) -> Self {
-        Self { parameters, expected: 0.0, accepted: 0.0, used: 0.0, normalised_square: 0.0 }
+        Self { parameters, expected: 0.0, accepted: 0.0, used: 0.0, normalised_square: 0.0, steady: [0.0; 2] }
     }
 
     /// Takes the evidence of one scan: how many observations tell whether they fit a fixed landmark, how many of these
@@ -54,6 +59,10 @@ impl Consistency {
         let remaining = self.remaining(expected);
         self.expected = remaining * self.expected + expected as f64;
         self.accepted = remaining * self.accepted + accepted as f64;
+        if expected > 0 {
+            let [before, accepted_before] = self.steady.map(|sum| sum * (1.0 - 1.0 / STEADY));
+            self.steady = [before + expected as f64, accepted_before + accepted as f64];
+        }
         let remaining = self.remaining(used);
         self.used = remaining * self.used + used as f64;
         self.normalised_square = remaining * self.normalised_square + normalised_square_sum;
@@ -69,6 +78,15 @@ impl Consistency {
     #[must_use]
     pub fn acceptance(&self) -> f64 {
         if self.expected > 0.0 { self.accepted / self.expected } else { 1.0 }
+    }
+
+    /// The share over the last scans and over some more of them, whichever is smaller: a map that looks alike fits well
+    /// now and then.
+    #[must_use]
+    pub fn least_acceptance(&self) -> f64 {
+        let [expected, accepted] = self.steady;
+        let steady = if expected > 0.0 { accepted / expected } else { 1.0 };
+        self.acceptance().min(steady)
     }
 
     /// Mean normalised squared innovation of what was used; two if nothing was.

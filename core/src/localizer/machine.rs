@@ -52,7 +52,7 @@ pub struct Localizer<
 }
 
 /// Below this share of accepted landmarks the map may be another one that looks alike.
-const DOUBTFUL_ACCEPTANCE: f64 = 0.6;
+const DOUBTFUL_ACCEPTANCE: f64 = 0.75;
 
 /// Where the vehicle is, and where it would be by odometry alone.
 #[derive(Clone, Copy, Debug)]
@@ -405,7 +405,9 @@ impl<
             (None, Some(blindness), ..) => (Mode::WithoutOdometry, blindness.reason),
             (None, None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
             (None, None, ..) if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
-            (None, None, ..) if acceptance < DOUBTFUL_ACCEPTANCE => (Mode::Degraded, Reason::LandmarksRejected),
+            (None, None, ..) if self.consistency.least_acceptance() < DOUBTFUL_ACCEPTANCE => {
+                (Mode::Degraded, Reason::LandmarksRejected)
+            }
             (None, None, true, true) => (Mode::Mixed, remark),
             (None, None, true, false) => (Mode::Reflectors, remark),
             (None, None, false, true) => (Mode::Features, remark),

@@ -26,7 +26,7 @@ const HEADING_FACTOR: f64 = 5.45;
 const POSITION_ALLOWANCE: f64 = 0.060;
 const HEADING_ALLOWANCE: f64 = 0.0175;
 /// The filter lags behind a steady drift by at most so many times what it corrects in its trend.
-const LAG: f64 = 0.5;
+const LAG: f64 = 0.3;
 
 impl PoseOutput {
     /// How wrong the pose may be: from its covariance, made larger by as much as the innovations are larger
