@@ -416,6 +416,9 @@ fn check_poses(name: &str, watch: &Watch, start: Instant) -> (usize, usize) {
         poses.len(),
         1e3 * worst
     );
+    // Encoders that come late are the machine's affair; the place is never lost.
+    let is_known = |mode| matches!(mode, Mode::Reflectors | Mode::WithoutOdometry | Mode::DeadReckoning);
+    assert!(poses.iter().all(|heard| is_known(heard.pose.mode)), "{name}: {others:?}");
     assert!(poses.len() as f64 > 25.0 * duration && worst < 0.5, "{name}: {} poses, {worst} s", poses.len());
     (poses.len(), with_reflectors)
 }
@@ -489,7 +492,7 @@ fn strangers_change_nothing_and_stop_nothing() {
     let (poses, with_reflectors) = seen.unwrap();
     assert!(driven.emergencies.is_empty(), "{:?}", driven.emergencies);
     // A machine that keeps the encoders waiting adds faults of its own.
-    let least = if driven.longest_stall < LONGEST_STALL { poses } else { poses * 9 / 10 };
+    let least = if driven.longest_stall < LONGEST_STALL { poses * 9 / 10 } else { poses / 2 };
     assert!(with_reflectors >= least, "{with_reflectors} of {poses} poses with reflectors");
     assert_eq!(driven.poses.last().unwrap().pose.mode, Mode::Reflectors);
 }
