@@ -13,6 +13,7 @@ use crate::geometry::{Point, Pose, difference};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
 use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
+use crate::order::insertion_sort_by;
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -165,12 +166,17 @@ impl<
     pub fn add_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
         let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
         // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
-        for run in landmarks.chunk_by(|a, b| is_reflector(a) == is_reflector(b)) {
-            if run.first().is_some_and(is_reflector) {
+        let mut rest = landmarks;
+        while let Some(first) = rest.first() {
+            let are_reflectors = is_reflector(first);
+            let length = rest.iter().take_while(|landmark| is_reflector(landmark) == are_reflectors).count();
+            let Some((run, others)) = rest.split_at_checked(length) else { break };
+            if are_reflectors {
                 self.maps.reflectors.extend(run)?;
             } else {
                 self.maps.features.extend(run)?;
             }
+            rest = others;
         }
         Ok(())
     }
@@ -598,7 +604,7 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
             self.path.correct(scan, &mut self.points);
         }
         self.detector.detect(&self.points, &mut self.keypoints);
-        self.keypoints.sort_unstable_by_key(|keypoint| keypoint.beam);
+        insertion_sort_by(&mut self.keypoints, |a, b| a.beam.cmp(&b.beam));
         self.sightings.clear();
         let added = features.added_deviation * features.added_deviation;
         for keypoint in &self.keypoints {
