@@ -337,3 +337,31 @@ fn prediction_is_the_first_order_transport_of_the_covariance() {
     joint.fixed_view_mut::<3, 3>(3, 3).copy_from(&motion(0).covariance);
     assert!((state.covariance - stacked * joint * stacked.transpose()).norm() < 1e-15);
 }
+
+proptest! {
+    /// What a very sure observation leaves of a very unsure state is below what rounding leaves of it.
+    #[test]
+    fn covariance_stays_one_whatever_rounding_does(
+        factor in proptest::array::uniform9(-1.0f64..1.0),
+        size in 0.0f64..4.0,
+        sureness in -12.0f64..-3.0,
+        bearing in -3.0f64..3.0,
+    ) {
+        let factor = Matrix3::from_row_slice(&factor) * 10f64.powf(size);
+        let mut state = Ekf { pose: Pose::new(1.0, 2.0, 0.5), covariance: factor * factor.transpose() };
+        state.covariance.m33 = state.covariance.m33.max(1e-6);
+        let variance = 10f64.powf(2.0 * sureness);
+        let seen = RangeBearing { range: 7.0, bearing, range_variance: variance, bearing_variance: variance };
+        let landmark = state.pose.transform(&Point::new(7.0 * bearing.cos(), 7.0 * bearing.sin()));
+        for _ in 0..3 {
+            let observation = Observation::RangeBearing(seen);
+            let linearisation = observation.linearise(&state.pose, &Pose::default(), &landmark, 0.0).unwrap();
+            state.correct(&linearisation);
+            let [xx, xy, yy, xh, yh, hh] = state.covariance_entries();
+            prop_assert!(xx >= 0.0 && yy >= 0.0 && hh >= 0.0, "{}", state.covariance);
+            let scale = Matrix3::from_diagonal(&Vector3::new(xx, yy, hh).map(|variance| if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 }));
+            let correlations = scale * Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh) * scale;
+            prop_assert!(correlations.symmetric_eigenvalues().min() > -1e-4, "{}", state.covariance);
+        }
+    }
+}

@@ -153,3 +153,11 @@ fn a_point_ahead_of_a_turned_pose_is_to_the_left() {
     let point = Pose::new(1.0, 2.0, PI / 2.0).transform(&Point::new(3.0, 0.0));
     assert!((point - Point::new(1.0, 5.0)).norm() < 1e-12);
 }
+
+#[test]
+fn part_of_a_displacement_that_comes_back_to_its_heading_is_near() {
+    for theta in [TAU, TAU - 1e-9, -2.0 * TAU, 1e6] {
+        let part = Pose { x: 1.0, y: 0.0, theta }.fraction(0.5);
+        assert!(part.position().norm() < 1.0, "{theta}: {part:?}");
+    }
+}

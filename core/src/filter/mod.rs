@@ -7,6 +7,7 @@ mod consistency;
 mod ekf;
 mod observation;
 mod packed_covariance;
+mod positive_semidefinite;
 mod range_bearing;
 mod sparse_linearisation;
 mod timeline;

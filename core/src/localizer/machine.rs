@@ -9,7 +9,7 @@ use super::slam::{SLAM_ENTRIES, SLAM_STATES, Seen, Slam, cartesian};
 use super::{Event, LandmarkSource, LandmarkUse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, detect_reflectors, falko};
 use crate::filter::{Cartesian, Consistency, Ekf, Observation, RangeBearing, Timeline};
-use crate::geometry::{Point, Pose, difference};
+use crate::geometry::{Point, Pose, difference, wrap};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
 use crate::measurement::{EncoderFaults, ReflectorObservation, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
@@ -249,7 +249,8 @@ impl<
         if !fix.is_sound() {
             return;
         }
-        let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
+        let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
+        let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.consistency = Consistency::new(self.parameters.consistency);
