@@ -2,6 +2,7 @@
 
 pub mod bus;
 pub mod calibrate;
+pub mod campaign;
 pub mod data;
 pub mod emulate;
 pub mod evaluate;
