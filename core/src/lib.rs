@@ -12,7 +12,7 @@
 //! | 4 | [`localizer`] |
 //! | 3 | [`calibration`], [`features`], [`filter`], [`places`] |
 //! | 2 | [`odometry`], [`landmarks`], [`wire`] |
-//! | 1 | [`geometry`], [`measurement`], [`state`] |
+//! | 1 | [`geometry`], [`measurement`], [`order`], [`state`] |
 //!
 //! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.
 //! Units: SI and radians. Poses and covariances are f64, scans and features f32.
@@ -29,6 +29,7 @@ pub mod landmarks;
 pub mod localizer;
 pub mod measurement;
 pub mod odometry;
+pub mod order;
 pub mod places;
 pub mod record;
 pub mod state;

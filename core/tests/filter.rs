@@ -337,3 +337,45 @@ fn prediction_is_the_first_order_transport_of_the_covariance() {
     joint.fixed_view_mut::<3, 3>(3, 3).copy_from(&motion(0).covariance);
     assert!((state.covariance - stacked * joint * stacked.transpose()).norm() < 1e-15);
 }
+
+/// Least eigenvalue of the correlations.
+fn least_eigenvalue([xx, xy, yy, xh, yh, hh]: [f64; 6]) -> f64 {
+    let scale = |variance: f64| if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 };
+    let scale = Matrix3::from_diagonal(&Vector3::new(xx, yy, hh).map(scale));
+    (scale * Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh) * scale).symmetric_eigenvalues().min()
+}
+
+fn with_entries([xx, xy, yy, xh, yh, hh]: [f64; 6]) -> Ekf {
+    Ekf { pose: Pose::new(1.0, 2.0, 0.5), covariance: Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh) }
+}
+
+/// What very sure observations have left of very unsure states: less than rounding did.
+#[test]
+fn what_rounding_has_broken_is_no_covariance_that_is_said() {
+    let broken = [
+        [-6.8e-4, 9.8e-4, -5.0e-4, 6.0e-6, -5.1e-6, 2.5e-5],
+        [-5.2e-8, -2.8e-8, 1.63e-7, 1.56e-8, 4.5e-9, 1.1e-9],
+        [9.359638697910363e-8, 1.6e-7, 2.55e-7, 2.4e-9, 3.97e-9, 2.486e-9],
+        [1.0, -1.0, 1.0, -1.0, -1.0, 1.0],
+        [1e40, 2e40, 1e40, 0.0, 0.0, -1e-300],
+    ];
+    for entries in broken {
+        let said = with_entries(entries).covariance_entries();
+        let [xx, _, yy, _, _, hh] = said;
+        assert!(xx >= 0.0 && yy >= 0.0 && hh >= 0.0, "{entries:?} {said:?}");
+        assert!(least_eigenvalue(said) > -1e-4, "{entries:?} {said:?}");
+        // No variance becomes smaller than what rounding has shown of it.
+        let [a, _, b, _, _, c] = entries;
+        assert_eq!([xx, yy, hh], [a.abs(), b.abs(), c.abs()]);
+    }
+}
+
+proptest! {
+    #[test]
+    fn sound_covariances_are_said_as_they_are(factor in proptest::array::uniform9(-1.0f64..1.0), size in -6.0f64..6.0) {
+        let factor = Matrix3::from_row_slice(&factor) * 10f64.powf(size);
+        let c = factor * factor.transpose();
+        let entries = [c.m11, c.m12, c.m22, c.m13, c.m23, c.m33];
+        prop_assert_eq!(with_entries(entries).covariance_entries(), entries);
+    }
+}

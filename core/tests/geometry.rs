@@ -20,7 +20,39 @@ fn assert_same(a: &Pose, b: &Pose, tolerance: f64) {
     assert!(error <= tolerance, "{a:?} is not {b:?}");
 }
 
+/// The definition: what is left of whole turns, brought into the interval.
+fn wrapped_by_definition(angle: f64) -> f64 {
+    let left = angle % TAU;
+    if left > PI {
+        left - TAU
+    } else if left <= -PI {
+        left + TAU
+    } else {
+        left
+    }
+}
+
+#[test]
+fn wrapping_is_exact_at_half_turns() {
+    for turns in -9..=9 {
+        for angle in [f64::from(turns) * PI, f64::from(turns) * PI + 1e-15, f64::from(turns) * PI - 1e-15] {
+            assert_eq!(wrap(angle).to_bits(), wrapped_by_definition(angle).to_bits(), "{angle:?}");
+        }
+    }
+    assert!(wrap(f64::NAN).is_nan() && wrap(f64::INFINITY).is_nan() && wrap(f64::NEG_INFINITY).is_nan());
+}
+
 proptest! {
+    #[test]
+    fn wrapping_is_exact(angle in any::<f64>()) {
+        prop_assert_eq!(wrap(angle).to_bits(), wrapped_by_definition(angle).to_bits());
+    }
+
+    #[test]
+    fn wrapping_of_some_turns_is_exact(angle in -1e3f64..1e3) {
+        prop_assert_eq!(wrap(angle).to_bits(), wrapped_by_definition(angle).to_bits());
+    }
+
     #[test]
     fn wrapping_keeps_the_direction(angle in -1e3f64..1e3) {
         let wrapped = wrap(angle);
@@ -120,4 +152,12 @@ fn the_exponential_is_continuous_through_straight_motion() {
 fn a_point_ahead_of_a_turned_pose_is_to_the_left() {
     let point = Pose::new(1.0, 2.0, PI / 2.0).transform(&Point::new(3.0, 0.0));
     assert!((point - Point::new(1.0, 5.0)).norm() < 1e-12);
+}
+
+#[test]
+fn part_of_a_displacement_that_comes_back_to_its_heading_is_near() {
+    for theta in [TAU, TAU - 1e-9, -2.0 * TAU, 1e6] {
+        let part = Pose { x: 1.0, y: 0.0, theta }.fraction(0.5);
+        assert!(part.position().norm() < 1.0, "{theta}: {part:?}");
+    }
 }

@@ -4,7 +4,9 @@
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason};
-use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{
+    EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time,
+};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use proptest::prelude::*;
 
@@ -474,4 +476,32 @@ fn all_of_its_memory_fits_a_controller() {
     let size = size_of::<Localizer>();
     println!("{size} bytes");
     assert!(size <= 320 * 1024, "{size} bytes");
+}
+
+#[test]
+fn a_given_heading_of_many_turns_is_said_as_one_of_none() {
+    let mut drive = Drive::start();
+    let output = drive.set_pose(Pose { x: 1.0, y: 2.0, theta: 1000.0 });
+    assert_eq!(output.pose, Pose::new(1.0, 2.0, 1000.0));
+    assert!(output.pose.theta.abs() < 3.2);
+}
+
+#[test]
+fn an_increment_of_more_than_half_a_turn_is_no_motion() {
+    let mut parameters = parameters();
+    parameters.vehicle = Vehicle::Increments;
+    for theta in [f64::MAX, -1e3, 3.15] {
+        let mut localizer = Box::new(Small::new(parameters));
+        let time = |step: u64| Time::from_micros(1_000_000 + step * 10_000);
+        let pose = Pose::new(1.0, 2.0, 0.5);
+        let fix = PoseFix { time: time(0), pose, position_deviation: 0.02, heading_deviation: 0.005 };
+        localizer.handle(&Event::SetPose(fix));
+        for (step, theta) in [(0, 0.0), (1, theta)] {
+            let displacement = Pose { x: 0.001, y: 0.0, theta };
+            localizer.handle(&Event::Increment(PoseIncrement { time: time(step), displacement }));
+        }
+        let output = localizer.outputs().pose;
+        assert_eq!((output.mode, output.reason), (Mode::WithoutOdometry, Reason::OdometryImplausible));
+        assert_eq!(output.pose, pose);
+    }
 }

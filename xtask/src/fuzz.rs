@@ -18,7 +18,8 @@ pub struct Fuzz {
 }
 
 /// Targets of the folder `fuzz`.
-const TARGETS: [&str; 7] = ["cola_a", "cola_b", "canopen", "slcan", "log_reader", "velodyne_packet", "capture"];
+const TARGETS: [&str; 8] =
+    ["cola_a", "cola_b", "canopen", "slcan", "log_reader", "velodyne_packet", "capture", "localizer"];
 
 impl Fuzz {
     /// Every target, for so many seconds.

@@ -54,9 +54,11 @@ impl Seeds {
         }
         let frames = write_frames(&data, &corpus)?;
         let captures = write_captures(&data, &corpus)?;
+        let drives = write_drives(&corpus)?;
         println!("telegrams  {count}");
         println!("frames     {frames}");
         println!("captures   {captures}");
+        println!("drives     {drives}");
         Ok(())
     }
 }
@@ -108,6 +110,24 @@ fn write_captures(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
         count += usize::from(is_capture);
     }
     Ok(count)
+}
+
+/// Choices without a pattern, from which most events are plausible. Returns how many drives there are.
+fn write_drives(corpus: &Path) -> anyhow::Result<usize> {
+    let folder = corpus.join("localizer");
+    std::fs::create_dir_all(&folder)?;
+    let mut state = 1_u32;
+    let lengths = [256, 512, 1024, 2048, 4096].repeat(8);
+    for (number, length) in lengths.iter().enumerate() {
+        let choices: Vec<u8> = (0..*length)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 24) as u8
+            })
+            .collect();
+        std::fs::write(folder.join(format!("drive{number}")), choices)?;
+    }
+    Ok(lengths.len())
 }
 
 /// Identifier and data of a line `can0 589 [8] 4B 77 ...`.

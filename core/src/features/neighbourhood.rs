@@ -130,7 +130,8 @@ impl Disc {
 pub(super) fn beams_within(sine: f32, bearing_step: f32) -> usize {
     // x + x^3 / 4 is never below asin(x) for x up to 0.8, and close to it for the small x of most neighbourhoods.
     let angle = sine * (1.0 + 0.25 * sine * sine);
-    (angle / bearing_step) as usize + 1
+    // As many as there are numbers, if beams hardly differ.
+    ((angle / bearing_step) as usize).saturating_add(1)
 }
 
 /// Calls `visit` with each return within `radius` (m, at most 0.8 of the range) of the return of beam `index`, relative to it,

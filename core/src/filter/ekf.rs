@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use super::Linearisation;
+use super::positive_semidefinite::make_positive_semidefinite;
 use crate::geometry::{Pose, wrap};
 use crate::odometry::Motion;
 
@@ -44,10 +45,12 @@ impl Ekf {
         Self { pose, covariance: Matrix3::from_diagonal(&nalgebra::Vector3::new(position, position, heading)) }
     }
 
-    /// The covariance as outputs state it: xx, xy, yy, x-heading, y-heading, heading-heading; m^2, m rad, rad^2.
+    /// The covariance as outputs state it: xx, xy, yy, x-heading, y-heading, heading-heading; m^2, m rad, rad^2. It is
+    /// positive semidefinite, but for 1e-4 in a correlation.
     #[must_use]
     pub fn covariance_entries(&self) -> [f64; 6] {
-        let covariance = &self.covariance;
+        let mut covariance = self.covariance;
+        make_positive_semidefinite(&mut covariance);
         [covariance.m11, covariance.m12, covariance.m22, covariance.m13, covariance.m23, covariance.m33]
     }
 
@@ -101,6 +104,7 @@ impl Ekf {
         self.covariance =
             remaining * self.covariance * remaining.transpose() + gain * observation.covariance * gain.transpose();
         self.symmetrise();
+        make_positive_semidefinite(&mut self.covariance);
         true
     }
 

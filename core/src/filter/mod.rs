@@ -9,6 +9,7 @@ mod ekf;
 mod motion_check;
 mod observation;
 mod packed_covariance;
+mod positive_semidefinite;
 mod range_bearing;
 mod sparse_linearisation;
 mod timeline;

@@ -10,14 +10,9 @@ pub fn wrap(angle: f64) -> f64 {
     if angle > -PI && angle <= PI {
         return angle;
     }
-    let remainder = libm::fmod(angle, TAU);
-    if remainder > PI {
-        remainder - TAU
-    } else if remainder <= -PI {
-        remainder + TAU
-    } else {
-        remainder
-    }
+    // Exact, and from -pi to pi.
+    let remainder = libm::remainder(angle, TAU);
+    if remainder <= -PI { PI } else { remainder }
 }
 
 /// The shortest rotation that leads from `from` to `to`, rad, in (-pi, pi].

@@ -106,16 +106,14 @@ impl Pose {
         Pose { x: along * twist.x - across * twist.y, y: across * twist.x + along * twist.y, theta: wrap(twist.theta) }
     }
 
-    /// The constant body velocity that makes this displacement (logarithm), for rotations of less than half a turn.
+    /// The constant body velocity that makes this displacement (logarithm), the one that turns by half a turn at most: of
+    /// those that turn more, one that comes back to its heading moves beyond all bounds.
     #[must_use]
     pub fn log(&self) -> Twist {
-        let (along, across) = arc_factors(self.theta);
+        let theta = wrap(self.theta);
+        let (along, across) = arc_factors(theta);
         let scale = 1.0 / (along * along + across * across);
-        Twist {
-            x: scale * (along * self.x + across * self.y),
-            y: scale * (along * self.y - across * self.x),
-            theta: self.theta,
-        }
+        Twist { x: scale * (along * self.x + across * self.y), y: scale * (along * self.y - across * self.x), theta }
     }
 
     /// The part of this displacement that is made in the given share of its duration, at constant body velocity.

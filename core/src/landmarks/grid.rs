@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::geometry::Point;
+use crate::order::heap_sort;
 
 /// A search goes over at most this many rows and columns of cells on either side.
 const REACH: i64 = 4;
@@ -34,7 +35,7 @@ impl<const POINTS: usize> Grid<POINTS> {
             let (row, column) = self.place(&point);
             let _ = self.places.push((row, column, number as u16));
         }
-        self.places.sort_unstable();
+        heap_sort(&mut self.places);
     }
 
     /// Numbers of the points in the cells that a square of half width `radius` (m) around `point` touches: all points

@@ -9,7 +9,7 @@ use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
 use super::{Event, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{PointScan, SensorPath, detect_reflectors, falko};
 use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline};
-use crate::geometry::{Point, Pose};
+use crate::geometry::{Point, Pose, wrap};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
@@ -149,12 +149,17 @@ impl<
     pub fn add_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
         let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
         // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
-        for run in landmarks.chunk_by(|a, b| is_reflector(a) == is_reflector(b)) {
-            if run.first().is_some_and(is_reflector) {
+        let mut rest = landmarks;
+        while let Some(first) = rest.first() {
+            let are_reflectors = is_reflector(first);
+            let length = rest.iter().take_while(|landmark| is_reflector(landmark) == are_reflectors).count();
+            let Some((run, others)) = rest.split_at_checked(length) else { break };
+            if are_reflectors {
                 self.maps.reflectors.extend(run)?;
             } else {
                 self.maps.features.extend(run)?;
             }
+            rest = others;
         }
         Ok(())
     }
@@ -232,7 +237,8 @@ impl<
         if !fix.is_sound() {
             return;
         }
-        let state = Ekf::new(fix.pose, fix.position_deviation, fix.heading_deviation);
+        let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
+        let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
         let is_contradicted = matches!(
             self.lost,
             Some(Reason::MotionDisagrees | Reason::LandmarksRejected | Reason::InnovationsTooLarge)

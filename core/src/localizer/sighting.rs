@@ -10,6 +10,7 @@ use crate::filter::{Cartesian, Observation, RangeBearing};
 use crate::geometry::{Point, difference};
 use crate::landmarks::{LandmarkKind, Verdict};
 use crate::measurement::{ReflectorObservation, Scan, Time};
+use crate::order::insertion_sort_by;
 
 /// Memory that is used within one event only.
 #[derive(Clone, Debug)]
@@ -45,7 +46,7 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
             self.path.correct(scan, &mut self.points);
         }
         self.detector.detect(&self.points, &mut self.keypoints);
-        self.keypoints.sort_unstable_by_key(|keypoint| keypoint.beam);
+        insertion_sort_by(&mut self.keypoints, |a, b| a.beam.cmp(&b.beam));
         self.sightings.clear();
         let added = features.added_deviation * features.added_deviation;
         for keypoint in &self.keypoints {

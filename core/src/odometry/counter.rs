@@ -39,6 +39,15 @@ impl CounterRange {
         if forward >= values - values / 2 { forward - values } else { forward }
     }
 
+    /// The reading at a position that may be beyond the range, ticks.
+    #[must_use]
+    pub const fn wrap(self, position: i64) -> u32 {
+        match position.checked_rem_euclid(self.0 as i64) {
+            Some(reading) => reading as u32,
+            None => 0,
+        }
+    }
+
     /// The reading as a signed number around zero, ticks.
     #[must_use]
     pub const fn signed(self, reading: u32) -> i64 {

@@ -1,5 +1,7 @@
 //! From samples to motions.
 
+use core::f64::consts::PI;
+
 use super::{Control, Integration, Motion, OdometryNoise, Tricycle, Vehicle};
 use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
 
@@ -130,7 +132,9 @@ impl Odometer {
         }
         let duration = increment.time.since(start);
         let distance = libm::hypot(increment.displacement.x, increment.displacement.y);
-        if !increment.displacement.is_finite() || distance > self.fastest * duration {
+        // Half a turn either way is all that a heading can say.
+        let is_turn = libm::fabs(increment.displacement.theta) <= PI;
+        if !(increment.displacement.is_finite() && is_turn) || distance > self.fastest * duration {
             return Err(OdometryError::Implausible);
         }
         Ok(Motion {

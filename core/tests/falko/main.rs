@@ -365,3 +365,14 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn beams_that_hardly_differ_are_no_more_than_there_are() {
+    let ranges: Vec<f32> = (0..200).map(|beam| 5.0 + (beam % 7) as f32 * 0.3).collect();
+    for (name, parameters) in profiles() {
+        for step in [1e-40, -1e-40, 7.7e-31, 1e-12] {
+            let keypoints = detect(&points(&ranges, 1.0, step), parameters);
+            assert!(keypoints.iter().all(|keypoint| keypoint.position.x.is_finite()), "{name}");
+        }
+    }
+}

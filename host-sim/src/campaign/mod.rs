@@ -2,6 +2,7 @@
 //! wrong.
 
 pub mod controller;
+pub mod event_fuzz;
 pub mod fault;
 pub mod results;
 pub mod rig;

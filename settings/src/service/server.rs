@@ -76,6 +76,23 @@ impl Session {
         time: Time,
         room: &mut [u8; LONGEST_MESSAGE],
     ) -> Result<(usize, Action), MessageError> {
+        self.answer_with(keep, message, controller, is_standing, time, room)
+    }
+
+    /// As [`Self::answer`], but what is to be kept in flash is given to `keep`: without the storage, the rest can be looked
+    /// at on its own.
+    ///
+    /// # Errors
+    /// If the message means nothing. The connection is of no more use.
+    pub fn answer_with<F: NorFlash>(
+        &mut self,
+        keep: impl FnOnce(Kept, &mut Controller<F>) -> Result<(), StoreError>,
+        message: &[u8],
+        controller: &mut Controller<F>,
+        is_standing: bool,
+        time: Time,
+        room: &mut [u8; LONGEST_MESSAGE],
+    ) -> Result<(usize, Action), MessageError> {
         let (request, tag) = postcard::take_from_bytes::<Request>(message).map_err(|_| MessageError)?;
         let is_change = matches!(request, Request::Change(_));
         if tag.len() != if is_change { TAG } else { 0 } {
@@ -98,7 +115,7 @@ impl Session {
             Request::Change(change) => {
                 let signed = message.get(..message.len() - TAG).unwrap_or_default();
                 let outcome = self.permit(controller, signed, tag, is_standing);
-                match outcome.and_then(|()| perform(change, controller, time)) {
+                match outcome.and_then(|()| perform(change, controller, time, keep)) {
                     Ok(left) => {
                         action = left;
                         Response::Done
@@ -156,26 +173,38 @@ fn map_piece(landmarks: &[Landmark], first: u16) -> Response<'static> {
     Response::Map { count: landmarks.len() as u16, piece: Vec::from_slice(piece).unwrap_or_default() }
 }
 
-fn perform<F: NorFlash>(change: Change, controller: &mut Controller<F>, time: Time) -> Result<Action, Refusal> {
-    let Controller { settings, store, map, .. } = controller;
-    let store = store.as_mut().ok_or(Refusal::Store(StoreError::Flash));
-    match change {
+/// What is to be kept in flash.
+#[allow(clippy::large_enum_variant, reason = "there is no allocator, and there is one message at a time")]
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kept {
+    /// All settings.
+    Settings,
+    /// A map of so many landmarks, which begins.
+    MapBegin(u16),
+    /// Its next landmarks.
+    MapPiece(Vec<Landmark, PIECE>),
+    /// Its end.
+    MapEnd,
+}
+
+fn perform<F: NorFlash>(
+    change: Change,
+    controller: &mut Controller<F>,
+    time: Time,
+    keep: impl FnOnce(Kept, &mut Controller<F>) -> Result<(), StoreError>,
+) -> Result<Action, Refusal> {
+    let kept = match change {
+        Change::Store => Kept::Settings,
+        Change::BeginMap(count) => Kept::MapBegin(count),
+        Change::MapPiece(piece) => Kept::MapPiece(piece),
+        Change::FinishMap => Kept::MapEnd,
         Change::Set(name, value) => {
             let leaf = Leaf::named(name).ok_or(Refusal::Name)?;
-            leaf.set(settings, value).map_err(|error| match error {
+            leaf.set(&mut controller.settings, value).map_err(|error| match error {
                 LeafError::Kind => Refusal::Kind,
                 LeafError::Bounds => Refusal::Bounds,
             })?;
-        }
-        Change::Store => store?.store_leaves(settings).map_err(Refusal::Store)?,
-        Change::BeginMap(count) => *map = Some(store?.begin_map(count).map_err(Refusal::Store)?),
-        Change::MapPiece(piece) => {
-            let writer = map.as_mut().ok_or(Refusal::Store(StoreError::Map))?;
-            store?.write_piece(writer, &piece).map_err(Refusal::Store)?;
-        }
-        Change::FinishMap => {
-            let writer = map.take().ok_or(Refusal::Store(StoreError::Map))?;
-            store?.finish_map(&writer).map_err(Refusal::Store)?;
+            return Ok(Action::None);
         }
         Change::SetPose { pose: [x, y, theta], deviations: [position_deviation, heading_deviation] } => {
             let pose = Pose { x, y, theta };
@@ -190,6 +219,25 @@ fn perform<F: NorFlash>(change: Change, controller: &mut Controller<F>, time: Ti
             return Ok(Action::ForgetPanic);
         }
         Change::Reboot => return Ok(Action::Reboot),
-    }
+    };
+    keep(kept, controller).map_err(Refusal::Store)?;
     Ok(Action::None)
+}
+
+fn keep<F: NorFlash>(kept: Kept, controller: &mut Controller<F>) -> Result<(), StoreError> {
+    let Controller { settings, store, map, .. } = controller;
+    let store = store.as_mut().ok_or(StoreError::Flash);
+    match kept {
+        Kept::Settings => store?.store_leaves(settings)?,
+        Kept::MapBegin(count) => *map = Some(store?.begin_map(count)?),
+        Kept::MapPiece(piece) => {
+            let writer = map.as_mut().ok_or(StoreError::Map)?;
+            store?.write_piece(writer, &piece)?;
+        }
+        Kept::MapEnd => {
+            let writer = map.take().ok_or(StoreError::Map)?;
+            store?.finish_map(&writer)?;
+        }
+    }
+    Ok(())
 }

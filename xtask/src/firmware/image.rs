@@ -18,8 +18,10 @@ pub struct Board {
 }
 
 /// The emulated board.
-pub const AN500: Board =
-    Board { feature: "an500", images: &["calibrate", "latency", "measure", "replay", "restart", "vehicle"] };
+pub const AN500: Board = Board {
+    feature: "an500",
+    images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
+};
 
 /// The vehicle's board, a Nucleo-H743ZI.
 pub const H743: Board = Board { feature: "h743", images: &["vehicle"] };

@@ -80,7 +80,7 @@ pub(super) fn walk<const BEAMS: usize>(
         }
         let range = scan.ranges.get(index).copied().unwrap_or(0.0);
         let sine = if range > radius { radius / range } else { 0.8 };
-        let window = if range > 0.0 { (libm::asinf(sine) / scan.bearing_step) as usize } else { 0 };
+        let window = if range > 0.0 { (libm::asinf(sine) / scan.bearing_step) as usize } else { 0 }.min(count);
         let mut start = index;
         if best + window < index {
             start = index.saturating_sub(window);

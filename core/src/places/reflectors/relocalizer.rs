@@ -13,6 +13,7 @@ use super::sought_pairs::{SoughtPair, SoughtPairs};
 use super::{IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorSnapshot, SeenReflector};
 use crate::geometry::{Pose, ScanPoint, difference};
 use crate::landmarks::Landmark;
+use crate::order::insertion_sort_by;
 use crate::places::align;
 use crate::places::correspondence::Transform;
 
@@ -102,7 +103,8 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
     ) {
         self.seen.clear();
-        self.seen.extend(snapshot.reflectors().iter().copied());
+        // Both have the same room.
+        let _ = self.seen.extend_from_slice(snapshot.reflectors());
         self.sought.clear();
         self.best.clear();
         self.at = (0, 1);
@@ -304,7 +306,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
             }
             let _ = self.best.push(fix);
         }
-        self.best.sort_unstable_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
+        insertion_sort_by(&mut self.best, |a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
     }
 
     fn answer(&self) -> ReflectorAnswer {

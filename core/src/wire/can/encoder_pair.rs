@@ -95,7 +95,7 @@ impl Channel {
         let share = time.since(before.time) / latest.time.since(before.time);
         let step = self.range.step(before.position, latest.position) as f64;
         let moved = libm::round(step * share) as i64;
-        Some((i64::from(before.position) + moved).rem_euclid(self.range.values() as i64) as u32)
+        Some(self.range.wrap(i64::from(before.position).saturating_add(moved)))
     }
 }
 
@@ -159,7 +159,7 @@ impl EncoderPair {
 
     /// The difference of two counters of the driving wheel, modulo its range.
     fn less(&self, position: u32, amount: u32) -> u32 {
-        (i64::from(position) - i64::from(amount)).rem_euclid(self.drive.range.values() as i64) as u32
+        self.drive.range.wrap(i64::from(position) - i64::from(amount))
     }
 
     fn sample(&mut self, now: Time) -> Option<EncoderSample> {

@@ -74,8 +74,11 @@ impl<const N: usize> Deframer<N> {
     /// [`next`](Self::next) has been called until it found nothing.
     pub fn room(&mut self) -> &mut [u8] {
         if self.start > 0 {
-            self.buffer.copy_within(self.start..self.end, 0);
-            (self.start, self.end) = (0, self.end - self.start);
+            // As it always is; the compiler cannot know.
+            if self.start <= self.end && self.end <= N {
+                self.buffer.copy_within(self.start..self.end, 0);
+            }
+            (self.start, self.end) = (0, self.end.saturating_sub(self.start));
         }
         self.buffer.get_mut(self.end..).unwrap_or_default()
     }

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::geometry::{Pose, wrap};
 use crate::measurement::{ReflectorObservation, Reflectors, Scan, Time};
+use crate::order::insertion_sort_by;
 
 /// Why an answer did not become a revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -208,7 +209,7 @@ fn take_reflectors<const N: usize>(
             observations.push(observation).map_err(|_| RevolutionError::Reflectors)?;
         }
     }
-    observations.sort_unstable_by_key(|observation: &ReflectorObservation| observation.time);
+    insertion_sort_by(&mut observations, |a: &ReflectorObservation, b| a.time.cmp(&b.time));
     Ok(observations)
 }
 
@@ -228,7 +229,7 @@ fn observation(
     let time = match (reflector.details, scan) {
         (Some(details), _) => clock.to_local(details.time)?,
         (None, Some(scan)) => {
-            let turn = libm::fmod((bearing - scan.first_bearing) / scan.bearing_step, scan.ranges as f64);
+            let turn = libm::remainder((bearing - scan.first_bearing) / scan.bearing_step, scan.ranges as f64);
             let beam = if turn < 0.0 { turn + scan.ranges as f64 } else { turn };
             scan.start.offset(beam * scan.beam_interval)
         }

@@ -1,10 +1,10 @@
 //! Time for embassy: CMSDK timer 1 runs free, timer 0 is the alarm (ARM DDI 0479, 4.3).
 #![allow(unsafe_code, reason = "registers are at fixed addresses")]
 
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::task::Waker;
 
-use critical_section::Mutex;
+use critical_section::{CriticalSection, Mutex};
 use embassy_time_driver::Driver;
 use embassy_time_queue_utils::Queue;
 
@@ -22,20 +22,22 @@ const ENABLE_WITH_INTERRUPT: u32 = 0b1001;
 /// Both timers count at 25 MHz.
 const TICKS_A_MICROSECOND: u64 = 25;
 
-struct State {
-    queue: Queue,
-    /// What the clock showed last, and how often it has wrapped.
+/// What the clock showed last, and how often it has wrapped.
+#[derive(Clone, Copy)]
+struct Clock {
     last: u32,
     wraps: u64,
     is_running: bool,
 }
 
 struct CmsdkTimers {
-    state: Mutex<RefCell<State>>,
+    clock: Mutex<Cell<Clock>>,
+    queue: Mutex<RefCell<Queue>>,
 }
 
 embassy_time_driver::time_driver_impl!(static DRIVER: CmsdkTimers = CmsdkTimers {
-    state: Mutex::new(RefCell::new(State { queue: Queue::new(), last: 0, wraps: 0, is_running: false })),
+    clock: Mutex::new(Cell::new(Clock { last: 0, wraps: 0, is_running: false })),
+    queue: Mutex::new(RefCell::new(Queue::new())),
 });
 
 /// Starts the clock.
@@ -48,44 +50,49 @@ pub fn start() {
             write(CLOCK, VALUE, u32::MAX);
             write(CLOCK, CONTROL, ENABLE);
         }
-        DRIVER.state.borrow(section).borrow_mut().is_running = true;
+        let clock = DRIVER.clock.borrow(section);
+        clock.set(Clock { is_running: true, ..clock.get() });
     });
 }
 
 /// The alarm has gone off.
 pub fn on_alarm() {
     critical_section::with(|section| {
-        let mut state = DRIVER.state.borrow(section).borrow_mut();
         // SAFETY: this is a register of a timer that only this driver uses.
         unsafe { write(ALARM, CLEAR, 1) };
-        state.arm();
+        // Nobody else has it while no interrupt comes.
+        if let Ok(mut queue) = DRIVER.queue.borrow(section).try_borrow_mut() {
+            DRIVER.arm(section, &mut queue);
+        }
     });
 }
 
-impl State {
+impl CmsdkTimers {
     /// Microseconds since the start. Called at least every 171 s, as the network has timers of its own.
-    fn now(&mut self) -> u64 {
-        if !self.is_running {
+    fn time(&self, section: CriticalSection) -> u64 {
+        let cell = self.clock.borrow(section);
+        let mut clock = cell.get();
+        if !clock.is_running {
             return 0;
         }
         // SAFETY: this is a register of a timer that only this driver uses; it counts down.
         let shown = u32::MAX - unsafe { read(CLOCK, VALUE) };
-        if shown < self.last {
-            self.wraps += 1;
+        if shown < clock.last {
+            clock.wraps += 1;
         }
-        self.last = shown;
-        ((self.wraps << 32) + u64::from(shown)) / TICKS_A_MICROSECOND
+        clock.last = shown;
+        cell.set(clock);
+        ((clock.wraps << 32) + u64::from(shown)) / TICKS_A_MICROSECOND
     }
 
     /// Sets the alarm to the next task that waits.
-    fn arm(&mut self) {
+    fn arm(&self, section: CriticalSection, queue: &mut Queue) {
         loop {
-            let now = self.now();
-            let next = self.queue.next_expiration(now);
+            let next = queue.next_expiration(self.time(section));
             if next == u64::MAX {
                 return;
             }
-            let now = self.now();
+            let now = self.time(section);
             if next <= now {
                 continue;
             }
@@ -105,14 +112,14 @@ impl State {
 
 impl Driver for CmsdkTimers {
     fn now(&self) -> u64 {
-        critical_section::with(|section| self.state.borrow(section).borrow_mut().now())
+        critical_section::with(|section| self.time(section))
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
         critical_section::with(|section| {
-            let mut state = self.state.borrow(section).borrow_mut();
-            if state.queue.schedule_wake(at, waker) {
-                state.arm();
+            let mut queue = self.queue.borrow(section).borrow_mut();
+            if queue.schedule_wake(at, waker) {
+                self.arm(section, &mut queue);
             }
         });
     }

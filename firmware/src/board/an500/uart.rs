@@ -47,7 +47,7 @@ struct State {
 static STATE_OF_LINE: Mutex<RefCell<Option<State>>> = Mutex::new(RefCell::new(None));
 
 fn with<T>(work: impl FnOnce(&mut State) -> T) -> Option<T> {
-    critical_section::with(|section| STATE_OF_LINE.borrow(section).borrow_mut().as_mut().map(work))
+    critical_section::with(|section| STATE_OF_LINE.borrow(section).try_borrow_mut().ok()?.as_mut().map(work))
 }
 
 /// Starts the line.

@@ -1,0 +1,91 @@
+//! The localiser with the search for its pose, and the log of both.
+
+use core::hint::black_box;
+
+use agv_core::geometry::Pose;
+use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::localizer::{self, Event, Parameters, PoseFix};
+use agv_core::measurement::{
+    EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
+};
+use agv_core::record::{MAX_FRAME, Output, Record, encode};
+use agv_firmware::app::room;
+use agv_firmware::app::start_search::StartSearch;
+use agv_settings::Settings;
+
+use super::any;
+
+static RANGES: [f32; 1500] = [0.0; 1500];
+static INTENSITIES: [u16; 1500] = [0; 1500];
+static OBSERVATIONS: [ReflectorObservation; 300] =
+    [ReflectorObservation { time: Time::from_micros(0), range: 0.0, bearing: 0.0 }; 300];
+static LANDMARKS: [Landmark; 100] =
+    [Landmark { id: 0, kind: LandmarkKind::Reflector, x: 0.0, y: 0.0, deviation: 0.0 }; 100];
+
+/// A localiser with room for landmarks in its state, as images with the feature `slam` have it.
+type SlamLocalizer = localizer::Localizer;
+
+/// The localisers of an image with the feature `slam` and of one without.
+pub struct Localization {
+    localizer: room::Localizer,
+    slam: SlamLocalizer,
+    search: StartSearch,
+    frame: [u8; MAX_FRAME],
+}
+
+/// Some part of a list, or all of it.
+fn part<T>(list: &'static [T]) -> &'static [T] {
+    any(list)
+}
+
+fn event() -> Event<'static> {
+    let time = any(Time::default());
+    let pose = any(Pose::default());
+    match any(0_u8) {
+        0 => Event::Encoders(EncoderSample { time, drive: any(0), steering: any(0) }),
+        1 => Event::EncoderFaults(any(EncoderFaults::default())),
+        2 => Event::Speed(SpeedSample { time, speed: any(0.0), steering: any(0.0) }),
+        3 => Event::Increment(PoseIncrement { time, displacement: pose }),
+        4 => Event::Reflectors(Reflectors { observations: part(&OBSERVATIONS) }),
+        5 => Event::Scan(Scan {
+            start: time,
+            beam_interval: any(0.0),
+            first_bearing: any(0.0),
+            bearing_step: any(0.0),
+            ranges: part(&RANGES),
+            intensities: part(&INTENSITIES),
+        }),
+        _ => Event::SetPose(PoseFix { time, pose, position_deviation: any(0.0), heading_deviation: any(0.0) }),
+    }
+}
+
+impl Localization {
+    #[inline(always)]
+    pub fn new() -> Self {
+        let parameters: Parameters = any(Settings::default().parameters);
+        Self {
+            localizer: room::Localizer::new(parameters),
+            slam: SlamLocalizer::new(parameters),
+            search: StartSearch::new(&parameters, any(true)),
+            frame: [0; MAX_FRAME],
+        }
+    }
+
+    /// One event, logged, handled and searched with, and a slice of the search.
+    pub fn step(&mut self) {
+        let event = event();
+        self.write(&Record::Event(event));
+        let _ = black_box(self.localizer.add_landmarks(part(&LANDMARKS)));
+        self.search.index(&self.localizer);
+        let outputs = self.localizer.handle(&event);
+        let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
+        self.search.handle(&self.localizer, &event);
+        black_box(self.search.advance(&self.localizer));
+        let outputs = self.slam.handle(&event);
+        let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
+    }
+
+    fn write(&mut self, record: &Record) {
+        let _ = black_box(encode(record, any(0), &mut self.frame));
+    }
+}

@@ -1,0 +1,117 @@
+//! No panic can be reached from the control loop: the images say so themselves.
+//!
+//! The images are those of `cargo xtask firmware build`, which `cargo xtask test` runs first.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use agv_host_sim::data;
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags};
+
+/// The file of an image, if it is built; a word about it if it is not.
+fn image(test: &str, board: &str, name: &str) -> Option<PathBuf> {
+    let target = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/firmware");
+    let path = target.join(board).join("thumbv7em-none-eabihf/firmware").join(name);
+    if !path.exists() {
+        data::skip(test, "the firmware is not built; cargo xtask firmware build");
+        return None;
+    }
+    Some(path)
+}
+
+/// Symbols of what a panic goes through: the functions of `core::panicking`, the panic handler, and what the handler of the
+/// image calls, which is nowhere.
+fn panics(symbols: &[String]) -> Vec<&str> {
+    let parts = ["9panicking", "rust_begin_unwind", "control_loop_can_panic"];
+    symbols.iter().map(String::as_str).filter(|symbol| parts.iter().any(|part| symbol.contains(part))).collect()
+}
+
+/// All symbols of an image, as they are written there.
+fn symbols(path: &Path) -> Vec<String> {
+    let bytes = fs::read(path).unwrap();
+    let file = object::File::parse(&*bytes).unwrap();
+    file.symbols().map(|symbol| symbol.name().unwrap().to_owned()).collect()
+}
+
+/// What handles input: if one of these is not in the image, it shows nothing.
+const WORK: [&str; 14] = [
+    "8timeline",
+    "7machine",
+    "5falko",
+    "9augmented",
+    "17motion_correction",
+    "12start_finder",
+    "11relocalizer",
+    "12encoder_pair",
+    "15controller_node",
+    "5slcan",
+    "7session",
+    "6record",
+    "6leaves6LEAVES",
+    "14authentication8is_right",
+];
+
+#[test]
+fn the_control_loop_has_no_panic() {
+    let Some(path) = image("the_control_loop_has_no_panic", "an500", "no_panic") else { return };
+    let symbols = symbols(&path);
+    assert_eq!(panics(&symbols), Vec::<&str>::new());
+    for work in WORK {
+        assert!(symbols.iter().any(|symbol| symbol.contains(work)), "nothing of {work} is in the image");
+    }
+}
+
+#[test]
+fn a_panic_in_the_control_loop_is_found() {
+    let Some(path) = image("a_panic_in_the_control_loop_is_found", "an500", "deliberate_panic") else { return };
+    let symbols = symbols(&path);
+    let found = panics(&symbols);
+    for part in ["9panicking", "rust_begin_unwind", "control_loop_can_panic"] {
+        assert!(found.iter().any(|symbol| symbol.contains(part)), "{part} is not among {found:?}");
+    }
+    // The linker was told to leave it; else it refuses.
+    let bytes = fs::read(&path).unwrap();
+    let file = object::File::parse(&*bytes).unwrap();
+    assert!(file.symbols().any(|symbol| symbol.name() == Ok("control_loop_can_panic") && symbol.is_undefined()));
+}
+
+/// What is loaded of an image, without what is there for debuggers.
+fn loaded(path: &Path) -> Vec<u8> {
+    let bytes = fs::read(path).unwrap();
+    let file = object::File::parse(&*bytes).unwrap();
+    let is_loaded =
+        |flags| matches!(flags, SectionFlags::Elf { sh_flags } if sh_flags & u64::from(object::elf::SHF_ALLOC) != 0);
+    let sections = file.sections().filter(|section| is_loaded(section.flags()));
+    sections.flat_map(|section| section.data().unwrap().to_vec()).collect()
+}
+
+/// A panic says where it was, so the name of its source file is in the image.
+fn names(image: &[u8], name: &str) -> bool {
+    image.windows(name.len()).any(|window| window == name.as_bytes())
+}
+
+/// The same for a room of agv-core; the compiler's own library has a folder of that name too, under `library`.
+fn names_of_core(image: &[u8], room: &str) -> bool {
+    let mut places = image.windows(room.len()).enumerate().filter(|(_, window)| *window == room.as_bytes());
+    places.any(|(place, _)| !image[..place].ends_with(b"library/"))
+}
+
+#[test]
+fn no_panic_of_the_vehicle_is_in_what_it_computes() {
+    for board in ["an500", "h743"] {
+        let Some(path) = image("no_panic_of_the_vehicle_is_in_what_it_computes", board, "vehicle") else { return };
+        let image = loaded(&path);
+        for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/src")).unwrap() {
+            let entry = entry.unwrap();
+            let room = format!("core/src/{}/", entry.file_name().to_str().unwrap());
+            assert!(!entry.path().is_dir() || !names_of_core(&image, &room), "{board}: {room}");
+        }
+        for library in ["nalgebra-", "libm-", "postcard-", "/crc-", "sha2-", "hmac-"] {
+            assert!(!names(&image, library), "{board}: {library}");
+        }
+        // So names are found where there are panics.
+        for name in ["smoltcp-", "sequential-storage-", "firmware/src/bin/vehicle.rs"] {
+            assert!(names(&image, name), "{board}: {name}");
+        }
+    }
+}
