@@ -10,8 +10,8 @@ use agv_core::wire::can::controller_node::ControllerNode;
 use agv_core::wire::can::encoder_pair::EncoderPair;
 use agv_core::wire::can::frame::{Frame, extended_id, standard_id};
 use agv_core::wire::can::slcan;
-use agv_firmware::app::encoders::{SYNC_PERIOD, channels, node};
 use agv_settings::Settings;
+use agv_settings::encoders::{SYNC_PERIOD, channels, node};
 
 use super::any;
 

@@ -4,13 +4,12 @@ use core::hint::black_box;
 
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::localizer::{self, Event, Parameters, PoseFix};
+use agv_core::localizer::{self, Event, Parameters, PoseFix, StartSearch};
 use agv_core::measurement::{
     EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
 use agv_firmware::app::room;
-use agv_firmware::app::start_search::StartSearch;
 use agv_settings::Settings;
 
 use super::any;
@@ -76,11 +75,13 @@ impl Localization {
         let event = event();
         self.write(&Record::Event(event));
         let _ = black_box(self.localizer.add_landmarks(part(&LANDMARKS)));
-        self.search.index(&self.localizer);
+        self.search.index(self.localizer.reflectors());
         let outputs = self.localizer.handle(&event);
         let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
-        self.search.handle(&self.localizer, &event);
-        black_box(self.search.advance(&self.localizer));
+        black_box(outputs.pose.protection_level());
+        let mode = outputs.pose.mode;
+        self.search.handle(&event, mode, self.localizer.reflectors());
+        black_box(self.search.advance(self.localizer.reflectors()));
         let outputs = self.slam.handle(&event);
         let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
     }
