@@ -49,7 +49,22 @@ pub struct DriftCheck {
     turn: f64,
     trend: Vector2<f64>,
     heading_trend: f64,
-    is_laser_suspected: bool,
+    suspect: Option<Suspect>,
+}
+
+/// What each metre and each radian add to a correction; none of what was not driven enough.
+#[derive(Clone, Copy)]
+struct Rates {
+    way: Option<f64>,
+    turn: Option<f64>,
+}
+
+fn is_beyond(rate: Option<f64>, limit: f64) -> bool {
+    rate.is_some_and(|rate| libm::fabs(rate) > limit)
+}
+
+fn is_below(rate: Option<f64>, limit: f64) -> bool {
+    rate.is_some_and(|rate| libm::fabs(rate) < HEALED * limit)
 }
 
 impl DriftCheck {
@@ -65,18 +80,19 @@ impl DriftCheck {
             turn: 0.0,
             trend: Vector2::zeros(),
             heading_trend: 0.0,
-            is_laser_suspected: false,
+            suspect: None,
         }
     }
 
-    /// Forgets the corrections, as those that a new pose needs say nothing of the vehicle. A suspicion remains.
+    /// Forgets the corrections, as those that a new pose needs say nothing of the vehicle. A suspicion of the laser
+    /// remains.
     pub fn restart(&mut self) {
-        *self = Self { is_laser_suspected: self.is_laser_suspected, ..Self::new() };
+        *self = Self { suspect: self.suspect.filter(|suspect| *suspect == Suspect::Laser), ..Self::new() };
     }
 
     /// The laser has moved: it is to be suspected until the vehicle has driven and turned without a contradiction.
     pub fn suspect_laser(&mut self) {
-        self.is_laser_suspected = true;
+        self.suspect = Some(Suspect::Laser);
     }
 
     /// Takes one revolution: the motion since the last one by odometry, and the correction in R after it.
@@ -92,7 +108,7 @@ impl DriftCheck {
         self.turn = self.turn * remaining + libm::fabs(turn);
         self.trend = self.trend * (1.0 - 1.0 / TREND) + Vector2::new(correction.x, correction.y);
         self.heading_trend = self.heading_trend * (1.0 - 1.0 / TREND) + correction.theta;
-        self.is_laser_suspected = self.judge_laser().unwrap_or(self.is_laser_suspected);
+        self.suspect = self.judge();
     }
 
     /// By how much landmarks have lately corrected the pose in one direction, m and rad: what the filter lags behind by.
@@ -101,54 +117,35 @@ impl DriftCheck {
         [self.trend.norm(), libm::fabs(self.heading_trend)]
     }
 
-    /// What each metre and each radian add to the correction; of either only if there were enough.
-    fn solve(&self, sum: &Vector2<f64>) -> (Option<f64>, Option<f64>) {
-        let (has_way, has_turn) = (self.way >= LEAST_WAY, self.turn >= LEAST_TURN);
-        let mut information = self.information;
-        // What has not been driven is held at zero by a little information of its own.
-        information.m11 += FLOOR.0;
-        information.m22 += FLOOR.1;
-        let determinant = information.m11 * information.m22 - information.m12 * information.m12;
-        let a = (information.m22 * sum.x - information.m12 * sum.y) / determinant;
-        let b = (information.m11 * sum.y - information.m12 * sum.x) / determinant;
-        (has_way.then_some(a), has_turn.then_some(b))
-    }
-
-    /// Whether the laser is suspected; none if there is no evidence either way.
-    fn judge_laser(&self) -> Option<bool> {
-        let (askew, forward) = self.solve(&self.side);
-        let (_, sideward) = self.solve(&self.along);
-        // Before the heading is corrected, a bent steering leads the vehicle aside, too.
-        let (bend, _) = self.solve(&self.heading);
-        let askew = askew.map(|askew| (libm::fabs(askew) - BEND_LAG * libm::fabs(bend.unwrap_or(0.0))).max(0.0));
-        let is_beyond = |value: Option<f64>, limit: f64| value.is_some_and(|value| libm::fabs(value) > limit);
-        let is_below = |value: Option<f64>, limit: f64| value.is_some_and(|value| libm::fabs(value) < HEALED * limit);
-        if is_beyond(askew, ASKEW) || is_beyond(forward, ELSEWHERE) || is_beyond(sideward, ELSEWHERE) {
-            return Some(true);
-        }
-        let is_well = is_below(askew, ASKEW) && is_below(forward, ELSEWHERE) && is_below(sideward, ELSEWHERE);
-        is_well.then_some(false)
-    }
-
     /// Which of the two is wrong, if one is.
     #[must_use]
     pub fn suspect(&self) -> Option<Suspect> {
-        if self.is_laser_suspected {
-            return Some(Suspect::Laser);
-        }
-        let (scale, _) = self.solve(&self.along);
-        let (bend, _) = self.solve(&self.heading);
-        let is_beyond = |value: Option<f64>, limit: f64| value.is_some_and(|value| libm::fabs(value) > limit);
-        (is_beyond(scale, SCALE) || is_beyond(bend, BEND)).then_some(Suspect::Odometry)
+        self.suspect
     }
 
-    /// What it has found, for whoever wants to look: askew (rad), forward, sideward (m), scale (share), bend (rad/m).
-    #[must_use]
-    pub fn findings(&self) -> [Option<f64>; 5] {
-        let (askew, forward) = self.solve(&self.side);
-        let (scale, sideward) = self.solve(&self.along);
-        let (bend, _) = self.solve(&self.heading);
-        [askew, forward, sideward, scale, bend]
+    fn judge(&self) -> Option<Suspect> {
+        let (has_way, has_turn) = (self.way >= LEAST_WAY, self.turn >= LEAST_TURN);
+        if !has_way && !has_turn {
+            return self.suspect;
+        }
+        // What has not been driven is held at zero by a little information of its own.
+        let (m11, m12, m22) = (self.information.m11 + FLOOR.0, self.information.m12, self.information.m22 + FLOOR.1);
+        let share = 1.0 / (m11 * m22 - m12 * m12);
+        let rates = |sum: &Vector2<f64>| Rates {
+            way: has_way.then(|| (m22 * sum.x - m12 * sum.y) * share),
+            turn: has_turn.then(|| (m11 * sum.y - m12 * sum.x) * share),
+        };
+        let (along, side, heading) = (rates(&self.along), rates(&self.side), rates(&self.heading));
+        // Before the heading is corrected, a bent steering leads the vehicle aside, too.
+        let bend = libm::fabs(heading.way.unwrap_or(0.0));
+        let askew = side.way.map(|askew| (libm::fabs(askew) - BEND_LAG * bend).max(0.0));
+        let laser = [(askew, ASKEW), (side.turn, ELSEWHERE), (along.turn, ELSEWHERE)];
+        let is_suspected = self.suspect == Some(Suspect::Laser);
+        let is_healed = laser.iter().all(|(rate, limit)| is_below(*rate, *limit));
+        if laser.iter().any(|(rate, limit)| is_beyond(*rate, *limit)) || (is_suspected && !is_healed) {
+            return Some(Suspect::Laser);
+        }
+        (is_beyond(along.way, SCALE) || is_beyond(heading.way, BEND)).then_some(Suspect::Odometry)
     }
 }
 

@@ -7,15 +7,17 @@
 
 use heapless::Vec;
 
-use crate::geometry::Point;
+use crate::geometry::{Point, ScanPoint};
 use crate::measurement::Time;
 
 /// Landmarks that are remembered.
 const REMEMBERED: usize = 32;
-/// How long one is remembered that is not seen again, s.
-const MEMORY: f64 = 1.0;
-/// One that was seen no longer ago than this, s, should be seen again: two revolutions and a little.
-const EXPECTED: f64 = 0.3;
+/// For how many revolutions one is remembered that is not seen again.
+const MEMORY: u8 = 8;
+/// One that was seen no more revolutions ago should be seen again.
+const EXPECTED: u8 = 2;
+/// After a longer pause between two revolutions, s, everything is forgotten: the view has changed.
+const LONGEST_PAUSE: f64 = 0.3;
 /// Landmarks on either side that a verdict needs.
 const LEAST: usize = 3;
 /// Of those that should be seen again, this share is not enough.
@@ -27,20 +29,28 @@ const GATE: (f64, f64) = (0.05, 0.006);
 
 #[derive(Clone, Copy, Debug)]
 struct Remembered {
-    position: Point,
-    seen: Time,
+    position: ScanPoint,
+    /// Revolutions since it was seen.
+    age: u8,
+    /// In how many revolutions it was seen.
     times: u8,
+}
+
+impl Remembered {
+    fn is_expected(&self) -> bool {
+        self.times >= 2 && self.age <= EXPECTED
+    }
 }
 
 /// The memory, and how often it was contradicted.
 #[derive(Clone, Debug)]
 pub struct MotionCheck {
     remembered: Vec<Remembered, REMEMBERED>,
-    now: Time,
-    expected: usize,
-    seen_again: usize,
-    seen: usize,
-    new: usize,
+    last: Time,
+    expected: u8,
+    seen_again: u8,
+    seen: u8,
+    new: u8,
     contradictions: u8,
 }
 
@@ -48,15 +58,8 @@ impl MotionCheck {
     /// A check that has seen nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            remembered: Vec::new(),
-            now: Time::from_micros(0),
-            expected: 0,
-            seen_again: 0,
-            seen: 0,
-            new: 0,
-            contradictions: 0,
-        }
+        let last = Time::from_micros(0);
+        Self { remembered: Vec::new(), last, expected: 0, seen_again: 0, seen: 0, new: 0, contradictions: 0 }
     }
 
     /// Forgets everything.
@@ -67,44 +70,57 @@ impl MotionCheck {
 
     /// Begins a revolution that ends at `now`.
     pub fn begin(&mut self, now: Time) {
-        self.now = now;
-        self.remembered.retain(|one| now.since(one.seen) <= MEMORY);
-        let is_expected = |one: &&Remembered| one.times >= 2 && now.since(one.seen) <= EXPECTED;
-        self.expected = self.remembered.iter().filter(is_expected).count();
+        if now.since(self.last) > LONGEST_PAUSE {
+            self.clear();
+        }
+        self.last = now;
+        self.expected = 0;
+        for one in &mut self.remembered {
+            one.age = one.age.saturating_add(1);
+            self.expected += u8::from(one.is_expected());
+        }
+        self.remembered.retain(|one| one.age <= MEMORY);
         (self.seen_again, self.seen, self.new) = (0, 0, 0);
     }
 
     /// Takes a landmark of the revolution: where it is in the frame of the odometry, m, and how far from the laser, m.
     pub fn see(&mut self, position: &Point, range: f64) {
-        let now = self.now;
-        let gate = GATE.0 + GATE.1 * range;
-        self.seen += 1;
-        let known = self
-            .remembered
-            .iter_mut()
-            .filter(|one| now.since(one.seen) > 0.0)
-            .map(|one| ((one.position - position).norm_squared(), one))
-            .filter(|(square, _)| *square <= gate * gate)
-            .min_by(|(a, _), (b, _)| a.total_cmp(b));
-        if let Some((_, one)) = known {
-            self.seen_again += usize::from(one.times >= 2 && now.since(one.seen) <= EXPECTED);
-            *one = Remembered { position: *position, seen: now, times: one.times.saturating_add(1) };
+        let gate = (GATE.0 + GATE.1 * range) as f32;
+        let position: ScanPoint = position.cast();
+        self.seen = self.seen.saturating_add(1);
+        let mut nearest = gate * gate;
+        let mut known = None;
+        for one in &mut self.remembered {
+            let (x, y) = (one.position.x - position.x, one.position.y - position.y);
+            let square = x * x + y * y;
+            if square <= nearest && one.age > 0 {
+                (nearest, known) = (square, Some(one));
+            }
+        }
+        if let Some(one) = known {
+            self.seen_again += u8::from(one.is_expected());
+            *one = Remembered { position, age: 0, times: one.times.saturating_add(1) };
             return;
         }
-        self.new += 1;
-        let one = Remembered { position: *position, seen: now, times: 1 };
-        if let Err(one) = self.remembered.push(one)
-            && let Some(oldest) = self.remembered.iter_mut().min_by_key(|other| other.seen)
-        {
-            *oldest = one;
+        self.new = self.new.saturating_add(1);
+        let one = Remembered { position, age: 0, times: 1 };
+        if self.remembered.is_full() {
+            // What was seen in this revolution stays.
+            if let Some(place) = self.remembered.iter_mut().max_by_key(|other| other.age).filter(|other| other.age > 0)
+            {
+                *place = one;
+            }
+        } else {
+            let _ = self.remembered.push(one);
         }
     }
 
     /// Ends the revolution. True if the laser has moved otherwise than the odometry says.
     pub fn disagrees(&mut self) -> bool {
-        let can_tell = self.expected >= LEAST && self.seen >= LEAST;
-        let is_contradicted =
-            can_tell && (self.seen_again as f64) < TOO_FEW * self.expected as f64 && 2 * self.new >= self.seen;
+        let can_tell = usize::from(self.expected.min(self.seen)) >= LEAST;
+        let is_contradicted = can_tell
+            && f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
+            && self.new >= self.seen - self.new;
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
         self.contradictions >= IN_A_ROW
     }

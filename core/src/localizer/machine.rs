@@ -377,7 +377,9 @@ impl<
         }
         if let Some(last) = self.corrected_at {
             // What was extrapolated behind the last sample is in both.
-            let expected = before.pose.compose(&before.smooth.between(&after.smooth));
+            let is_same = before.smooth == after.smooth;
+            let expected =
+                if is_same { before.pose } else { before.pose.compose(&before.smooth.between(&after.smooth)) };
             self.drift_check.add(&last.between(&after.smooth), &expected.between(&after.pose));
         }
         self.corrected_at = Some(after.smooth);
