@@ -6,9 +6,11 @@ pub mod event_fuzz;
 pub mod fault;
 pub mod results;
 pub mod rig;
+pub mod soak;
 pub mod table;
 pub mod verdict;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -158,7 +160,8 @@ impl Campaign {
             .collect()
     }
 
-    /// Makes those runs that are `of` this shard, on all cores, and returns them in order. `done` is called after each.
+    /// Makes those runs that are in a shard, on all cores, and returns them in order. A run that panics is one of them.
+    /// `done` is called after each.
     ///
     /// # Errors
     /// See [`CampaignError`].
@@ -175,10 +178,10 @@ impl Campaign {
         of_shard
             .into_par_iter()
             .map(|(number, run)| {
-                let verdict = self.run(scenario, run)?;
+                let verdict = catch_unwind(AssertUnwindSafe(|| self.run(scenario, run))).ok().transpose()?;
                 done();
                 let can_recover = run.faults.iter().all(|&fault| self.faults[fault].can_recover);
-                Ok(Row::new(number, [name(run, 0), name(run, 1)], run.seed, can_recover, &verdict))
+                Ok(Row::new(number, [name(run, 0), name(run, 1)], run.seed, can_recover, verdict.as_ref()))
             })
             .collect()
     }
@@ -199,7 +202,10 @@ impl Campaign {
             fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);
             fault.mislead(&mut recording, &mut random);
         }
-        let judge = Judge::new(self.limits, window(&faults).0);
-        Ok(rig::drive(&recording, &faults, self.seconds, run.seed, judge)?)
+        let mut judge = Judge::new(self.limits, window(&faults).0);
+        rig::drive(&recording, &faults, self.seconds, run.seed, |now, time, output, truth| {
+            judge.hear(now, time, output, truth);
+        })?;
+        Ok(judge.verdict(&faults))
     }
 }

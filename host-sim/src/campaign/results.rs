@@ -25,7 +25,7 @@ pub struct Row {
     pub other_fault: String,
     /// Seed of the run.
     pub seed: i64,
-    /// [`Class`] as its name in snake case.
+    /// [`Class`] as its name in snake case, or "panicked".
     pub class: String,
     /// See [`Verdict`].
     pub late_s: f64,
@@ -72,6 +72,9 @@ pub enum ResultsError {
     },
 }
 
+/// Class of a run that has panicked.
+const PANICKED: &str = "panicked";
+
 /// A class and its name.
 const CLASSES: [(Class, &str); 4] = [
     (Class::Unimpressed, "unimpressed"),
@@ -83,7 +86,12 @@ const CLASSES: [(Class, &str); 4] = [
 impl Row {
     /// The row of a run with these faults.
     #[must_use]
-    pub fn new(run: usize, faults: [&str; 2], seed: u64, can_recover: bool, verdict: &Verdict) -> Self {
+    pub fn new(run: usize, faults: [&str; 2], seed: u64, can_recover: bool, verdict: Option<&Verdict>) -> Self {
+        let Some(verdict) = verdict else {
+            let [fault, other_fault] = faults.map(str::to_owned);
+            let (run, seed, class) = (run as i64, seed as i64, PANICKED.to_owned());
+            return Self { run, fault, other_fault, seed, class, can_recover, ..Self::default() };
+        };
         let name = CLASSES.iter().find(|(class, _)| *class == verdict.class).map_or("", |(_, name)| name);
         Self {
             run: run as i64,
@@ -105,7 +113,13 @@ impl Row {
         }
     }
 
-    /// Its class; none if the file names another one.
+    /// Whether the controller or what is around it has panicked.
+    #[must_use]
+    pub fn has_panicked(&self) -> bool {
+        self.class == PANICKED
+    }
+
+    /// Its class; none of a run that has panicked.
     #[must_use]
     pub fn class(&self) -> Option<Class> {
         CLASSES.iter().find(|(_, name)| *name == self.class).map(|(class, _)| *class)

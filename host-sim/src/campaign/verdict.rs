@@ -131,7 +131,7 @@ impl Judge {
     }
 
     /// Hears what is published at `now`, `time` s after the vehicle has driven off. `truth` tells where it is.
-    pub fn hear(&mut self, now: Time, time: f64, output: Option<&PoseOutput>, truth: impl Fn(Time) -> Option<Pose>) {
+    pub fn hear(&mut self, now: Time, time: f64, output: Option<&PoseOutput>, truth: &dyn Fn(Time) -> Option<Pose>) {
         let Some(here) = truth(now) else { return };
         let (step, way) =
             self.last.map_or((0.0, 0.0), |(last, pose)| (time - last, pose.between(&here).position().norm()));

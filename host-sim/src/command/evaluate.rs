@@ -11,6 +11,7 @@ mod lidar3d_places;
 mod lidar3d_sharpness;
 mod places;
 mod slam;
+mod trust;
 mod warehouse;
 mod windows;
 
@@ -50,6 +51,7 @@ enum Experiment {
     Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
     Slam(slam::Slam),
+    Trust(trust::Trust),
     Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
     Lidar3dSharpness(lidar3d_sharpness::Lidar3dSharpness),
@@ -69,6 +71,7 @@ impl Evaluate {
             Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),
+            Experiment::Trust(experiment) => experiment.run(),
             Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),
             Experiment::Lidar3dSharpness(experiment) => experiment.run(),

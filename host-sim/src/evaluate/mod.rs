@@ -16,6 +16,7 @@ pub mod lidar3d_sharpness;
 pub mod places;
 pub mod repeatability;
 pub mod slam;
+pub mod trust;
 pub mod warehouse;
 pub mod warehouse_disturbance;
 pub mod warehouse_page;
