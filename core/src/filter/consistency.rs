@@ -41,16 +41,31 @@ pub struct Consistency {
     normalised_square: f64,
     /// The same as `expected` and `accepted` with the longer memory.
     steady: [f64; 2],
+    /// Scans with evidence so far, as many as matter.
+    scans: f64,
 }
 
 /// How many scans the longer memory of the acceptance reaches back.
 const STEADY: f64 = 12.0;
+/// Below this share of accepted landmarks the map may be another one that looks alike; a new pose must do better by so much,
+/// until it has stood the test of so many scans.
+const DOUBTFUL: f64 = 0.75;
+const PROBATION: f64 = 0.13;
+const PROBATION_SCANS: f64 = 24.0;
 
 impl Consistency {
     /// No evidence yet.
     #[must_use]
     pub fn new(parameters: ConsistencyParameters) -> Self {
-        Self { parameters, expected: 0.0, accepted: 0.0, used: 0.0, normalised_square: 0.0, steady: [0.0; 2] }
+        Self {
+            parameters,
+            expected: 0.0,
+            accepted: 0.0,
+            used: 0.0,
+            normalised_square: 0.0,
+            steady: [0.0; 2],
+            scans: 0.0,
+        }
     }
 
     /// Takes the evidence of one scan: how many observations tell whether they fit a fixed landmark, how many of these
@@ -61,6 +76,7 @@ impl Consistency {
         self.accepted = remaining * self.accepted + accepted as f64;
         if expected > 0 {
             let [before, accepted_before] = self.steady.map(|sum| sum * (1.0 - 1.0 / STEADY));
+            self.scans = (self.scans + 1.0).min(PROBATION_SCANS);
             self.steady = [before + expected as f64, accepted_before + accepted as f64];
         }
         let remaining = self.remaining(used);
@@ -80,13 +96,13 @@ impl Consistency {
         if self.expected > 0.0 { self.accepted / self.expected } else { 1.0 }
     }
 
-    /// The share over the last scans and over some more of them, whichever is smaller: a map that looks alike fits well
-    /// now and then.
+    /// Whether the map may be another one that looks alike: such a map fits well now and then, so a few scans and some more
+    /// of them must both fit.
     #[must_use]
-    pub fn least_acceptance(&self) -> f64 {
+    pub fn is_doubtful(&self) -> bool {
         let [expected, accepted] = self.steady;
         let steady = if expected > 0.0 { accepted / expected } else { 1.0 };
-        self.acceptance().min(steady)
+        self.acceptance().min(steady) < DOUBTFUL + PROBATION * (1.0 - self.scans / PROBATION_SCANS)
     }
 
     /// Mean normalised squared innovation of what was used; two if nothing was.

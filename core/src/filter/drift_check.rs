@@ -11,12 +11,16 @@ use nalgebra::{Matrix2, Vector2};
 use crate::geometry::Pose;
 
 /// What is remembered of the way and the turn: this much, m and rad, counts by 1/e.
-const MEMORY: (f64, f64) = (4.0, 1.5);
+const MEMORY: (f64, f64) = (3.0, 1.5);
 /// Corrections are summed over about this many revolutions.
 const TREND: f64 = 8.0;
-/// Way, m, and turn, rad, that a verdict needs within the memory.
-const LEAST_WAY: f64 = 1.5;
-const LEAST_TURN: f64 = 0.6;
+/// Way, m, and turn, rad, within the memory that the first verdict against the laser or the odometry needs.
+const LEAST: (f64, f64) = (0.3, 0.3);
+/// The same for a verdict that the laser is as it is believed.
+const HEALING: (f64, f64) = (1.5, 0.6);
+/// What noise adds up to over any way and turn: it must not be taken for a drift of a short one. m to the side and along,
+/// rad.
+const NOISE: (f64, f64) = (0.015, 0.01);
 /// The laser looks askew by more than this, rad, or stands elsewhere by more than this, m.
 const ASKEW: f64 = 0.009;
 const ELSEWHERE: f64 = 0.06;
@@ -124,7 +128,7 @@ impl DriftCheck {
     }
 
     fn judge(&self) -> Option<Suspect> {
-        let (has_way, has_turn) = (self.way >= LEAST_WAY, self.turn >= LEAST_TURN);
+        let (has_way, has_turn) = (self.way >= LEAST.0, self.turn >= LEAST.1);
         if !has_way && !has_turn {
             return self.suspect;
         }
@@ -139,13 +143,18 @@ impl DriftCheck {
         // Before the heading is corrected, a bent steering leads the vehicle aside, too.
         let bend = libm::fabs(heading.way.unwrap_or(0.0));
         let askew = side.way.map(|askew| (libm::fabs(askew) - BEND_LAG * bend).max(0.0));
-        let laser = [(askew, ASKEW), (side.turn, ELSEWHERE), (along.turn, ELSEWHERE)];
+        let (way_noise, turn_noise) = (NOISE.0 / self.way.max(LEAST.0), NOISE.0 / self.turn.max(LEAST.1));
+        let elsewhere = ELSEWHERE + turn_noise;
+        let laser = [(askew, ASKEW + way_noise), (side.turn, elsewhere), (along.turn, elsewhere)];
         let is_suspected = self.suspect == Some(Suspect::Laser);
-        let is_healed = laser.iter().all(|(rate, limit)| is_below(*rate, *limit));
+        let has_driven = self.way >= HEALING.0 && self.turn >= HEALING.1;
+        let is_healed = has_driven && laser.iter().all(|(rate, limit)| is_below(*rate, *limit));
         if laser.iter().any(|(rate, limit)| is_beyond(*rate, *limit)) || (is_suspected && !is_healed) {
             return Some(Suspect::Laser);
         }
-        (is_beyond(along.way, SCALE) || is_beyond(heading.way, BEND)).then_some(Suspect::Odometry)
+        let bend_noise = NOISE.1 / self.way.max(LEAST.0);
+        (is_beyond(along.way, SCALE + way_noise) || is_beyond(heading.way, BEND + bend_noise))
+            .then_some(Suspect::Odometry)
     }
 }
 

@@ -99,6 +99,8 @@ impl MotionCheck {
         }
         if let Some(one) = known {
             self.seen_again += u8::from(one.is_expected());
+            // What was seen once before may itself be the first that contradicts.
+            self.new = self.new.saturating_add(u8::from(one.times < 2));
             *one = Remembered { position, age: 0, times: one.times.saturating_add(1) };
             return;
         }
@@ -120,7 +122,7 @@ impl MotionCheck {
         let can_tell = usize::from(self.expected.min(self.seen)) >= LEAST;
         let is_contradicted = can_tell
             && f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
-            && self.new >= self.seen - self.new;
+            && self.new >= self.seen.saturating_sub(self.new);
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
         self.contradictions >= IN_A_ROW
     }

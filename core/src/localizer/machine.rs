@@ -51,9 +51,6 @@ pub struct Localizer<
     pub(super) outputs: Outputs,
 }
 
-/// Below this share of accepted landmarks the map may be another one that looks alike.
-const DOUBTFUL_ACCEPTANCE: f64 = 0.75;
-
 /// Where the vehicle is, and where it would be by odometry alone.
 #[derive(Clone, Copy, Debug)]
 struct Estimate {
@@ -61,16 +58,13 @@ struct Estimate {
     smooth: Pose,
 }
 
-/// A knocked laser stays within this, m and rad, of where it was; a vehicle that is further off was carried.
-const LARGEST_KNOCK: (f64, f64) = (0.5, 0.55);
 /// A vehicle whose wheel has spun or slid is off by no more than this to the side, m, and in its heading, rad.
 const LARGEST_SLIP: (f64, f64) = (0.05, 0.026);
 
-/// Whether the laser may have been knocked, if it has made the vehicle seem to jump by so much in R.
+/// Whether the laser may have been knocked, if the vehicle seems to have jumped by so much in R. Who carries a vehicle may
+/// knock its laser, too.
 fn is_knock(jump: &Pose) -> bool {
-    let (way, turn) = (libm::hypot(jump.x, jump.y), libm::fabs(jump.theta));
-    let is_slip = libm::fabs(jump.y) < LARGEST_SLIP.0 && turn < LARGEST_SLIP.1;
-    !is_slip && way < LARGEST_KNOCK.0 && turn < LARGEST_KNOCK.1
+    libm::fabs(jump.y) > LARGEST_SLIP.0 || libm::fabs(jump.theta) > LARGEST_SLIP.1
 }
 
 /// The odometry is not believed.
@@ -413,9 +407,7 @@ impl<
             (None, Some(blindness), ..) => (Mode::WithoutOdometry, blindness.reason),
             (None, None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
             (None, None, ..) if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
-            (None, None, ..) if self.consistency.least_acceptance() < DOUBTFUL_ACCEPTANCE => {
-                (Mode::Degraded, Reason::LandmarksRejected)
-            }
+            (None, None, ..) if self.consistency.is_doubtful() => (Mode::Degraded, Reason::LandmarksRejected),
             (None, None, true, true) => (Mode::Mixed, remark),
             (None, None, true, false) => (Mode::Reflectors, remark),
             (None, None, false, true) => (Mode::Features, remark),

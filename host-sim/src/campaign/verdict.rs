@@ -17,13 +17,11 @@ pub struct AlertLimits {
     pub heading_deg: f64,
     /// How long a larger error may be unsaid, s.
     pub time_to_alert: f64,
-    /// How far the vehicle may go with it, m.
-    pub distance_to_alert: f64,
 }
 
 impl Default for AlertLimits {
     fn default() -> Self {
-        Self { position: 0.15, heading_deg: 2.0, time_to_alert: 1.0, distance_to_alert: 0.5 }
+        Self { position: 0.15, heading_deg: 2.0, time_to_alert: 1.0 }
     }
 }
 
@@ -59,7 +57,8 @@ pub struct Judge {
     /// The same for errors larger than the alert limits.
     harm: Option<Episode>,
     violations: Vec<Episode>,
-    longest_harm: Episode,
+    /// Longest of them, s.
+    longest_harm: f64,
     first_degraded: Option<f64>,
     /// Since when the pose has been right and said to be, s.
     right_since: Option<f64>,
@@ -120,7 +119,7 @@ impl Judge {
             violation: None,
             harm: None,
             violations: Vec::new(),
-            longest_harm: Episode::default(),
+            longest_harm: 0.0,
             first_degraded: None,
             right_since: None,
             worst: (0.0, 0.0),
@@ -182,8 +181,7 @@ impl Judge {
     }
 
     fn note_harm(&mut self, harm: &Episode) {
-        self.longest_harm.seconds = self.longest_harm.seconds.max(harm.seconds);
-        self.longest_harm.metres = self.longest_harm.metres.max(harm.metres);
+        self.longest_harm = self.longest_harm.max(harm.seconds);
     }
 
     /// The verdict at the end of the run.
@@ -196,8 +194,7 @@ impl Judge {
         let (_, until) = window(faults);
         let late_s = self.violations.iter().map(|episode| episode.seconds).fold(0.0, f64::max);
         let late_m = self.violations.iter().map(|episode| episode.metres).fold(0.0, f64::max);
-        let is_misleading = self.longest_harm.seconds > self.limits.time_to_alert
-            || self.longest_harm.metres > self.limits.distance_to_alert;
+        let is_misleading = self.longest_harm > self.limits.time_to_alert;
         let class = if is_misleading {
             Class::Misleading
         } else if !self.violations.is_empty() {

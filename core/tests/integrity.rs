@@ -1,0 +1,205 @@
+//! What watches over the pose: motion of the laser against the odometry, corrections, and the protection level.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use agv_core::filter::{DriftCheck, MotionCheck, Suspect};
+use agv_core::geometry::{Point, Pose};
+use agv_core::measurement::Time;
+use agv_core::state::{Mode, PoseOutput, ProtectionLevel, Reason};
+use proptest::prelude::*;
+
+/// Reflectors of a hall, in W.
+fn hall() -> Vec<Point> {
+    let row = |y: f64| (0..8).map(move |k| Point::new(3.1 * f64::from(k) - 7.0 + 0.37 * y, y));
+    row(-4.0).chain(row(5.0)).collect()
+}
+
+/// A vehicle that turns and goes on by a tenth of a metre a revolution.
+fn odometry(revolution: u32) -> Pose {
+    let step = Pose::new(0.15, 0.0, 0.01);
+    (0..revolution).fold(Pose::default(), |pose, _| pose.compose(&step))
+}
+
+/// The verdicts of revolutions in which the laser sees the hall from `truth`, and the odometry is `odometry`. Of the
+/// reflectors those are seen for which `is_seen` holds.
+fn verdicts(
+    count: u32,
+    truth: impl Fn(u32) -> Pose,
+    is_seen: impl Fn(u32, usize) -> bool,
+    extra: impl Fn(u32) -> Vec<Point>,
+) -> Vec<bool> {
+    let mut check = MotionCheck::new();
+    (0..count)
+        .map(|revolution| {
+            check.begin(Time::from_micros(u64::from(revolution) * 125_000 + 1_000_000));
+            let seen = hall()
+                .into_iter()
+                .enumerate()
+                .filter(|(index, _)| is_seen(revolution, *index))
+                .map(|(_, place)| truth(revolution).inverse_transform(&place))
+                .chain(extra(revolution));
+            for in_robot in seen {
+                check.see(&odometry(revolution).transform(&in_robot), in_robot.norm());
+            }
+            check.disagrees()
+        })
+        .collect()
+}
+
+fn all(_: u32, _: usize) -> bool {
+    true
+}
+
+fn none(_: u32) -> Vec<Point> {
+    Vec::new()
+}
+
+/// A number between 0 and 1 that looks random.
+fn noise(a: u32, b: usize) -> f64 {
+    let mixed = (u64::from(a) << 32 | b as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mixed = (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    ((mixed ^ mixed >> 32) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[test]
+fn a_laser_that_moves_as_the_odometry_says_is_believed() {
+    assert!(!verdicts(50, odometry, all, none).contains(&true));
+}
+
+#[test]
+fn hidden_and_false_reflectors_are_no_motion() {
+    let hidden = |revolution, index| noise(revolution, index) > 0.7;
+    assert!(!verdicts(400, odometry, hidden, none).contains(&true));
+    let rain = |revolution| {
+        (0..12).map(move |k| {
+            Point::new(30.0 * noise(revolution, 100 + k) - 15.0, 20.0 * noise(revolution, 200 + k) - 10.0)
+        })
+    };
+    assert!(!verdicts(400, odometry, all, |revolution| rain(revolution).collect()).contains(&true));
+}
+
+proptest! {
+    #[test]
+    fn a_jump_is_seen_in_the_second_revolution(
+        x in -3.0f64..3.0, y in -3.0f64..3.0, degrees in -40.0f64..40.0,
+    ) {
+        let jump = Pose::new(x, y, degrees.to_radians());
+        // Of jumps by a whole distance between reflectors nobody can know.
+        prop_assume!(x.hypot(y) > 0.3 || degrees.abs() > 6.0);
+        prop_assume!(degrees.abs() > 4.0 || (y.abs() > 0.5 || (x.abs() - 3.1).abs() > 0.5));
+        let truth = |revolution| if revolution < 20 { odometry(revolution) } else { odometry(revolution).compose(&jump) };
+        let verdicts = verdicts(22, truth, all, none);
+        prop_assert_eq!(verdicts.iter().position(|is_wrong| *is_wrong), Some(21));
+    }
+}
+
+#[test]
+fn one_wrong_revolution_decides_nothing() {
+    let truth = |revolution| {
+        let jump = Pose::new(0.0, 0.0, if revolution == 20 { 0.3 } else { 0.0 });
+        odometry(revolution).compose(&jump)
+    };
+    assert!(!verdicts(40, truth, all, none).contains(&true));
+}
+
+/// Straight on for a while, then round a bend.
+fn motions() -> impl Iterator<Item = Pose> {
+    let straight = std::iter::repeat_n(Pose::new(0.15, 0.0, 0.0), 40);
+    straight.chain(std::iter::repeat_n(Pose::new(0.15, 0.0, 0.06), 26))
+}
+
+/// What is suspected after a drive whose corrections follow from the motion.
+fn suspected(correction: impl Fn(&Pose) -> Pose) -> Option<Suspect> {
+    let mut check = DriftCheck::new();
+    for motion in motions() {
+        check.add(&motion, &correction(&motion));
+    }
+    check.suspect()
+}
+
+#[test]
+fn corrections_tell_which_is_wrong() {
+    assert_eq!(suspected(|_| Pose::default()), None);
+    let small = |motion: &Pose| Pose::new(0.01 * motion.x, 0.002 * motion.x, 0.002 * motion.x);
+    assert_eq!(suspected(small), None);
+    // A laser that looks askew by one degree makes the vehicle seem to drive askew.
+    for degrees in [1.0_f64, -1.0] {
+        let askew = degrees.to_radians();
+        assert_eq!(suspected(|motion| Pose::new(0.0, askew * motion.x, 0.0)), Some(Suspect::Laser));
+    }
+    // One that stands 10 cm further forward, or to the side, is swung about in a bend only.
+    assert_eq!(suspected(|motion| Pose::new(0.0, 0.1 * motion.theta, 0.0)), Some(Suspect::Laser));
+    assert_eq!(suspected(|motion| Pose::new(0.1 * motion.theta, 0.0, 0.0)), Some(Suspect::Laser));
+    // A wheel that is 5 % too large, and a steering that is bent by two degrees on 1.5 m.
+    assert_eq!(suspected(|motion| Pose::new(-0.05 * motion.x, 0.0, 0.0)), Some(Suspect::Odometry));
+    let bend = 2_f64.to_radians().tan() / 1.5;
+    assert_eq!(suspected(|motion| Pose::new(0.0, 0.0, bend * motion.x)), Some(Suspect::Odometry));
+}
+
+#[test]
+fn a_suspicion_of_the_laser_lasts_until_the_vehicle_has_driven_and_turned() {
+    let mut check = DriftCheck::new();
+    check.suspect_laser();
+    check.restart();
+    assert_eq!(check.suspect(), Some(Suspect::Laser));
+    for _ in 0..100 {
+        check.add(&Pose::new(0.15, 0.0, 0.0), &Pose::default());
+    }
+    assert_eq!(check.suspect(), Some(Suspect::Laser), "straight on, a shift is not seen");
+    for _ in 0..20 {
+        check.add(&Pose::new(0.15, 0.0, 0.06), &Pose::default());
+    }
+    assert_eq!(check.suspect(), None);
+}
+
+fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
+    PoseOutput {
+        time: Time::default(),
+        pose: Pose::default(),
+        covariance,
+        mode: Mode::Reflectors,
+        reason: Reason::None,
+        dead_reckoning_distance: 0.0,
+        correction: 0.0,
+        smooth: Pose::default(),
+        drift,
+        acceptance: 1.0,
+        normalised_square,
+    }
+}
+
+#[test]
+fn the_bounds_hold_with_the_stated_probability() {
+    let level = |deviation: f64| {
+        let variance = deviation * deviation;
+        output([variance, 0.0, variance, 0.0, 0.0, variance], 2.0, [0.0; 2]).protection_level()
+    };
+    // What is added for each metre and radian of deviation.
+    let (one, two) = (level(1.0), level(2.0));
+    let (position, heading) = (two.position - one.position, two.heading - one.heading);
+    let of_position = (-0.5 * position * position).exp();
+    let of_heading = libm::erfc(heading / 2_f64.sqrt());
+    let risk = of_position + of_heading;
+    assert!((0.9..=1.1).contains(&(risk / ProtectionLevel::RISK)), "{risk}");
+}
+
+proptest! {
+    #[test]
+    fn what_is_less_sure_may_be_further_off(
+        deviation in 0.001f64..0.5, ratio in 0.0f64..1.0, direction in 0.0f64..3.0,
+        square in 0.1f64..5.0, drift in 0.0f64..0.3,
+    ) {
+        let (sine, cosine) = direction.sin_cos();
+        let (long, short) = (deviation * deviation, (ratio * deviation).powi(2));
+        let xx = cosine * cosine * long + sine * sine * short;
+        let yy = sine * sine * long + cosine * cosine * short;
+        let xy = sine * cosine * (long - short);
+        let level = |square, drift| output([xx, xy, yy, 0.0, 0.0, 1e-6], square, [drift, drift]).protection_level();
+        let plain = level(2.0, 0.0);
+        // The direction in which it is least sure decides, wherever it points.
+        let across = output([long, 0.0, short, 0.0, 0.0, 1e-6], 2.0, [0.0; 2]).protection_level();
+        prop_assert!((plain.position - across.position).abs() < 1e-9);
+        prop_assert!(plain.position > 5.0 * deviation);
+        prop_assert!(level(square, drift).position >= plain.position - 1e-12);
+        prop_assert!(level(square, drift).heading >= plain.heading - 1e-12);
+    }
+}
