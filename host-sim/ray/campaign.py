@@ -24,7 +24,7 @@ EXAMPLES = """\
 Examples:
   python3 host-sim/ray/campaign.py host-sim/scenarios/faults.toml --agv target/release/agv
   python3 host-sim/ray/campaign.py host-sim/scenarios/faults.toml --workers 2 --shards 6 -- --only laser --runs 5
-  python3 host-sim/ray/campaign.py /srv/faults.toml --agv /srv/agv --address 10.0.0.1:6379 --output all.parquet -- --pairs
+  python3 host-sim/ray/campaign.py /srv/faults.toml --agv /srv/agv --address 10.0.0.1:6379 --output all.parquet
 """
 
 # How often a shard is run again before the campaign fails.
@@ -93,11 +93,12 @@ def run_shards(options: argparse.Namespace) -> list[bytes]:
 
     if options.address is not None:
         assert_listens(options.address)
+    where = options.address or "this machine"
     local = {"num_cpus": options.workers, "include_dashboard": False} if options.address is None else {}
     try:
         ray.init(address=options.address or "local", log_to_driver=False, logging_level=logging.ERROR, **local)
     except (OSError, RuntimeError, ValueError) as error:
-        raise Failure(f"there is no Ray cluster at {options.address or 'this machine'}: {str(error).splitlines()[0]}") from error
+        raise Failure(f"there is no Ray cluster at {where}: {str(error).splitlines()[0]}") from error
     try:
         count: int = options.shards or 4 * max(1, int(ray.cluster_resources().get("CPU", 1)))
         task = ray.remote(num_cpus=1, max_retries=MAX_RETRIES, retry_exceptions=[ChildProcessError])(run_shard)
@@ -126,9 +127,7 @@ def merge(options: argparse.Namespace, results: list[bytes]) -> None:
         for file, result in zip(files, results):
             file.write_bytes(result)
         output = [] if options.output is None else ["--output", options.output]
-        done = subprocess.run(
-            [options.agv, "campaign", *files, *output, *options.extra], stderr=subprocess.PIPE
-        )
+        done = subprocess.run([options.agv, "campaign", *files, *output, *options.extra], stderr=subprocess.PIPE)
         if done.returncode != 0:
             raise Failure(f"the results cannot be put together: {complaint(done)}")
 
@@ -154,7 +153,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--shards", metavar="N", type=positive, help="parts of the campaign; default: four a core")
     parser.add_argument("--output", metavar="FILE", help="write every run, as Apache Parquet")
     parser.add_argument("--address", metavar="HOST:PORT", help="a running cluster; default: one of this machine alone")
-    parser.add_argument("--workers", metavar="N", type=positive, help="workers on this machine alone; default: one a core")
+    parser.add_argument("--workers", metavar="N", type=positive, help="workers on this machine; default: one a core")
     options = parser.parse_args(arguments[:end])
     options.extra = arguments[end + 1 :]
     if options.address is not None and options.workers is not None:
