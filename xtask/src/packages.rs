@@ -38,7 +38,7 @@ const REQUIREMENTS: [Requirement; 4] = [
 ];
 
 /// Packages of Python that Debian does not have, and the modules that they bring.
-const PYTHON_PACKAGES: [(&str, &str); 7] = [
+const PYTHON_PACKAGES: [(&str, &str); 8] = [
     ("cantools>=39,<50", "cantools"),
     ("canopen>=2.2,<3", "canopen"),
     ("mcap>=1.2,<2", "mcap"),
@@ -46,6 +46,7 @@ const PYTHON_PACKAGES: [(&str, &str); 7] = [
     ("rosbags>=0.10,<1", "rosbags"),
     ("evo>=1.30,<2", "evo"),
     ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
+    (include_str!("../../host-sim/ray/requirements.txt").trim_ascii(), "ray"),
 ];
 
 /// What drives a browser, from npm.
