@@ -11,21 +11,21 @@ use nalgebra::{Matrix2, Vector2};
 use crate::geometry::Pose;
 
 /// What is remembered of the way and the turn: this much, m and rad, counts by 1/e.
-const MEMORY: (f64, f64) = (3.0, 1.5);
+const MEMORY: (f64, f64) = (2.5, 1.5);
 /// Corrections are summed over about this many revolutions.
 const TREND: f64 = 8.0;
 /// Way, m, and turn, rad, within the memory that the first verdict against the laser or the odometry needs.
 const LEAST: (f64, f64) = (0.3, 0.3);
 /// The same for a verdict that the laser is as it is believed.
-const HEALING: (f64, f64) = (1.5, 0.6);
+const HEALING: (f64, f64) = (1.2, 0.45);
 /// What noise adds up to over any way and turn: it must not be taken for a drift of a short one. m to the side and along,
 /// rad.
-const NOISE: (f64, f64) = (0.015, 0.01);
+const NOISE: (f64, f64) = (0.012, 0.01);
 /// The laser looks askew by more than this, rad, or stands elsewhere by more than this, m.
-const ASKEW: f64 = 0.009;
+const ASKEW: f64 = 0.006;
 const ELSEWHERE: f64 = 0.06;
 /// It is as it is believed again if both are below this share of the limits.
-const HEALED: f64 = 0.6;
+const HEALED: f64 = 0.9;
 /// A way, share of itself, and a turn, rad a metre, that the odometry cannot be wrong by.
 const SCALE: f64 = 0.03;
 const BEND: f64 = 0.01;

@@ -61,10 +61,14 @@ struct Estimate {
 /// A vehicle whose wheel has spun or slid is off by no more than this to the side, m, and in its heading, rad.
 const LARGEST_SLIP: (f64, f64) = (0.05, 0.026);
 
-/// Whether the laser may have been knocked, if the vehicle seems to have jumped by so much in R. Who carries a vehicle may
+/// What is added to both for each metre of the way.
+const LARGEST_DRIFT: f64 = 0.03;
+
+/// Whether the laser may have been knocked, if the vehicle seems to have jumped by so much in R on a way of so many metres. Who carries a vehicle may
 /// knock its laser, too.
-fn is_knock(jump: &Pose) -> bool {
-    libm::fabs(jump.y) > LARGEST_SLIP.0 || libm::fabs(jump.theta) > LARGEST_SLIP.1
+fn is_knock(jump: &Pose, way: f64) -> bool {
+    let (side, turn) = (LARGEST_SLIP.0 + LARGEST_DRIFT * way, LARGEST_SLIP.1 + LARGEST_DRIFT * way);
+    libm::fabs(jump.y) > side || libm::fabs(jump.theta) > turn
 }
 
 /// The odometry is not believed.
@@ -241,7 +245,7 @@ impl<
         if is_contradicted
             && self.corrected_at.is_some()
             && let Some(before) = self.estimate()
-            && is_knock(&before.pose.between(&fix.pose))
+            && is_knock(&before.pose.between(&fix.pose), 0.0)
         {
             self.drift_check.suspect_laser();
         }
@@ -374,7 +378,12 @@ impl<
             let is_same = before.smooth == after.smooth;
             let expected =
                 if is_same { before.pose } else { before.pose.compose(&before.smooth.between(&after.smooth)) };
-            self.drift_check.add(&last.between(&after.smooth), &expected.between(&after.pose));
+            let (motion, correction) = (last.between(&after.smooth), expected.between(&after.pose));
+            self.drift_check.add(&motion, &correction);
+            // What the gate let pass may still be more than the odometry can be wrong by.
+            if is_knock(&correction, motion.position().norm()) {
+                self.drift_check.suspect_laser();
+            }
         }
         self.corrected_at = Some(after.smooth);
     }

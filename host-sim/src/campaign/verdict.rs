@@ -171,7 +171,8 @@ impl Judge {
 
     fn claim(&self, now: Time, output: &PoseOutput) -> Claim {
         let level = output.protection_level();
-        let is_localised = matches!(output.mode, Mode::Reflectors | Mode::Features | Mode::Mixed | Mode::DeadReckoning);
+        // In dead reckoning nothing watches over the odometry.
+        let is_localised = matches!(output.mode, Mode::Reflectors | Mode::Features | Mode::Mixed);
         let is_fresh = now.since(output.time) <= STALE;
         if is_localised && is_fresh && self.is_tolerable(level.position, level.heading) {
             Claim::Right

@@ -48,6 +48,10 @@ fn the_shipped_scenarios_can_be_driven_and_survive_writing() {
     let mut count = 0;
     for entry in std::fs::read_dir("scenarios").unwrap() {
         let path = entry.unwrap().path();
+        // A campaign is no scenario; it names one.
+        if path.ends_with("faults.toml") {
+            continue;
+        }
         let mut scenario = Scenario::read(&path).unwrap();
         let written = toml::to_string(&scenario).unwrap();
         assert_eq!(Scenario::parse(&written).unwrap(), scenario, "{}", path.display());
