@@ -30,6 +30,8 @@ const HEALED: f64 = 0.9;
 const SCALE: f64 = 0.03;
 const BEND: f64 = 0.01;
 
+/// How often the askew look counts in the trend.
+const ASKEW_WEIGHT: f64 = 4.0;
 /// Way after which the heading has been corrected, m.
 const BEND_LAG: f64 = 0.5;
 
@@ -53,6 +55,8 @@ pub struct DriftCheck {
     turn: f64,
     trend: Vector2<f64>,
     heading_trend: f64,
+    /// By how much the laser seems to look askew, rad.
+    askew: f64,
     suspect: Option<Suspect>,
 }
 
@@ -84,6 +88,7 @@ impl DriftCheck {
             turn: 0.0,
             trend: Vector2::zeros(),
             heading_trend: 0.0,
+            askew: 0.0,
             suspect: None,
         }
     }
@@ -115,10 +120,11 @@ impl DriftCheck {
         self.suspect = self.judge();
     }
 
-    /// By how much landmarks have lately corrected the pose in one direction, m and rad: what the filter lags behind by.
+    /// By how much landmarks have lately corrected the pose in one direction, m and rad: what the filter lags behind by. The
+    /// heading's has what the laser seems to look askew by, several times, because the pose is off by all of it.
     #[must_use]
     pub fn trend(&self) -> [f64; 2] {
-        [self.trend.norm(), libm::fabs(self.heading_trend)]
+        [self.trend.norm(), libm::fabs(self.heading_trend) + ASKEW_WEIGHT * self.askew]
     }
 
     /// Which of the two is wrong, if one is.
@@ -127,7 +133,7 @@ impl DriftCheck {
         self.suspect
     }
 
-    fn judge(&self) -> Option<Suspect> {
+    fn judge(&mut self) -> Option<Suspect> {
         let (has_way, has_turn) = (self.way >= LEAST.0, self.turn >= LEAST.1);
         if !has_way && !has_turn {
             return self.suspect;
@@ -143,6 +149,7 @@ impl DriftCheck {
         // Before the heading is corrected, a bent steering leads the vehicle aside, too.
         let bend = libm::fabs(heading.way.unwrap_or(0.0));
         let askew = side.way.map(|askew| (libm::fabs(askew) - BEND_LAG * bend).max(0.0));
+        self.askew = askew.unwrap_or(0.0);
         let (way_noise, turn_noise) = (NOISE.0 / self.way.max(LEAST.0), NOISE.0 / self.turn.max(LEAST.1));
         let elsewhere = ELSEWHERE + turn_noise;
         let laser = [(askew, ASKEW + way_noise), (side.turn, elsewhere), (along.turn, elsewhere)];
