@@ -32,14 +32,21 @@ pub struct Campaign {
     pub scenario: PathBuf,
     /// How long each run lasts, s.
     pub seconds: f64,
-    /// Seeds of each fault: 1 and so on.
+    /// Seeds of each fault.
     pub runs: u64,
+    /// The first of them.
+    #[serde(default = "one")]
+    pub first_seed: u64,
     /// What the vehicle can live with.
     #[serde(default)]
     pub limits: AlertLimits,
     /// What goes wrong.
     #[serde(rename = "fault")]
     pub faults: Vec<Fault>,
+}
+
+fn one() -> u64 {
+    1
 }
 
 /// Why a campaign cannot be made.
@@ -144,7 +151,10 @@ impl Campaign {
     /// The runs with each fault alone.
     #[must_use]
     pub fn alone(&self) -> Vec<Run> {
-        let of_fault = |fault| (1..=self.runs).map(move |seed| Run { faults: vec![fault], seed });
+        let of_fault = |fault| {
+            (self.first_seed..self.first_seed.saturating_add(self.runs))
+                .map(move |seed| Run { faults: vec![fault], seed })
+        };
         (0..self.faults.len()).flat_map(of_fault).collect()
     }
 
@@ -156,7 +166,7 @@ impl Campaign {
         (0..count)
             .flat_map(pair)
             .zip(0..)
-            .map(|(faults, number)| Run { faults, seed: 1 + number % self.runs.max(1) })
+            .map(|(faults, number)| Run { faults, seed: self.first_seed.saturating_add(number % self.runs.max(1)) })
             .collect()
     }
 

@@ -25,6 +25,9 @@ pub struct Campaign {
     /// Seeds of each fault, instead of what the file says.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     runs: Option<u64>,
+    /// First seed. Thresholds were chosen on the seeds 1 to 25.
+    #[arg(long)]
+    first_seed: Option<u64>,
     /// Only faults whose name contains this.
     #[arg(long, default_value = "")]
     only: String,
@@ -75,6 +78,7 @@ impl Campaign {
         let [file] = &self.files[..] else { anyhow::bail!("one campaign at a time, or tables of results (.parquet)") };
         let (mut plan, scenario) = Plan::read(file).with_context(|| file.display().to_string())?;
         plan.runs = self.runs.unwrap_or(plan.runs);
+        plan.first_seed = self.first_seed.unwrap_or(plan.first_seed);
         let mut runs = if self.pairs { plan.pairs() } else { plan.alone() };
         runs.retain(|run| run.faults.iter().any(|&fault| plan.faults[fault].name.contains(&self.only)));
         anyhow::ensure!(!runs.is_empty(), "no fault has such a name");

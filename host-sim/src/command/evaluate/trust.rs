@@ -22,6 +22,9 @@ pub struct Trust {
     /// Seeds of each fault alone, instead of what the campaign says.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     runs: Option<u64>,
+    /// First seed. Thresholds were chosen on the seeds 1 to 25.
+    #[arg(long)]
+    first_seed: Option<u64>,
     /// Leave out the pairs of faults.
     #[arg(long)]
     without_pairs: bool,
@@ -47,6 +50,7 @@ impl Trust {
         let (mut plan, scenario) =
             Campaign::read(&self.campaign).with_context(|| self.campaign.display().to_string())?;
         plan.runs = self.runs.unwrap_or(plan.runs);
+        plan.first_seed = self.first_seed.unwrap_or(plan.first_seed);
         let alone = plan.alone();
         let pairs = if self.without_pairs { Vec::new() } else { plan.pairs() };
         let bar = progress::bar("runs", (alone.len() + pairs.len()) as u64);
