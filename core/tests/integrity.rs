@@ -126,9 +126,9 @@ fn corrections_tell_which_is_wrong() {
         let askew = degrees.to_radians();
         assert_eq!(suspected(|motion| Pose::new(0.0, askew * motion.x, 0.0)), Some(Suspect::Laser));
     }
-    // One that stands 10 cm further forward, or to the side, is swung about in a bend only.
-    assert_eq!(suspected(|motion| Pose::new(0.0, 0.1 * motion.theta, 0.0)), Some(Suspect::Laser));
-    assert_eq!(suspected(|motion| Pose::new(0.1 * motion.theta, 0.0, 0.0)), Some(Suspect::Laser));
+    // One that stands 13 cm further forward, or to the side, is swung about in a bend only.
+    assert_eq!(suspected(|motion| Pose::new(0.0, 0.13 * motion.theta, 0.0)), Some(Suspect::Laser));
+    assert_eq!(suspected(|motion| Pose::new(0.13 * motion.theta, 0.0, 0.0)), Some(Suspect::Laser));
     // A wheel that is 5 % too large, and a steering that is bent by two degrees on 1.5 m.
     assert_eq!(suspected(|motion| Pose::new(-0.05 * motion.x, 0.0, 0.0)), Some(Suspect::Odometry));
     let bend = 2_f64.to_radians().tan() / 1.5;

@@ -246,7 +246,7 @@ fn a_vehicle_that_was_carried_away_is_lost_and_can_be_put_back() {
         assert!(revolutions < 6, "it still believes its pose");
         drive.revolutions(1, |_| true);
     }
-    assert_eq!(drive.localizer.outputs().pose.reason, Reason::LandmarksRejected);
+    assert_eq!(drive.localizer.outputs().pose.reason, Reason::MotionDisagrees);
     // It stays lost, however well a later scan may fit.
     drive.offset = 0.0;
     assert_eq!(drive.revolutions(4, |_| true).mode, Mode::Lost);

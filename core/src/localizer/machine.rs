@@ -10,7 +10,7 @@ use super::{Event, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::features::{PointScan, SensorPath, detect_reflectors, falko};
 use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline};
 use crate::geometry::{Point, Pose, wrap};
-use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, Verdict};
+use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
 
@@ -40,35 +40,15 @@ pub struct Localizer<
     pub(super) timeline: Timeline<PAST>,
     pub(super) slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
     pub(super) consistency: Consistency,
-    motion_check: MotionCheck,
-    drift_check: DriftCheck,
+    pub(super) motion_check: MotionCheck,
+    pub(super) drift_check: DriftCheck,
     /// Pose by odometry at the last revolution that has corrected the pose.
-    corrected_at: Option<Pose>,
+    pub(super) corrected_at: Option<Pose>,
     pub(super) lost: Option<Reason>,
     blindness: Option<Blindness>,
     pub(super) distance: DistanceSince,
     pub(super) workspace: Workspace<BEAMS>,
     pub(super) outputs: Outputs,
-}
-
-/// Where the vehicle is, and where it would be by odometry alone.
-#[derive(Clone, Copy, Debug)]
-struct Estimate {
-    pose: Pose,
-    smooth: Pose,
-}
-
-/// A vehicle whose wheel has spun or slid is off by no more than this to the side, m, and in its heading, rad.
-const LARGEST_SLIP: (f64, f64) = (0.05, 0.026);
-
-/// What is added to both for each metre of the way.
-const LARGEST_DRIFT: f64 = 0.03;
-
-/// Whether the laser may have been knocked, if the vehicle seems to have jumped by so much in R on a way of so many metres. Who carries a vehicle may
-/// knock its laser, too.
-fn is_knock(jump: &Pose, way: f64) -> bool {
-    let (side, turn) = (LARGEST_SLIP.0 + LARGEST_DRIFT * way, LARGEST_SLIP.1 + LARGEST_DRIFT * way);
-    libm::fabs(jump.y) > side || libm::fabs(jump.theta) > turn
 }
 
 /// The odometry is not believed.
@@ -237,21 +217,7 @@ impl<
         }
         let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
         let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
-        let is_contradicted = matches!(
-            self.lost,
-            Some(Reason::MotionDisagrees | Reason::LandmarksRejected | Reason::InnovationsTooLarge)
-        );
-        // Who was never right after the last pose was told it wrongly.
-        if is_contradicted
-            && self.corrected_at.is_some()
-            && let Some(before) = self.estimate()
-            && is_knock(&before.pose.between(&fix.pose), 0.0)
-        {
-            self.drift_check.suspect_laser();
-        }
-        self.motion_check.clear();
-        self.drift_check.restart();
-        self.corrected_at = None;
+        self.restart_checks(fix);
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.consistency = Consistency::new(self.parameters.consistency);
@@ -345,47 +311,6 @@ impl<
             self.fuse();
             self.update_dynamic_map();
         }
-    }
-
-    /// The pose for now, and that by odometry alone.
-    fn estimate(&mut self) -> Option<Estimate> {
-        let timeline = self.timeline.begun_mut()?;
-        Some(Estimate { pose: timeline.state().pose, smooth: *timeline.odometry_pose() })
-    }
-
-    /// Compares what a revolution has shown with what the odometry says; `before` is the estimate before it was used.
-    fn check_motion(&mut self, before: &Estimate) {
-        let Some(after) = self.estimate() else { return };
-        let to_odometry = before.smooth.compose(&before.pose.inverse());
-        let mut is_corrected = false;
-        self.motion_check.begin(self.timeline.now());
-        for use_ in &self.outputs.uses {
-            is_corrected |= use_.verdict == Verdict::Accepted;
-            if use_.kind == LandmarkKind::Reflector {
-                let [x, y] = use_.position.map(f64::from);
-                let place = to_odometry.transform(&use_.located.into());
-                self.motion_check.see(&place, libm::hypot(x, y));
-            }
-        }
-        if self.lost.is_none() && self.motion_check.disagrees() {
-            self.lost = Some(Reason::MotionDisagrees);
-        }
-        if !is_corrected {
-            return;
-        }
-        if let Some(last) = self.corrected_at {
-            // What was extrapolated behind the last sample is in both.
-            let is_same = before.smooth == after.smooth;
-            let expected =
-                if is_same { before.pose } else { before.pose.compose(&before.smooth.between(&after.smooth)) };
-            let (motion, correction) = (last.between(&after.smooth), expected.between(&after.pose));
-            self.drift_check.add(&motion, &correction);
-            // What the gate let pass may still be more than the odometry can be wrong by.
-            if is_knock(&correction, motion.position().norm()) {
-                self.drift_check.suspect_laser();
-            }
-        }
-        self.corrected_at = Some(after.smooth);
     }
 
     fn publish(&mut self, may_be_corrected: bool) {

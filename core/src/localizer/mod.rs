@@ -3,6 +3,7 @@
 mod event;
 mod evidence;
 mod fusion;
+mod integrity;
 mod machine;
 mod maps;
 mod output;
