@@ -142,15 +142,6 @@ impl Controller {
         self.predictor.output()
     }
 
-    /// Whether the laser measures and both encoders report.
-    #[must_use]
-    pub fn is_ready(&self) -> bool {
-        use agv_core::wire::can::encoder::EncoderState;
-        use agv_core::wire::nav350::State;
-        let encoders = self.encoders.states().iter().all(|state| *state == EncoderState::Reporting);
-        encoders && self.session.state() == State::Running
-    }
-
     fn handle(&mut self, event: &Event) {
         let output = self.localizer.handle(event).pose;
         self.predictor.update(&output);

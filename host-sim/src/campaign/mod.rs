@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::simulate::random::{Random, Stream};
-use crate::simulate::scenario::{Scenario, ScenarioError};
+use crate::simulate::scenario::{Scenario, ScenarioError, toml_complaint};
 use crate::simulate::{SimulateError, simulate};
 use fault::{Fault, window};
 use rayon::prelude::*;
@@ -133,9 +133,8 @@ impl Campaign {
         let text =
             std::fs::read_to_string(path).map_err(|source| CampaignError::Read { path: path.to_path_buf(), source })?;
         let campaign: Self = toml::from_str(&text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let problem = error.message().replace('\n', ", ");
-            CampaignError::Parse { line: before.matches('\n').count() + 1, problem }
+            let (line, problem) = toml_complaint(&text, &error);
+            CampaignError::Parse { line, problem }
         })?;
         for (index, fault) in campaign.faults.iter().enumerate() {
             let is_known = campaign.faults[..index].iter().any(|known| known.name == fault.name);

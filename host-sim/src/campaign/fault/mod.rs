@@ -255,7 +255,7 @@ pub enum FaultKind {
     LayoutMirrored,
     /// The layout that is loaded is that of another hall.
     LayoutOfAnotherHall,
-    /// The layout is shifted and turned as a whole against the building: the poses are right in the layout.
+    /// The layout is stretched along its first axis, as one that was measured with a wrong scale.
     LayoutStretched {
         /// By which share.
         share: f64,

@@ -130,9 +130,8 @@ impl Scenario {
     /// The text is not a scenario.
     pub fn parse(text: &str) -> Result<Self, ScenarioError> {
         let scenario: Self = toml::from_str(text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let problem = error.message().replace('\n', ", ");
-            ScenarioError::Parse { line: before.matches('\n').count() + 1, problem }
+            let (line, problem) = toml_complaint(text, &error);
+            ScenarioError::Parse { line, problem }
         })?;
         scenario.check()?;
         Ok(scenario)
@@ -168,4 +167,10 @@ impl Scenario {
             PathKind::Legs => Path { start: self.path.start.pose(), legs: self.path.legs.clone() },
         }
     }
+}
+
+/// Line, from 1, and what is wrong there, in one line.
+pub(crate) fn toml_complaint(text: &str, error: &toml::de::Error) -> (usize, String) {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    (before.matches('\n').count() + 1, error.message().replace('\n', ", "))
 }
