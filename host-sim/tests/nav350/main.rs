@@ -9,3 +9,4 @@ mod layout;
 mod live;
 mod minute;
 mod recorded;
+mod turns;

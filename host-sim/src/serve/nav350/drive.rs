@@ -1,6 +1,9 @@
 //! What an emulated sensor will see: the drive, turn by turn.
 
+use std::f64::consts::TAU;
+
 use agv_core::geometry::Pose;
+use agv_core::localizer::Event;
 use agv_core::measurement::{ReflectorObservation, Time};
 use agv_core::wire::nav350::{Distance, IdentifiedLandmark, Milliangle, SensorFrame};
 
@@ -30,6 +33,8 @@ pub struct Turn {
 #[derive(Clone, Debug)]
 pub struct Drive {
     pub(super) turns: Vec<Turn>,
+    /// When the drive begins, in the time of the recording: the first sample of the encoders, if there are any.
+    pub(super) begin: Time,
     layout: Vec<IdentifiedLandmark>,
     pub(super) frame: SensorFrame,
 }
@@ -82,8 +87,14 @@ impl Drive {
                 let index = turns.partition_point(|turn| turn.start <= first.time).saturating_sub(1);
                 turns[index].reflectors.extend(observations);
             } else {
-                turns.push(Turn { reflectors: observations.clone(), ..empty(first.time) });
+                let earliest = turns.last().map(|turn| turn.start.offset(0.5 * frame.period));
+                let start = turn_start(first, &frame, earliest);
+                turns.push(Turn { reflectors: observations.clone(), ..empty(start) });
             }
+        }
+        let begin = begin(recording).or(turns.first().map(|turn| turn.start)).ok_or(DriveError::Empty)?;
+        if !has_scans {
+            turns = without_gaps(turns, begin, &frame, empty);
         }
         for turn in &mut turns {
             let end = turn.start.offset(frame.period);
@@ -92,7 +103,7 @@ impl Drive {
             turn.pose = truth.map(|truth| truth.pose.compose(&recording.parameters.laser));
         }
         let layout = layout_file::layout(&recording.landmarks);
-        if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, layout, frame }) }
+        if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, begin, layout, frame }) }
     }
 
     /// What the sensor will see, turn by turn.
@@ -106,8 +117,35 @@ impl Drive {
     pub fn layout(&self) -> &[IdentifiedLandmark] {
         &self.layout
     }
+}
 
-    pub(super) fn first_start(&self) -> Time {
-        self.turns.first().map_or(Time::default(), |turn| turn.start)
+/// When the encoders began to report.
+fn begin(recording: &Recording) -> Option<Time> {
+    recording.events.iter().find_map(|event| match event.view() {
+        Event::Encoders(sample) => Some(sample.time),
+        _ => None,
+    })
+}
+
+/// When the head began the turn in which it saw a reflector: the reflector's direction says how far it had turned. Not
+/// before `earliest`, as the noise of a direction may carry it across the seam between two turns.
+fn turn_start(seen: &ReflectorObservation, frame: &SensorFrame, earliest: Option<Time>) -> Time {
+    let turned = frame.angle(f64::from(seen.bearing)).rem_euclid(TAU);
+    let start = seen.time.offset(-frame.interval(turned));
+    match earliest {
+        Some(earliest) if start < earliest => start.offset(frame.period),
+        _ => start,
     }
+}
+
+/// The head turns when there is nothing to see, too: from `begin` on there is a turn in every period.
+fn without_gaps(turns: Vec<Turn>, begin: Time, frame: &SensorFrame, empty: impl Fn(Time) -> Turn) -> Vec<Turn> {
+    let mut filled: Vec<Turn> = Vec::new();
+    for turn in turns {
+        let next = filled.last().map_or(begin, |last| last.start.offset(frame.period));
+        let missing = (turn.start.since(next) / frame.period).round().max(0.0) as u32;
+        filled.extend((1..=missing).rev().map(|back| empty(turn.start.offset(-f64::from(back) * frame.period))));
+        filled.push(turn);
+    }
+    filled
 }

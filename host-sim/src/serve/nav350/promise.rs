@@ -16,7 +16,7 @@ use super::sensor::{Sensor, encode};
 pub(super) struct Promise {
     pub(super) due: f64,
     turn: usize,
-    /// When the first turn began, had every turn been made once, s.
+    /// When the turn began, in the sensor's time, s.
     start: f64,
     method: PromisedMethod,
     dialect: Dialect,
@@ -63,7 +63,8 @@ impl Sensor {
             return bytes;
         }
         let drive_start = *self.drive_start.get_or_insert(now);
-        let end = |turn: &Turn| drive_start + turn.start.since(self.drive.first_start()) + period;
+        let start = |turn: &Turn| drive_start + turn.start.since(self.drive.begin);
+        let end = |turn: &Turn| start(turn) + period;
         let mut turn = self.drive.turns.partition_point(|turn| end(turn) <= now);
         if !wait {
             turn = turn.saturating_sub(1);
@@ -76,14 +77,15 @@ impl Sensor {
             (last, periods * period)
         };
         let due = if wait { end(&self.drive.turns[turn]) + shift } else { now };
-        *promise = Some(Promise { due, turn, start: drive_start + shift, method, dialect });
+        let start = start(&self.drive.turns[turn]) + shift;
+        *promise = Some(Promise { due, turn, start, method, dialect });
         bytes
     }
 
     /// The answer that was promised.
     pub(super) fn keep(&self, promise: &Promise) -> Vec<u8> {
         let turn = &self.drive.turns[promise.turn];
-        let time = |time: Time| self.device_time(time.since(self.drive.first_start()) + promise.start);
+        let time = |time: Time| self.device_time(time.since(turn.start) + promise.start);
         let mut pose_details = false;
         let mut landmarks =
             LandmarkDataFormat { coordinates: CoordinateFormat::Cartesian, has_details: false, filter: 0 };
