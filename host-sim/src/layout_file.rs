@@ -5,6 +5,7 @@
 //! separated by spaces; a map of this program is read, too. A dxf drawing has a point for each landmark and a text with its
 //! name at the same place.
 
+#[cfg(feature = "drawings")]
 mod drawing;
 
 use std::path::Path;
@@ -24,6 +25,7 @@ pub enum Format {
     /// Comma-separated.
     Csv,
     /// A drawing.
+    #[cfg(feature = "drawings")]
     Dxf,
 }
 
@@ -36,7 +38,12 @@ impl Format {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some(ending) if ending.eq_ignore_ascii_case("imk") => Ok(Self::Imk),
             Some(ending) if ending.eq_ignore_ascii_case("csv") => Ok(Self::Csv),
+            #[cfg(feature = "drawings")]
             Some(ending) if ending.eq_ignore_ascii_case("dxf") => Ok(Self::Dxf),
+            #[cfg(not(feature = "drawings"))]
+            Some(ending) if ending.eq_ignore_ascii_case("dxf") => {
+                Err(TextFileError::LeftOut { path: path.to_owned(), source: crate::left_out::DRAWINGS })
+            }
             _ => Err(TextFileError::Foreign {
                 path: path.to_owned(),
                 expected: "a layout, whose name ends in .imk, .csv or .dxf,",
@@ -95,6 +102,7 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
     let (separator, mut text) = match format {
         Format::Imk => (' ', "# globID x_mm y_mm type subtype size_mm layer1 layer2 layer3\n".to_owned()),
         Format::Csv => (',', "globID,x_mm,y_mm,type,subtype,size_mm,layers\n".to_owned()),
+        #[cfg(feature = "drawings")]
         Format::Dxf => return drawing::write(landmarks),
     };
     for IdentifiedLandmark { id, landmark } in landmarks {
@@ -119,8 +127,10 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
 /// # Errors
 /// If the file cannot be read, or a line is no landmark.
 pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
+    #[cfg_attr(not(feature = "drawings"), expect(unused_variables, reason = "the others are told apart by their text"))]
     let format = Format::of(path)?;
     let text = text_file::read(path, "a layout")?;
+    #[cfg(feature = "drawings")]
     if format == Format::Dxf {
         return drawing::parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem));
     }

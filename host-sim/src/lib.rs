@@ -11,6 +11,7 @@ pub mod file_kind;
 pub mod import;
 pub mod layout_check;
 pub mod layout_file;
+pub mod left_out;
 pub mod lidar3d;
 pub mod link;
 pub mod live;
@@ -21,6 +22,7 @@ pub mod provision;
 pub mod recording;
 pub mod replay;
 pub mod report;
+#[cfg(feature = "bags")]
 pub mod ros;
 pub mod serve;
 pub mod simulate;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use flate2::read::MultiGzDecoder;
 
 use crate::file_kind;
+use crate::left_out::LeftOut;
 
 /// Why a text file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +40,14 @@ pub enum TextFileError {
         expected: &'static str,
         /// What it seems to be.
         looks_like: &'static str,
+    },
+    /// This program was built without what reads it.
+    #[error("{}: {source}", path.display())]
+    LeftOut {
+        /// The file.
+        path: PathBuf,
+        /// What was left out.
+        source: LeftOut,
     },
     /// A line is not what it should be.
     #[error("{}:{line}: {problem}", path.display())]

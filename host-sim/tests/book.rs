@@ -6,10 +6,10 @@
 
 mod support;
 
+use agv_tests::recordings;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use agv_host_sim::data;
 use support::{agv, text};
 
 fn repository() -> PathBuf {
@@ -79,8 +79,7 @@ fn run_file(path: &Path) -> usize {
     let mut count = 0;
     for Block { line, mark, commands } in blocks(path) {
         let place = format!("{}:{line}", path.display());
-        if mark == "sh run data" && data::folder().is_none() {
-            data::skip(&place, "there is no folder of real data (AGV_DATA)");
+        if mark == "sh run data" && recordings(&place, "").is_none() {
             continue;
         }
         if !mark.starts_with("sh run") {

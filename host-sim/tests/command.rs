@@ -2,9 +2,9 @@
 
 mod support;
 
+use agv_tests::recordings;
 use std::path::{Path, PathBuf};
 
-use agv_host_sim::data;
 use support::{Files, agv, refusal, text};
 
 /// Names of the subcommands, as the help lists them.
@@ -142,7 +142,7 @@ fn an_imported_log_exports_what_its_source_does() {
 
 #[test]
 fn import_finds_out_what_the_real_data_are() {
-    let Some(folder) = data::for_test("import_finds_out_what_the_real_data_are", "carpark") else { return };
+    let Some(folder) = recordings("import_finds_out_what_the_real_data_are", "carpark") else { return };
     let files = Files::new();
     let output = files.path("out.agvlog");
     for (input, key, expected) in [

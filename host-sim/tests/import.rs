@@ -6,9 +6,10 @@ use agv_core::geometry::Pose;
 use agv_core::measurement::{PoseIncrement, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_host_sim::import::{PosedScan, ScanLog, carmen, carpark, drive, graph_log, sapienza};
+use agv_host_sim::log;
 use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording, Reference};
 use agv_host_sim::text_file::TextFileError;
-use agv_host_sim::{data, log};
+use agv_tests::recordings;
 
 fn survives_a_log(recording: &Recording) {
     let folder = tempfile::tempdir().unwrap();
@@ -85,7 +86,7 @@ fn bad_tricycle_files_are_refused_with_the_line() {
 
 #[test]
 fn the_real_tricycle_data_are_read() {
-    let Some(folder) = data::for_test("the_real_tricycle_data_are_read", "sapienza_tricycle") else { return };
+    let Some(folder) = recordings("the_real_tricycle_data_are_read", "sapienza_tricycle") else { return };
     let recording = sapienza::read(&folder.join("dataset.txt")).unwrap();
     assert_eq!((recording.events.len(), recording.references.len()), (2434, 2434));
     let RecordedEvent::Encoders(last) = recording.events[2433] else { panic!() };
@@ -162,7 +163,7 @@ fn bad_car_park_tables_are_refused_with_the_line() {
 
 #[test]
 fn the_real_car_park_data_are_read() {
-    let Some(folder) = data::for_test("the_real_car_park_data_are_read", "carpark") else { return };
+    let Some(folder) = recordings("the_real_car_park_data_are_read", "carpark") else { return };
     let recording = carpark::read(&folder, &carpark::WINDOW).unwrap();
     let scans = || {
         recording.events.iter().filter_map(|event| match event {
@@ -227,7 +228,7 @@ fn close(a: &Pose, b: &Pose) -> bool {
 
 #[test]
 fn the_real_logs_of_scans_are_read() {
-    let Some(folder) = data::for_test("the_real_logs_of_scans_are_read", "scans2d") else { return };
+    let Some(folder) = recordings("the_real_logs_of_scans_are_read", "scans2d") else { return };
     let recordings = [
         (drive(&graph_log::read(&folder.join("fr079.log")).unwrap().log).unwrap(), 1464, 360),
         (drive(&carmen::read(&folder.join("aces-corrected.log.gz")).unwrap().front).unwrap(), 440, 180),

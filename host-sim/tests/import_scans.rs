@@ -5,9 +5,9 @@ use std::io::Write;
 
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
-use agv_host_sim::data;
 use agv_host_sim::import::{carmen, graph_log};
 use agv_host_sim::text_file::TextFileError;
+use agv_tests::recordings;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
@@ -103,12 +103,9 @@ fn carmen_log_says_which_line_is_wrong() {
 
 #[test]
 fn real_logs_have_the_scans_that_their_owners_count() {
-    let Some(folder) = data::folder() else {
-        eprintln!("real_logs_have_the_scans_that_their_owners_count: skipped, no folder of recordings (AGV_DATA)");
-        return;
-    };
+    let Some(folder) = recordings("real_logs_have_the_scans_that_their_owners_count", "scans2d") else { return };
     for (name, scans, beams) in [("fr079.log", 1464, 360), ("intel-lab.log", 2672, 180)] {
-        let graph = graph_log::read(&folder.join("scans2d").join(name)).unwrap();
+        let graph = graph_log::read(&folder.join(name)).unwrap();
         assert_eq!(graph.log.scans.len(), scans);
         assert!(graph.log.scans.iter().all(|scan| scan.scan.ranges.len() == beams));
         assert!(graph.edges.iter().all(|edge| edge.from < scans && edge.to < scans));
@@ -118,7 +115,7 @@ fn real_logs_have_the_scans_that_their_owners_count() {
         ("fhw-corrected.log.gz", 488, 180, 13451),
         ("freiburg-079-corrected.log.gz", 4791, 360, 4951),
     ] {
-        let log = carmen::read(&folder.join("scans2d").join(name)).unwrap();
+        let log = carmen::read(&folder.join(name)).unwrap();
         assert_eq!(log.front.scans.len(), scans);
         assert!(log.front.scans.iter().all(|scan| scan.scan.ranges.len() == beams));
         assert_eq!(log.front.increments.len(), motions);

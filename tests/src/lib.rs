@@ -1,1 +1,26 @@
-//! What no single crate can show: the command as people run it, replay, real data.
+//! What the tests of several crates need: recordings of others, programs of others, the images of the boards, and a word
+//! about every test for which one of them is missing.
+
+mod programs;
+mod skip;
+
+use std::path::{Path, PathBuf};
+
+pub use programs::{emulator, image, is_on_path, python};
+pub use skip::{skip, too_busy};
+
+/// A path in the repository.
+#[must_use]
+pub fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// A file or folder of the real recordings; an empty name is the folder of all. Where it is absent, `test` is skipped.
+#[must_use]
+pub fn recordings(test: &str, name: &str) -> Option<PathBuf> {
+    let found = agv_host_sim::data::folder().map(|folder| folder.join(name)).filter(|path| path.exists());
+    if found.is_none() {
+        skip(test, &format!("there is no {name} in the folder of real data (AGV_DATA)"));
+    }
+    found
+}

@@ -13,12 +13,12 @@ use std::time::Instant;
 use agv_core::geometry::difference;
 use agv_core::measurement::Time;
 use agv_core::wire::nav350::{Configuration, Revolution, SensorFrame};
-use agv_host_sim::data;
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::{Happening, Link};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options, Turn};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_tests::{is_on_path, skip};
 
 const NAME: &str = "the_session_holds_on_a_bad_network";
 /// Set for the program inside.
@@ -37,13 +37,6 @@ const IN_ORDER: &str = "ip link set dev lo mtu 1500 gso_max_segs 1 up && \
 const OUT_OF_ORDER: &str = "ip link set dev lo mtu 1500 gso_max_segs 1 up && \
                             tc qdisc add dev lo root netem delay 100ms 100ms loss 2%";
 
-fn finds(program: &str) -> bool {
-    let folders = std::env::var_os("PATH").unwrap_or_default();
-    let mut folders: Vec<PathBuf> = std::env::split_paths(&folders).collect();
-    folders.extend(["/usr/sbin", "/sbin"].map(PathBuf::from));
-    folders.iter().any(|folder| folder.join(program).is_file())
-}
-
 /// Runs a script in a network of its own, if this machine's kernel has what it takes.
 fn in_namespace(script: &str) -> Command {
     let mut command = Command::new("unshare");
@@ -56,8 +49,8 @@ fn the_session_holds_on_a_bad_network() {
     if std::env::var_os(INSIDE).is_some() {
         return inside();
     }
-    if let Some(missing) = ["ip", "tc", "unshare"].into_iter().find(|program| !finds(program)) {
-        return data::skip(NAME, &format!("there is no {missing} (Debian packages iproute2 and util-linux)"));
+    if let Some(missing) = ["ip", "tc", "unshare"].into_iter().find(|program| !is_on_path(program)) {
+        return skip(NAME, &format!("there is no {missing} (Debian packages iproute2 and util-linux)"));
     }
     hold_on(IN_ORDER);
     if std::env::var_os("AGV_LONG").is_some() {
@@ -72,11 +65,11 @@ fn hold_on(network: &str) {
     let output = if has_netem {
         let output = in_namespace(&format!("{network} && {run}; tc -s qdisc show dev lo")).output().unwrap();
         String::from_utf8_lossy(&output.stdout).into_owned()
-    } else if ["linux.uml", "insmod"].into_iter().all(finds) {
+    } else if ["linux.uml", "insmod"].into_iter().all(is_on_path) {
         in_user_mode_linux(network, &run)
     } else {
         let reason = "the kernel has no netem, and the Debian packages user-mode-linux and kmod are not there";
-        return data::skip(NAME, reason);
+        return skip(NAME, reason);
     };
     println!("{output}");
     assert!(output.contains("1 passed"), "{output}");

@@ -26,7 +26,8 @@ use agv_host_sim::emulate::vehicle::{self, VehicleOptions, Watch};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
-use agv_host_sim::{data, log, replay};
+use agv_host_sim::{log, replay};
+use agv_tests::{emulator, image, too_busy};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -396,15 +397,7 @@ const LONGEST_GAP: f64 = 0.04;
 #[test]
 fn the_board_localises_among_foreign_frames() {
     const NAME: &str = "the_board_localises_among_foreign_frames";
-    let path = "../target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle";
-    let image: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    let Ok(image) = image.canonicalize() else {
-        return data::skip(NAME, "the firmware is not built; cargo xtask firmware build");
-    };
-    let qemu = std::process::Command::new("qemu-system-arm").arg("--version").output();
-    if !qemu.is_ok_and(|output| output.status.success()) {
-        return data::skip(NAME, "there is no qemu-system-arm");
-    }
+    let Some(image) = image(NAME, "an500", "vehicle").filter(|_| emulator(NAME)) else { return };
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let recording = hall();
     // A machine that is too busy for encoders in real time is given some tries.
@@ -450,5 +443,5 @@ fn the_board_localises_among_foreign_frames() {
         assert_eq!(driven.poses.last().unwrap().pose.mode, Mode::Reflectors);
         return;
     }
-    data::skip(NAME, "the machine is too busy to emulate a vehicle in real time");
+    too_busy(NAME);
 }

@@ -1,15 +1,12 @@
 //! The real tricycle, held to what its calibration must show.
 
-use agv_host_sim::data;
 use agv_host_sim::evaluate::calibration::sapienza::{self, Fit};
+use agv_tests::recordings;
 
 #[test]
 fn the_real_tricycle_is_calibrated() {
-    let Some(folder) = data::folder() else {
-        eprintln!("the_real_tricycle_is_calibrated: skipped, no folder of recordings (AGV_DATA)");
-        return;
-    };
-    let outcomes = sapienza::run(&folder.join("sapienza_tricycle")).unwrap();
+    let Some(folder) = recordings("the_real_tricycle_is_calibrated", "sapienza_tricycle") else { return };
+    let outcomes = sapienza::run(&folder).unwrap();
     let fit = |method: &str| -> &Fit { &outcomes.iter().find(|outcome| outcome.method == method).unwrap().fit };
     for method in ["atc_wheelbase", "joint"] {
         let fit = fit(method);

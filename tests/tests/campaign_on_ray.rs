@@ -1,20 +1,15 @@
 //! A campaign on a Ray cluster that loses a worker gives the bytes that one machine gives.
 
+use agv_tests::{python, repository, skip};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use agv_host_sim::data;
-
 const TEST: &str = "a_lost_worker_changes_nothing";
 
 /// Long enough for a shard of it to be caught while it runs.
 const RUNS: [&str; 2] = ["--runs", "2"];
-
-fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
 
 /// The command `agv` as it was built last; it belongs to another package, so Cargo does not build it for this test.
 fn command() -> Option<PathBuf> {
@@ -22,13 +17,6 @@ fn command() -> Option<PathBuf> {
     let target = program.ancestors().nth(3)?;
     let built = ["release/agv", "debug/agv"].map(|name| target.join(name));
     built.into_iter().filter(|path| path.exists()).max_by_key(|path| path.metadata().unwrap().modified().unwrap())
-}
-
-fn python() -> Command {
-    let mut python = Command::new("python3");
-    let inherited = std::env::var("PYTHONPATH").unwrap_or_default();
-    python.env("PYTHONPATH", format!("{}:{inherited}", repository("target/python").display()));
-    python
 }
 
 /// A process that runs a shard.
@@ -97,17 +85,14 @@ fn checked(output: &Output) {
 #[test]
 fn a_lost_worker_changes_nothing() {
     let Some(agv) = command() else {
-        data::skip(TEST, "the command agv is not built; cargo build --release --package agv-host-sim");
+        skip(TEST, "the command agv is not built; cargo build --release --package agv-host-sim");
         return;
     };
     if !Path::new("/proc/self/stat").exists() {
-        data::skip(TEST, "there is no /proc, where the workers are found");
+        skip(TEST, "there is no /proc, where the workers are found");
         return;
     }
-    if !python().args(["-c", "import ray"]).output().is_ok_and(|run| run.status.success()) {
-        data::skip(TEST, "python3 with ray is not there");
-        return;
-    }
+    let Some(mut python) = python(TEST, "ray") else { return };
     // Its path tells the shards of this campaign from those of any other.
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().canonicalize().unwrap();
@@ -123,7 +108,7 @@ fn a_lost_worker_changes_nothing() {
     checked(&alone);
 
     let cluster = folder.join("cluster.parquet");
-    let mut driver = python()
+    let mut driver = python
         .arg(repository("host-sim/ray/campaign.py"))
         .args([campaign, "--workers", "2", "--shards", "6", "--agv"])
         .arg(&agv)

@@ -4,17 +4,15 @@ use std::f32::consts::{PI, TAU};
 
 use agv_core::features::falko::{Parameters, Sectors};
 use agv_core::features::{BinaryShapeContext, CumulativeGaussianHistogram, Kernel, Keypoint, PointScan};
-use agv_host_sim::data;
 use agv_host_sim::evaluate::falko::{BEAMS, RANGES, ReferenceKeypoint, Set, detect};
+use agv_tests::recordings;
 
 /// Radius of the descriptors in the reference file, m.
 const RADIUS: f32 = 0.5;
 
 /// Calls `compare` with each keypoint that both programs found in the scans that the reference describes.
 fn each_common(test: &str, mut compare: impl FnMut(&PointScan<BEAMS>, &Keypoint, &ReferenceKeypoint)) -> usize {
-    if data::for_test(test, "falko_reference").is_none() {
-        return 0;
-    }
+    let (Some(_), Some(_)) = (recordings(test, "scans2d"), recordings(test, "falko_reference")) else { return 0 };
     let mut common = 0;
     for set in [Set::Fr079, Set::Intel] {
         let scans = set.scans().unwrap();

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{MapUse, Mode, PoseOutput};
-use agv_host_sim::data;
 use agv_host_sim::evaluate::carpark::{self, Knowledge, Noise};
 use agv_host_sim::evaluate::slam::OfficeDrive;
 use agv_host_sim::evaluate::warehouse::{Map, Method, PATHS, experiment};
@@ -15,18 +14,11 @@ use agv_host_sim::replay::replay;
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
 use agv_host_sim::simulate::simulate;
-
-fn carpark_folder(test: &str) -> Option<PathBuf> {
-    let folder = data::folder();
-    if folder.is_none() {
-        eprintln!("{test}: skipped, no folder of recordings (AGV_DATA)");
-    }
-    folder.map(|folder| folder.join("carpark"))
-}
+use agv_tests::recordings;
 
 #[test]
 fn the_car_park_is_localised_to_seven_centimetres() {
-    let Some(folder) = carpark_folder("the_car_park_is_localised_to_seven_centimetres") else { return };
+    let Some(folder) = recordings("the_car_park_is_localised_to_seven_centimetres", "carpark") else { return };
     let (outcome, recording, replay) = carpark::run(&folder, Noise::Nominal, Knowledge::Map).unwrap();
     println!("{outcome:?}");
     assert!(outcome.rmse_m <= 0.070, "{} m", outcome.rmse_m);
@@ -50,7 +42,7 @@ fn the_car_park_is_localised_to_seven_centimetres() {
 
 #[test]
 fn a_localiser_too_sure_of_itself_says_that_it_is_lost() {
-    let Some(folder) = carpark_folder("a_localiser_too_sure_of_itself_says_that_it_is_lost") else { return };
+    let Some(folder) = recordings("a_localiser_too_sure_of_itself_says_that_it_is_lost", "carpark") else { return };
     let (outcome, _, _) = carpark::run(&folder, Noise::Tight, Knowledge::Map).unwrap();
     println!("{outcome:?}");
     if let Some(wrong) = outcome.wrong_at_s {
@@ -131,7 +123,7 @@ fn moved_pallets_are_no_reason_to_be_five_centimetres_off() {
 fn scans_alone_bring_robots_further_than_their_odometry_in_offices_that_were_not_tuned_on() {
     let test = "scans_alone_bring_robots_further_than_their_odometry_in_offices_that_were_not_tuned_on";
     for (log, share) in [("aces", 0.8), ("fhw", 0.5)] {
-        let Some(log) = data::for_test(test, &format!("scans2d/{log}-corrected.log.gz")) else { return };
+        let Some(log) = recordings(test, &format!("scans2d/{log}-corrected.log.gz")) else { return };
         let drive = OfficeDrive::of_carmen(&log).unwrap();
         let drift = |name: &str| {
             let candidate = Candidate::ALL.iter().find(|candidate| candidate.name == name).unwrap();

@@ -1,28 +1,19 @@
 //! The detector on the office logs: against the keypoints of the reference program, and scored by an independent one.
 
 use std::path::PathBuf;
-use std::process::Command;
 
 use agv_core::features::falko::Parameters;
 use agv_host_sim::evaluate::falko::{Set, detect, positions, reference_match};
 use agv_host_sim::evaluate::repeatability;
-use agv_host_sim::{data, export};
+use agv_host_sim::export;
+use agv_tests::{python, recordings};
 
 const SETS: [(&str, Set); 2] = [("fr079", Set::Fr079), ("intel", Set::Intel)];
 
-fn has_data(test: &str) -> bool {
-    let is_there = data::folder().is_some();
-    if !is_there {
-        eprintln!("{test}: skipped, no folder of recordings (AGV_DATA)");
-    }
-    is_there
-}
-
 #[test]
 fn reference_profile_finds_what_the_reference_program_finds() {
-    if !has_data("reference_profile_finds_what_the_reference_program_finds") {
-        return;
-    }
+    let test = "reference_profile_finds_what_the_reference_program_finds";
+    let (Some(_), Some(_)) = (recordings(test, "scans2d"), recordings(test, "falko_reference")) else { return };
     for (name, set) in SETS {
         let scans = set.scans().unwrap();
         let reference = set.reference().unwrap();
@@ -48,19 +39,11 @@ fn reference_profile_finds_what_the_reference_program_finds() {
 
 #[test]
 fn repeatability_beats_the_reference_program_by_the_independent_score() {
-    if !has_data("repeatability_beats_the_reference_program_by_the_independent_score") {
-        return;
-    }
-    let script =
-        data::folder().map(|folder| folder.join("../tools/repeatability.py")).filter(|script| script.is_file());
-    let has_modules = Command::new("python3")
-        .args(["-c", "import numpy, scipy, shapely"])
-        .output()
-        .is_ok_and(|run| run.status.success());
-    let script = script.filter(|_| has_modules);
-    if script.is_none() {
-        eprintln!("independent score: skipped, repeatability.py or python3 with numpy, scipy, shapely is not there");
-    }
+    let test = "repeatability_beats_the_reference_program_by_the_independent_score";
+    let Some(_) = recordings(test, "scans2d") else { return };
+    // What is measured here is held to its figures even where the other program cannot be had.
+    let script = recordings(test, "../tools/repeatability.py");
+    let script = script.filter(|_| python(test, "numpy, scipy, shapely").is_some());
     for ((name, set), least) in SETS.into_iter().zip([0.556, 0.512]) {
         let scans = set.scans().unwrap();
         let keypoints: Vec<_> = detect(&scans, Parameters::thesis()).collect();
@@ -87,7 +70,8 @@ fn score_by_script(
     let folder = tempfile::tempdir().unwrap();
     export::keypoints::write(folder.path(), scans.iter().zip(keypoints)).unwrap();
     let files = ["scans.txt", "poses.txt", "keypoints.csv"].map(|file| folder.path().join(file));
-    let run = Command::new("python3").arg(script).args(files).output().unwrap();
+    let mut python = python("the independent score", "numpy, scipy, shapely").expect("asked before");
+    let run = python.arg(script).args(files).output().unwrap();
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     serde_json::from_slice(&run.stdout).unwrap()
 }

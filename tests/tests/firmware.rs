@@ -6,21 +6,17 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use agv_host_sim::evaluate::demonstration;
-use agv_host_sim::{data, log, replay};
+use agv_host_sim::{log, replay};
+use agv_tests::{emulator, image};
 
 /// The folder of the images of the emulated board. None, and a word about it, if one is missing or there is no emulator.
 fn images(test: &str) -> Option<PathBuf> {
-    let target = "../target/firmware/an500/thumbv7em-none-eabihf/firmware";
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(target);
-    if ["calibrate", "replay", "measure", "latency", "restart"].iter().any(|image| !folder.join(image).exists()) {
-        data::skip(test, "the firmware is not built; cargo xtask firmware build");
+    if !emulator(test) {
         return None;
     }
-    if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|output| output.status.success()) {
-        data::skip(test, "there is no qemu-system-arm");
-        return None;
-    }
-    Some(folder)
+    let names = ["calibrate", "replay", "measure", "latency", "restart"];
+    let images: Option<Vec<PathBuf>> = names.into_iter().map(|name| image(test, "an500", name)).collect();
+    Some(images?.first()?.parent()?.to_owned())
 }
 
 /// Runs an image in `folder`, with the files there.

@@ -3,21 +3,10 @@
 //! The images are those of `cargo xtask firmware build`, which `cargo xtask test` runs first.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use agv_host_sim::data;
+use agv_tests::image;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags};
-
-/// The file of an image, if it is built; a word about it if it is not.
-fn image(test: &str, board: &str, name: &str) -> Option<PathBuf> {
-    let target = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/firmware");
-    let path = target.join(board).join("thumbv7em-none-eabihf/firmware").join(name);
-    if !path.exists() {
-        data::skip(test, "the firmware is not built; cargo xtask firmware build");
-        return None;
-    }
-    Some(path)
-}
 
 /// Symbols of what a panic goes through: the functions of `core::panicking`, the panic handler, and what the handler of the
 /// image calls, which is nowhere.

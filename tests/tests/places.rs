@@ -2,7 +2,6 @@
 
 use agv_core::landmarks::Landmark;
 use agv_core::places::RelocalizationParameters;
-use agv_host_sim::data;
 use agv_host_sim::evaluate::falko::Set;
 use agv_host_sim::evaluate::features::{DetectorKind, run as measure_features};
 use agv_host_sim::evaluate::kidnapping::{Case, feature_map, run as kidnap};
@@ -15,6 +14,7 @@ use agv_host_sim::places::{FindParameters, Observer, PlaceAnswer, PlaceMap, Spac
 use agv_host_sim::simulate::block_storage::BlockStoragePath;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_tests::recordings;
 
 fn recognise(set: Set, asked: &[(Protocol, Mode)]) -> Vec<Outcome> {
     let experiment = Experiment::new(Method::Improved, &set.scans().unwrap());
@@ -31,7 +31,7 @@ fn recognise(set: Set, asked: &[(Protocol, Mode)]) -> Vec<Outcome> {
 
 #[test]
 fn places_of_fr079_are_recognised() {
-    if data::for_test("places_of_fr079_are_recognised", "scans2d").is_none() {
+    if recordings("places_of_fr079_are_recognised", "scans2d").is_none() {
         return;
     }
     let asked = [(Protocol::Thesis, Mode::Offline), (Protocol::Thesis, Mode::Online), (Protocol::Honest, Mode::Online)];
@@ -43,7 +43,7 @@ fn places_of_fr079_are_recognised() {
 
 #[test]
 fn places_of_intel_are_recognised() {
-    if data::for_test("places_of_intel_are_recognised", "scans2d").is_none() {
+    if recordings("places_of_intel_are_recognised", "scans2d").is_none() {
         return;
     }
     let outcomes = recognise(Set::Intel, &[(Protocol::Honest, Mode::Online)]);
@@ -52,7 +52,7 @@ fn places_of_intel_are_recognised() {
 
 #[test]
 fn keypoints_are_repeatable_and_told_apart() {
-    if data::for_test("keypoints_are_repeatable_and_told_apart", "scans2d").is_none() {
+    if recordings("keypoints_are_repeatable_and_told_apart", "scans2d").is_none() {
         return;
     }
     for (set, repeatability) in [(Set::Fr079, 0.60), (Set::Intel, 0.56)] {
@@ -66,7 +66,7 @@ fn keypoints_are_repeatable_and_told_apart() {
 
 #[test]
 fn an_office_is_mapped_from_raw_odometry() {
-    let Some(folder) = data::for_test("an_office_is_mapped_from_raw_odometry", "scans2d") else { return };
+    let Some(folder) = recordings("an_office_is_mapped_from_raw_odometry", "scans2d") else { return };
     let carmen = folder.join("freiburg-079-corrected.log.gz");
     let drive = OfficeDrive::of_graph(&folder.join("fr079.log"), &carmen).unwrap();
     for (name, parameters, largest) in
@@ -84,7 +84,7 @@ fn an_office_is_mapped_from_raw_odometry() {
 
 #[test]
 fn a_corridor_is_mapped_without_false_loops() {
-    let Some(folder) = data::for_test("a_corridor_is_mapped_without_false_loops", "scans2d") else { return };
+    let Some(folder) = recordings("a_corridor_is_mapped_without_false_loops", "scans2d") else { return };
     let drive = OfficeDrive::of_carmen(&folder.join("aces-corrected.log.gz")).unwrap();
     let (outcome, _) = map_office(&drive, None, "all", &SlamParameters::all(), || ()).unwrap();
     println!("{outcome:?}");
@@ -138,7 +138,7 @@ fn a_vehicle_finds_itself_among_features() {
 
 #[test]
 fn stored_places_are_found_and_other_halls_are_not() {
-    if data::for_test("stored_places_are_found_and_other_halls_are_not", "scans2d").is_none() {
+    if recordings("stored_places_are_found_and_other_halls_are_not", "scans2d").is_none() {
         return;
     }
     let scans = Set::Fr079.scans().unwrap();

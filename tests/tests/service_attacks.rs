@@ -12,7 +12,6 @@ use std::time::{Duration, Instant};
 use agv_core::landmarks::Landmark;
 use agv_core::measurement::EncoderSample;
 use agv_core::state::Mode;
-use agv_host_sim::data;
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, Setting};
 use agv_host_sim::recording::{RecordedEvent, Recording};
@@ -21,6 +20,7 @@ use agv_host_sim::simulate::simulate;
 use agv_settings::leaf::Value;
 use agv_settings::service::authentication::{Nonce, TAG, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, Refusal, Request, Response, encode};
+use agv_tests::{emulator, image};
 use socket2::{Domain, Socket, Type};
 
 const KEY: [u8; 32] = [0x42; 32];
@@ -468,15 +468,7 @@ fn attack(watch: &Watch, folder: &Path) -> (usize, usize) {
 #[test]
 fn strangers_change_nothing_and_stop_nothing() {
     const NAME: &str = "strangers_change_nothing_and_stop_nothing";
-    let path = "../target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle";
-    let image: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    let Ok(image) = image.canonicalize() else {
-        return data::skip(NAME, "the firmware is not built; cargo xtask firmware build");
-    };
-    let qemu = std::process::Command::new("qemu-system-arm").arg("--version").output();
-    if !qemu.is_ok_and(|output| output.status.success()) {
-        return data::skip(NAME, "there is no qemu-system-arm");
-    }
+    let Some(image) = image(NAME, "an500", "vehicle").filter(|_| emulator(NAME)) else { return };
     let recording = standing();
     let folder = tempfile::tempdir().unwrap();
     let options =

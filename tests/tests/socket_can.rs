@@ -19,21 +19,14 @@ use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_core::wire::can::frame::{AnyFrame, FdFrame, Frame, extended_id, standard_id};
 use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::bus::{Bus, SocketCanBus};
-use agv_host_sim::data;
 use agv_host_sim::emulate::encoder::EmulatedEncoder;
 use agv_host_sim::import::candump::{Line, parse_line};
+use agv_tests::{is_on_path, skip};
 
 /// Names the interface to the program inside.
 const INTERFACE: &str = "AGV_CAN_INTERFACE";
 /// Longer than anything here takes on a slow machine.
 const PATIENCE: Duration = Duration::from_secs(60);
-
-fn finds(program: &str) -> bool {
-    let folders = std::env::var_os("PATH").unwrap_or_default();
-    let mut folders: Vec<PathBuf> = std::env::split_paths(&folders).collect();
-    folders.extend(["/usr/sbin", "/sbin"].map(PathBuf::from));
-    folders.iter().any(|folder| folder.join(program).is_file())
-}
 
 fn runs(program: &str, arguments: &[&str]) -> bool {
     let mut command = Command::new(program);
@@ -47,8 +40,8 @@ fn the_bus_works_on_a_real_can_stack() {
     if let Ok(interface) = std::env::var(INTERFACE) {
         return on_interface(&interface);
     }
-    if let Some(missing) = ["candump", "cansend", "ip"].into_iter().find(|program| !finds(program)) {
-        return data::skip(NAME, &format!("there is no {missing} (Debian packages can-utils and iproute2)"));
+    if let Some(missing) = ["candump", "cansend", "ip"].into_iter().find(|program| !is_on_path(program)) {
+        return skip(NAME, &format!("there is no {missing} (Debian packages can-utils and iproute2)"));
     }
     let vcan = format!("agv{}", std::process::id() % 100_000);
     if runs("ip", &["link", "add", "dev", &vcan, "mtu", "72", "type", "vcan"]) {
@@ -56,10 +49,10 @@ fn the_bus_works_on_a_real_can_stack() {
         let outcome = std::panic::catch_unwind(|| on_interface(&vcan));
         runs("ip", &["link", "delete", &vcan]);
         assert!(is_up && outcome.is_ok());
-    } else if ["linux.uml", "insmod"].into_iter().all(finds) {
+    } else if ["linux.uml", "insmod"].into_iter().all(is_on_path) {
         in_user_mode_linux(NAME);
     } else {
-        data::skip(NAME, "the kernel has no vcan, and the Debian packages user-mode-linux and kmod are not there");
+        skip(NAME, "the kernel has no vcan, and the Debian packages user-mode-linux and kmod are not there");
     }
 }
 

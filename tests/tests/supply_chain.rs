@@ -1,12 +1,12 @@
 //! What the project rests on: licences and sources of its dependencies, and every place where its own code is `unsafe`.
 //! `cargo xtask audit` looks further, with programs that must be installed.
 
+use agv_tests::skip;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::str::FromStr;
 
-use agv_host_sim::data;
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use serde_json::Value;
 
@@ -77,7 +77,7 @@ fn licences_are_those_that_are_allowed() {
     let output = cargo.current_dir(repository()).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     if !output.status.success() && said.contains("--offline") {
-        return data::skip(NAME, "a package was not downloaded yet; cargo fetch");
+        return skip(NAME, "a package was not downloaded yet; cargo fetch");
     }
     assert!(output.status.success(), "{said}");
     let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();

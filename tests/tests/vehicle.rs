@@ -32,18 +32,8 @@ const KEY: [u8; 32] = [0x42; 32];
 
 /// The image, and the right to run it. None, and a word about it, if it is missing or there is no emulator.
 fn image(test: &str) -> Option<(PathBuf, MutexGuard<'static, ()>)> {
-    let path = "../target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle";
-    let image = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    if !image.exists() {
-        data::skip(test, "the firmware is not built; cargo xtask firmware build");
-        return None;
-    }
-    let qemu = std::process::Command::new("qemu-system-arm").arg("--version").output();
-    if !qemu.is_ok_and(|output| output.status.success()) {
-        data::skip(test, "there is no qemu-system-arm");
-        return None;
-    }
-    Some((image.canonicalize().unwrap(), ALONE.lock().unwrap_or_else(PoisonError::into_inner)))
+    let image = agv_tests::image(test, "an500", "vehicle").filter(|_| agv_tests::emulator(test))?;
+    Some((image, ALONE.lock().unwrap_or_else(PoisonError::into_inner)))
 }
 
 /// The standard hall: reflectors everywhere.
@@ -103,7 +93,7 @@ fn it_drives_through_the_hall() {
         drive.driven.longest_stall < LONGEST_STALL
     });
     let Some(drive) = drive else {
-        data::skip("it_drives_through_the_hall", "the machine is too busy to emulate a vehicle in real time");
+        agv_tests::too_busy("it_drives_through_the_hall");
         return;
     };
     let errors = vehicle::errors(&drive.driven, &recording).unwrap();

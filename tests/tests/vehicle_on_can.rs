@@ -14,7 +14,6 @@ use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{Content, PoseReceiver, PublishedPose};
 use agv_core::wire::can::frame::AnyFrame;
 use agv_host_sim::bus::{Bus, BusError, SocketCanBus};
-use agv_host_sim::data;
 use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::emulate::vehicle::settings_like;
 use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line};
@@ -22,6 +21,7 @@ use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_tests::{emulator, image, is_on_path, python, repository, skip};
 use serde_json::Value;
 
 /// Names the interface to the program inside.
@@ -33,10 +33,6 @@ const FOLDER: &str = "AGV_BOARD_FOLDER";
 const ENCODER_PERIOD: u16 = 100;
 const START: Pose = Pose { x: 12.5, y: -3.25, theta: 0.5 };
 
-fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
-
 fn controller() -> NodeId {
     NodeId::new(16).unwrap()
 }
@@ -47,26 +43,15 @@ fn drive() -> Recording {
     simulate(&scenario).unwrap().recording
 }
 
-fn is_there(program: &str) -> bool {
-    let script = format!("command -v {program}");
-    let path = format!("{}:/usr/sbin:/sbin", std::env::var("PATH").unwrap_or_default());
-    let mut shell = Command::new("sh");
-    shell.args(["-c", &script]).env("PATH", path).stdout(Stdio::null());
-    shell.status().is_ok_and(|status| status.success())
-}
-
 #[test]
 fn the_board_is_a_node_of_a_real_bus() {
     if let Ok(interface) = std::env::var(INTERFACE) {
         return inside(&interface, Path::new(&std::env::var(FOLDER).unwrap()));
     }
-    let image = repository("target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle");
-    if !image.exists() {
-        return data::skip(NAME, "the firmware is not built; cargo xtask firmware build");
-    }
-    let programs = ["qemu-system-arm", "linux.uml", "insmod", "slcand", "candump", "cansend", "stty", "ip"];
-    if let Some(missing) = programs.into_iter().find(|program| !is_there(program)) {
-        return data::skip(NAME, &format!("there is no {missing}"));
+    let Some(image) = image(NAME, "an500", "vehicle").filter(|_| emulator(NAME)) else { return };
+    let programs = ["linux.uml", "insmod", "slcand", "candump", "cansend", "stty", "ip"];
+    if let Some(missing) = programs.into_iter().find(|program| !is_on_path(program)) {
+        return skip(NAME, &format!("there is no {missing}"));
     }
     let folder = tempfile::tempdir().unwrap();
     let recording = drive();
@@ -265,9 +250,8 @@ fn check_candump(log: &str) {
     for (identifier, least) in [("190", 100), ("290", 100), ("390", 100), ("490", 100), ("181", 10), ("182", 10)] {
         assert!(identifiers.get(identifier).is_some_and(|count| *count > least), "{identifiers:?}");
     }
-    let inherited = std::env::var("PYTHONPATH").unwrap_or_default();
-    let mut python = Command::new("python3")
-        .env("PYTHONPATH", format!("{}:{inherited}", repository("target/python").display()))
+    let Some(mut python) = python(NAME, "cantools, canopen") else { return };
+    let mut python = python
         .arg(repository("host-sim/tests/can/agv_description.py"))
         .args([repository("docs/agv.dbc"), repository("docs/agv.eds")])
         .stdin(Stdio::piped())
@@ -279,9 +263,6 @@ fn check_candump(log: &str) {
     let writer = std::thread::spawn(move || input.write_all(text.as_bytes()));
     let output = python.wait_with_output().unwrap();
     let _ = writer.join();
-    if !output.status.success() && String::from_utf8_lossy(&output.stderr).contains("ModuleNotFoundError") {
-        return data::skip(NAME, "cantools is not there to decode what candump has heard");
-    }
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     for line in String::from_utf8_lossy(&output.stdout).lines() {
         let decoded: Value = serde_json::from_str(line).unwrap();

@@ -10,17 +10,14 @@ use std::time::Instant;
 use agv_core::geometry::Pose;
 use agv_core::measurement::{PoseFix, Time};
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions};
+use agv_host_sim::log;
 use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording, truth_at};
 use agv_host_sim::replay::{Replay, replay};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::view::{Shared, Timeline, follow, load, serve};
-use agv_host_sim::{data, log};
+use agv_tests::{emulator, image, repository, skip};
 use serde_json::Value;
-
-fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
 
 /// Where the pictures of the page go.
 fn pictures() -> PathBuf {
@@ -35,7 +32,7 @@ fn has_browser(test: &str) -> bool {
     let has_driver = runs(node().args(["-e", "require('playwright-core')"]));
     let has_chromium = runs(Command::new(chromium()).arg("--version"));
     if !has_driver || !has_chromium {
-        data::skip(test, "chromium, node or its package playwright-core is not there");
+        skip(test, "chromium, node or its package playwright-core is not there");
     }
     has_driver && has_chromium
 }
@@ -190,18 +187,7 @@ fn an_hour_is_opened_and_scrubbed() {
 #[test]
 fn a_drive_in_emulation_is_looked_at() {
     let test = "a_drive_in_emulation_is_looked_at";
-    let image = repository("target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle");
-    if !image.exists() {
-        data::skip(test, "the firmware is not built; cargo xtask firmware build");
-        return;
-    }
-    if !Command::new("qemu-system-arm").arg("--version").output().is_ok_and(|output| output.status.success()) {
-        data::skip(test, "there is no qemu-system-arm");
-        return;
-    }
-    if !has_browser(test) {
-        return;
-    }
+    let Some(image) = image(test, "an500", "vehicle").filter(|_| emulator(test) && has_browser(test)) else { return };
     let recording = hall("speed = 1.2");
     let folder = tempfile::tempdir().unwrap();
     let image = image.canonicalize().unwrap();

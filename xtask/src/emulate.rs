@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, bail};
 
-use crate::{firmware, packages, repository};
+use crate::{firmware, repository, requirements};
 
 /// Build the firmware and drive a vehicle with it in emulation: arguments behind -- go to `agv emulate`
 #[derive(clap::Args)]
@@ -18,7 +18,7 @@ pub struct Emulate {
 impl Emulate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        for missing in packages::prepare() {
+        for missing in requirements::prepare_emulator() {
             eprintln!("{missing}");
         }
         let image = firmware::emulated_vehicle()?;

@@ -4,7 +4,7 @@ mod audit;
 mod emulate;
 mod firmware;
 mod fuzz;
-mod packages;
+mod requirements;
 mod seeds;
 mod test;
 

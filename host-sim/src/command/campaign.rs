@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use agv_host_sim::campaign::results::{self, Row};
 use agv_host_sim::campaign::table::table;
 use agv_host_sim::campaign::{Campaign as Plan, Shard};
+use agv_host_sim::left_out;
 use anyhow::Context as _;
 
 use crate::command::progress;
@@ -52,6 +53,9 @@ Examples:
 impl Campaign {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        if self.output.is_some() {
+            left_out::TABLES.check()?;
+        }
         let is_table = |file: &PathBuf| file.extension().is_some_and(|extension| extension == "parquet");
         let mut rows = if self.files.iter().all(is_table) {
             let mut rows = Vec::new();

@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use agv_core::geometry::Pose;
 use agv_host_sim::import::raw::{self, RawBytes};
-use agv_host_sim::import::{self, ScanLog, candump, capture, carmen, carpark, graph_log, ros, sapienza};
+#[cfg(feature = "bags")]
+use agv_host_sim::import::ros;
+use agv_host_sim::import::{self, ScanLog, candump, capture, carmen, carpark, graph_log, sapienza};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
@@ -102,7 +104,7 @@ impl Import {
             Format::Candump => return self.import_raw(&progress, candump_bytes(&self.input)?),
             Format::Capture => return self.import_raw(&progress, self.capture()?),
             Format::Raw => self.raw_drive()?,
-            Format::Mcap | Format::Rosbag2 => ros::read(&self.input, &self.ros_choice())?,
+            Format::Mcap | Format::Rosbag2 => self.ros_drive()?,
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
             Format::Carmen => drive(&self.input, "CARMEN", &carmen::read(&self.input)?.front)?,
@@ -126,8 +128,16 @@ impl Import {
         Summary::of(&drive).print(self.json)
     }
 
-    fn ros_choice(&self) -> ros::Choice {
-        ros::Choice { scan: self.scan_topic.clone(), odometry: self.odometry_topic.clone(), laser: self.laser }
+    #[cfg(feature = "bags")]
+    fn ros_drive(&self) -> anyhow::Result<Recording> {
+        let Self { scan_topic, odometry_topic, laser, .. } = self;
+        let choice = ros::Choice { scan: scan_topic.clone(), odometry: odometry_topic.clone(), laser: *laser };
+        Ok(ros::read(&self.input, &choice)?)
+    }
+
+    #[cfg(not(feature = "bags"))]
+    fn ros_drive(&self) -> anyhow::Result<Recording> {
+        bail!(agv_host_sim::left_out::BAGS)
     }
 
     fn capture(&self) -> anyhow::Result<Vec<RawBytes>> {

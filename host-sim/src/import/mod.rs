@@ -10,6 +10,7 @@ mod posed_scan;
 pub mod poses;
 pub mod range_image;
 pub mod raw;
+#[cfg(feature = "bags")]
 pub mod ros;
 pub mod sapienza;
 mod scan_drive;

@@ -5,9 +5,9 @@ use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use mcap::sans_io::linear_reader::LinearReaderOptions;
-use rusqlite::{Connection, OpenFlags};
 use serde::Deserialize;
 
+use super::database::{self, DatabaseError};
 use crate::file_kind;
 
 /// Why a recording cannot be read.
@@ -53,7 +53,7 @@ pub enum BagError {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: rusqlite::Error,
+        source: DatabaseError,
     },
 }
 
@@ -118,7 +118,7 @@ impl Bag {
         for (path, storage) in &self.files {
             match storage {
                 Storage::Mcap => read_mcap(path, &mut take)?,
-                Storage::Sqlite => read_sqlite(path, &mut take)
+                Storage::Sqlite => database::read(path, &mut take)
                     .map_err(|source| BagError::Database { path: path.to_owned(), source })?,
             }
         }
@@ -179,25 +179,6 @@ fn read_mcap(path: &Path, take: &mut impl FnMut(&BagMessage)) -> Result<(), BagE
             kind: &schema.name,
             time: message.log_time,
             data: &message.data,
-        });
-    }
-    Ok(())
-}
-
-fn read_sqlite(path: &Path, take: &mut impl FnMut(&BagMessage)) -> Result<(), rusqlite::Error> {
-    let database = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
-    let mut query = database.prepare(
-        "SELECT topics.name, topics.type, messages.timestamp, messages.data FROM messages \
-         JOIN topics ON messages.topic_id = topics.id WHERE topics.serialization_format = 'cdr' ORDER BY messages.id",
-    )?;
-    let mut rows = query.query([])?;
-    while let Some(row) = rows.next()? {
-        let time: i64 = row.get(2)?;
-        take(&BagMessage {
-            topic: row.get_ref(0)?.as_str()?,
-            kind: row.get_ref(1)?.as_str()?,
-            time: u64::try_from(time).unwrap_or_default(),
-            data: row.get_ref(3)?.as_blob()?,
         });
     }
     Ok(())

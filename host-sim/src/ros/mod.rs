@@ -1,6 +1,7 @@
 //! Messages of ROS 2 as their recordings hold them, to the extent that vehicles and this program exchange.
 
 mod bag;
+mod database;
 mod encoding;
 pub mod messages;
 mod schema;

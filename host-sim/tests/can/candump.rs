@@ -7,9 +7,9 @@ use agv_core::wire::can::encoder_pair::ChannelSettings;
 use agv_core::wire::can::frame::{FdFrame, Frame, extended_id, standard_id};
 use agv_core::wire::can::sdo::{Object, Response, Value};
 use agv_core::wire::can::supervision::SupervisionLimits;
-use agv_host_sim::data;
 use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line, read, screen_line};
 use agv_host_sim::link::encoder_listener::EncoderListener;
+use agv_tests::recordings;
 
 fn seen(micros: u64, frame: impl Into<agv_core::wire::can::frame::AnyFrame>) -> SeenFrame {
     SeenFrame { time: Some(Time::from_micros(micros)), interface: "vcan0".to_owned(), frame: frame.into() }
@@ -72,7 +72,7 @@ fn lines_of_a_screen() {
 
 #[test]
 fn a_recorded_drive_unit_decodes() {
-    let Some(path) = data::for_test("a_recorded_drive_unit_decodes", "can/candump_ros_canopen_380.log") else { return };
+    let Some(path) = recordings("a_recorded_drive_unit_decodes", "can/candump_ros_canopen_380.log") else { return };
     let frames = read(&path).unwrap();
     let messages: Vec<Message> =
         frames.iter().map(|seen| Message::decode(seen.frame.classic().unwrap()).unwrap()).collect();

@@ -2,28 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use agv_core::localizer::{Mode, Reason};
 use agv_core::measurement::EncoderFault;
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{Content, Health, LaserHealth, StartSearch, WantedMode};
 use agv_core::wire::can::frame::{Frame, Id};
-use agv_host_sim::data;
+use agv_tests::{python, repository};
 use serde_json::Value;
-
-fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
-
-fn python() -> Command {
-    let mut python = Command::new("python3");
-    // Where `cargo xtask test` puts packages that Debian does not have.
-    let inherited = std::env::var("PYTHONPATH").unwrap_or_default();
-    python.env("PYTHONPATH", format!("{}:{inherited}", repository("target/python").display()));
-    python
-}
 
 fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
     let mut all = Vec::new();
@@ -160,14 +147,8 @@ fn line(frame: &Frame) -> String {
 
 /// What cantools makes of each frame. None if it is not installed.
 fn described(frames: &[Frame]) -> Option<Vec<Value>> {
-    let has_packages = python().args(["-c", "import cantools, canopen"]).output().is_ok_and(|run| run.status.success());
-    if !has_packages {
-        data::skip("agv.dbc and agv.eds", "python3 with cantools and canopen is not there");
-        return None;
-    }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/can/agv_description.py");
-    let mut child = python()
-        .arg(script)
+    let mut child = python("agv.dbc and agv.eds", "cantools, canopen")?
+        .arg(repository("host-sim/tests/can/agv_description.py"))
         .args([repository("docs/agv.dbc"), repository("docs/agv.eds")])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use agv_host_sim::log;
+use agv_tests::python;
 use serde_json::Value;
 
-use crate::python::{hall, python};
+use crate::hall::hall;
 use crate::support::{Files, agv, text};
 
 /// Prints the statistics that evo_ape stores.

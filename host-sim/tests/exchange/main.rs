@@ -4,7 +4,7 @@
 mod support;
 
 mod evo;
+mod hall;
 mod layouts;
-mod python;
 mod ros;
 mod views;

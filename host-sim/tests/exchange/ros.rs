@@ -7,9 +7,10 @@ use agv_core::localizer::Mode;
 use agv_host_sim::log;
 use agv_host_sim::recording::RecordedEvent;
 use agv_host_sim::replay::replay;
+use agv_tests::python;
 use serde_json::Value;
 
-use crate::python::{hall, python};
+use crate::hall::hall;
 use crate::support::{Files, agv, refusal, text};
 
 fn number(value: &Value) -> f64 {

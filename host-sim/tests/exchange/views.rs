@@ -8,13 +8,14 @@ use std::sync::atomic::AtomicBool;
 
 use agv_core::localizer::{Mode, PoseOutput};
 use agv_core::measurement::Time;
+use agv_host_sim::log;
 use agv_host_sim::recording::RecordedEvent;
 use agv_host_sim::replay::replay;
 use agv_host_sim::view::{Shared, Timeline, Window, load};
-use agv_host_sim::{data, log};
+use agv_tests::skip;
 use serde_json::Value;
 
-use crate::python::hall;
+use crate::hall::hall;
 use crate::support::{Files, agv, refusal, text};
 
 fn get(address: &str, path: &str, host: &str) -> String {
@@ -105,7 +106,7 @@ fn a_report_puts_drives_side_by_side() {
     assert!(std::fs::read_to_string(&alone).unwrap().contains("lost_after"));
     let run = agv(&["report", &before, "-o", &page, "--pdf", &pdf]);
     if text(&run.stderr).contains("needs Chromium") {
-        data::skip("a_report_puts_drives_side_by_side", "Chromium is not there to print");
+        skip("a_report_puts_drives_side_by_side", "Chromium is not there to print");
         return;
     }
     assert!(run.status.success(), "{}", text(&run.stderr));

@@ -1,15 +1,15 @@
 //! Parameters of a real sensor found back from simulated scans.
 
-use agv_host_sim::data;
 use agv_host_sim::evaluate::{lidar3d_calibration, lidar3d_sharpness};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::intrinsic::Residual;
+use agv_tests::recordings;
 
 const TRUTH: &str = "lidar3d/calib/ros_64e_utexas.yaml";
 
 #[test]
 fn disturbed_parameters_of_a_real_sensor_come_back_and_their_deviations_are_honest() {
-    let Some(path) = data::for_test("lidar3d calibration", TRUTH) else { return };
+    let Some(path) = recordings("lidar3d calibration", TRUTH) else { return };
     let outcome = lidar3d_calibration::run(&path, Offsets::Orthogonal, Residual::AlongBeam, 11).unwrap();
     assert_eq!(outcome.lasers, 64);
     assert!(outcome.is_within_limits, "{outcome:?}");
@@ -25,7 +25,7 @@ fn disturbed_parameters_of_a_real_sensor_come_back_and_their_deviations_are_hone
 
 #[test]
 fn ground_and_facades_of_real_scans_become_thinner_where_they_were_not_used() {
-    let Some(folder) = data::for_test("lidar3d sharpness", "lidar3d/moosmann/MuehlburgerTor") else { return };
+    let Some(folder) = recordings("lidar3d sharpness", "lidar3d/moosmann/MuehlburgerTor") else { return };
     let outcome = lidar3d_sharpness::moosmann(&folder).unwrap();
     for thickness in [outcome.ground_held_out, outcome.facades_held_out] {
         assert!(thickness.patches > 100 && thickness.after_m < 0.95 * thickness.before_m, "{outcome:?}");

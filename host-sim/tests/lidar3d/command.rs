@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::measurement::Time;
-use agv_host_sim::data;
 use agv_host_sim::export::velodyne::{CaptureWriter, hdl64e_packets};
 use agv_host_sim::simulate::multi_beam::{Sensor, Stand, packets};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::LENGTH;
+use agv_tests::recordings;
 use serde_json::Value;
 
 use super::support::{Files, agv, json_keys, refusal, text};
@@ -46,7 +46,7 @@ fn results(arguments: &[&str]) -> Value {
 }
 
 fn real(name: &str) -> Option<PathBuf> {
-    data::for_test("agv lidar3d", name)
+    recordings("agv lidar3d", name)
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! The packet that the manual of the HDL-64E S2 prints.
 
-use agv_host_sim::{data, import};
+use agv_host_sim::import;
 use agv_lidar3d::packet::{Packet, Sensor};
+use agv_tests::recordings;
 
 /// Counts of distance and intensities of the first four lasers of the first upper and the first lower block.
 const UPPER: [(u16, u8); 4] = [(1395, 61), (1361, 54), (1449, 63), (1473, 52)];
@@ -9,7 +10,7 @@ const LOWER: [(u16, u8); 4] = [(1281, 30), (1301, 61), (1564, 118), (1231, 59)];
 
 #[test]
 fn it_decodes_to_the_values_printed() {
-    let Some(bytes) = data::for_test("S2 manual", "lidar3d/pcap/hdl64e_s2_manual_sample_packet.bin") else { return };
+    let Some(bytes) = recordings("S2 manual", "lidar3d/pcap/hdl64e_s2_manual_sample_packet.bin") else { return };
     let bytes = std::fs::read(bytes).unwrap();
     let packet = Packet::new(&bytes).unwrap();
     let blocks: Vec<_> = packet.blocks().collect();
@@ -28,8 +29,8 @@ fn it_decodes_to_the_values_printed() {
 #[test]
 fn the_capture_of_it_holds_the_same_bytes() {
     let folder = "lidar3d/pcap/hdl64e_s2_manual_sample_packet";
-    let Some(bytes) = data::for_test("S2 manual", &format!("{folder}.bin")) else { return };
-    let Some(capture) = data::for_test("S2 manual", &format!("{folder}.pcap")) else { return };
+    let Some(bytes) = recordings("S2 manual", &format!("{folder}.bin")) else { return };
+    let Some(capture) = recordings("S2 manual", &format!("{folder}.pcap")) else { return };
     let bytes = std::fs::read(bytes).unwrap();
     let mut angles = Vec::new();
     let seen = import::velodyne::for_each(&capture, |_, packet| {

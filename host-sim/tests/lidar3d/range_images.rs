@@ -1,19 +1,19 @@
 //! Range images of a real HDL-64E, packed as its sensor sends them and decoded again.
 
 use agv_core::measurement::Time;
-use agv_host_sim::data;
 use agv_host_sim::export::velodyne::CaptureWriter;
 use agv_host_sim::import::range_image::RangeImages;
 use agv_host_sim::import::velodyne;
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::{Decoder, Filter, Packet, Sensor};
+use agv_tests::recordings;
 use rayon::prelude::*;
 
 const FOLDER: &str = "lidar3d/moosmann/MuehlburgerTor/velodyne_dist";
 
 #[test]
 fn all_counts_come_back_from_the_points() {
-    let Some(folder) = data::for_test("range images as packets", FOLDER) else { return };
+    let Some(folder) = recordings("range images as packets", FOLDER) else { return };
     let images = RangeImages::open(&folder).unwrap();
     assert_eq!(images.files.len(), 501);
     let lasers = images.calibration().lasers;
@@ -51,7 +51,7 @@ fn all_counts_come_back_from_the_points() {
 
 #[test]
 fn a_capture_brings_back_the_packets_it_was_written_from() {
-    let Some(folder) = data::for_test("range images as packets", FOLDER) else { return };
+    let Some(folder) = recordings("range images as packets", FOLDER) else { return };
     let images = RangeImages::open(&folder).unwrap();
     let packets = images.packets(&images.counts(300).unwrap());
     let folder = tempfile::tempdir().unwrap();

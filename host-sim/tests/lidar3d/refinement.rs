@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use agv_host_sim::data;
 use agv_host_sim::import::poses;
 use agv_host_sim::import::range_image::RangeImages;
 use agv_host_sim::lidar3d::refinement::{Surfaces, Target};
 use agv_host_sim::lidar3d::signatures::{Signatures, sensor_height};
 use agv_lidar3d::cloud::Cloud;
+use agv_tests::recordings;
 
 const STREET: &str = "lidar3d/moosmann/MuehlburgerTor";
 
@@ -35,7 +35,7 @@ impl Street {
 
 #[test]
 fn a_scan_that_was_moved_is_brought_back() {
-    let Some(folder) = data::for_test("a_scan_that_was_moved_is_brought_back", STREET) else { return };
+    let Some(folder) = recordings("a_scan_that_was_moved_is_brought_back", STREET) else { return };
     let street = Street::open(&folder);
     let points = street.scan(100);
     let target = Target::new(Surfaces::new(&street.cloud(&points))).unwrap();
@@ -61,7 +61,7 @@ fn a_scan_that_was_moved_is_brought_back() {
 
 #[test]
 fn scans_of_a_street_lie_where_another_program_puts_them() {
-    let Some(folder) = data::for_test("scans_of_a_street_lie_where_another_program_puts_them", STREET) else { return };
+    let Some(folder) = recordings("scans_of_a_street_lie_where_another_program_puts_them", STREET) else { return };
     let street = Street::open(&folder);
     let height = sensor_height(&street.scan(0));
     let (mut errors, mut turns, mut asked) = (Vec::new(), Vec::new(), 0);

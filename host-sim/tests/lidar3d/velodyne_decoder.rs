@@ -1,34 +1,20 @@
 //! Points of captures, as velodyne_decoder of M. Valgur computes them.
 
 use std::path::Path;
-use std::process::Command;
 
-use agv_host_sim::data;
 use agv_host_sim::import::velodyne;
 use agv_lidar3d::calibration::Calibration;
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::{Decoder, Filter, Point, Sensor};
+use agv_tests::{python, recordings, repository};
 
 /// Greatest difference of a coordinate, m.
 const TOLERANCE: f32 = 0.001;
 
 /// x, y, z and intensity of each point. None if the package is not installed.
 fn theirs(capture: &Path, model: &str, calibration: &Path) -> Option<Vec<[f32; 4]>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let python = || {
-        let mut python = Command::new("python3");
-        // Where `cargo xtask test` puts packages that Debian does not have.
-        let inherited = std::env::var("PYTHONPATH").unwrap_or_default();
-        python.env("PYTHONPATH", format!("{}:{inherited}", folder.join("../target/python").display()));
-        python
-    };
-    let has_package = python().args(["-c", "import velodyne_decoder"]).output();
-    if !has_package.is_ok_and(|run| run.status.success()) {
-        data::skip("agreement with velodyne_decoder", "python3 with velodyne_decoder is not there");
-        return None;
-    }
-    let mut run = python();
-    run.arg(folder.join("tests/lidar3d/velodyne_points.py")).arg(capture).arg(model).arg(calibration);
+    let mut run = python("agreement with velodyne_decoder", "velodyne_decoder")?;
+    run.arg(repository("host-sim/tests/lidar3d/velodyne_points.py")).arg(capture).arg(model).arg(calibration);
     let output = run.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let (points, rest) = output.stdout.as_chunks::<16>();
@@ -48,8 +34,8 @@ fn ours(capture: &Path, sensor: Sensor, calibration: &Path) -> Vec<Point> {
 
 fn agree(capture: &str, sensor: Sensor, model: &str, calibration: &str) -> Option<usize> {
     let test = "agreement with velodyne_decoder";
-    let capture = data::for_test(test, &format!("lidar3d/pcap/{capture}"))?;
-    let calibration = data::for_test(test, &format!("lidar3d/calib/{calibration}"))?;
+    let capture = recordings(test, &format!("lidar3d/pcap/{capture}"))?;
+    let calibration = recordings(test, &format!("lidar3d/calib/{calibration}"))?;
     let theirs = theirs(&capture, model, &calibration)?;
     let ours = ours(&capture, sensor, &calibration);
     assert_eq!(ours.len(), theirs.len());

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use agv_core::measurement::Time;
 use agv_core::record::RawSource;
-use agv_host_sim::data;
 use agv_host_sim::import::capture;
 use agv_host_sim::import::raw::RawBytes;
 use agv_host_sim::import::tcp_stream::TcpStream;
+use agv_tests::recordings;
 use etherparse::PacketBuilder;
 use proptest::prelude::*;
 
@@ -173,7 +173,7 @@ fn a_cut_or_foreign_file_is_told() {
 #[test]
 fn a_real_capture_is_put_together() {
     let Some(file) =
-        data::for_test("a_real_capture_is_put_together", "nav350/other_sick_cola/xd_pcap_json_converter_test.pcapng")
+        recordings("a_real_capture_is_put_together", "nav350/other_sick_cola/xd_pcap_json_converter_test.pcapng")
     else {
         return;
     };

@@ -16,11 +16,8 @@ use crate::support::{Files, agv, text};
 const SECONDS: f64 = 60.0;
 
 #[test]
+#[ignore = "takes a minute of real time"]
 fn a_minute_at_8_hz_in_both_dialects_localises_as_simulated() {
-    if std::env::var_os("AGV_LONG").is_none() {
-        data::skip("a_minute_at_8_hz_in_both_dialects_localises_as_simulated", "it takes a minute: --long");
-        return;
-    }
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/warehouse_hall.toml");
     let simulated = simulate(&Scenario::read(&scenario).unwrap()).unwrap().recording;
     let drive = Drive::new(&simulated, SensorFrame::default()).unwrap();

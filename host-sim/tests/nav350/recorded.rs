@@ -7,7 +7,7 @@ use agv_core::wire::nav350::{
     MapConfiguration, Method, MethodName, MethodResult, Milliangle, NavigationData, OperatingMode, PoseDataFormat,
     Reflector, Request, RotationSpeed, ScanDataFormat, Setting, Size, SpeedReport, Variable, Velocity,
 };
-use agv_host_sim::data;
+use agv_tests::recordings;
 use serde_json::{Value, json};
 
 /// One line of a file of telegrams: whether the host sent it, and its bytes.
@@ -17,7 +17,7 @@ struct Line {
 }
 
 fn lines(test: &str, name: &str) -> Option<Vec<Line>> {
-    let text = std::fs::read_to_string(data::for_test(test, name)?).unwrap();
+    let text = std::fs::read_to_string(recordings(test, name)?).unwrap();
     let parse = |line: &str| {
         let mut words = line.split(' ').skip_while(|word| !word.contains("S>C") && !word.contains("C>S"));
         let is_request = words.next().unwrap() == "C>S";
@@ -271,7 +271,7 @@ fn printed(data: &NavigationData) -> [(&'static str, Value); 10] {
 fn data_are_what_the_makers_parser_has_printed() {
     let test = "data_are_what_the_makers_parser_has_printed";
     let Some(lines) = lines(test, "nav350/sick_serialised_mNPOSGetData.hexlines") else { return };
-    let Some(path) = data::for_test(test, "nav350/sick_serialised_mNPOSGetData.sick_parser_decoded.jsonl") else {
+    let Some(path) = recordings(test, "nav350/sick_serialised_mNPOSGetData.sick_parser_decoded.jsonl") else {
         return;
     };
     let text = std::fs::read_to_string(path).unwrap();

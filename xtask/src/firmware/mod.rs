@@ -72,7 +72,7 @@ pub fn build() -> anyhow::Result<()> {
 fn build_lidar3d() -> anyhow::Result<()> {
     let mut cargo = toolchain::cargo()?;
     cargo.args(["build", "--package", "agv-lidar3d", "--no-default-features", "--profile", "firmware"]);
-    cargo.args(["--target", image::TARGET, "--target-dir"]).arg(AN500.folder());
+    cargo.args(["--target", image::TARGET, "--target-dir"]).arg(image::build_folder());
     if !cargo.status().context("cargo cannot be started")?.success() {
         bail!("agv-lidar3d does not build without std");
     }
@@ -97,7 +97,7 @@ fn build_board(board: &Board, options: &[&str]) -> anyhow::Result<()> {
     let mut cargo = toolchain::cargo()?;
     cargo.args(["build", "--package", "agv-firmware", "--profile", "firmware"]);
     cargo.args(["--target", image::TARGET, "--features", board.feature, "--target-dir"]);
-    cargo.arg(board.folder());
+    cargo.arg(image::build_folder());
     for option in options {
         cargo.args(["--features", option]);
     }
@@ -107,7 +107,7 @@ fn build_board(board: &Board, options: &[&str]) -> anyhow::Result<()> {
     if !cargo.status().context("cargo cannot be started")?.success() {
         bail!("the firmware of {} does not build", board.feature);
     }
-    Ok(())
+    board.keep_images()
 }
 
 fn emulate(name: &str, icount: bool) -> anyhow::Result<()> {

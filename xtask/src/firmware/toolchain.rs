@@ -6,8 +6,8 @@ use std::process::Command;
 use anyhow::bail;
 
 use super::image::TARGET;
-use crate::packages;
 use crate::repository;
+use crate::requirements::debian;
 
 /// Compiler of Debian's package `rustc-web`, which comes with the sources of its own `core` in `rust-web-src`.
 const DEBIAN: &str = "/usr/bin/rustc";
@@ -23,8 +23,12 @@ pub fn cargo() -> anyhow::Result<Command> {
     if has_target() {
         return Ok(cargo);
     }
-    if !has_sources() {
-        packages::install(&["rustc-web", "rust-web-src"]);
+    for package in ["rustc-web", "rust-web-src"] {
+        if !has_sources()
+            && let Err(why) = debian::install(package)
+        {
+            eprintln!("{package} is not installed: {why}");
+        }
     }
     if !has_sources() {
         bail!("nothing here builds for {TARGET}: `rustup target add {TARGET}`, or Debian's rustc-web and rust-web-src");

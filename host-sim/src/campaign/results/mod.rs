@@ -1,21 +1,23 @@
 //! What became of the runs of a campaign, as a file in Apache Parquet.
 
-use std::fs::File;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+#[cfg(feature = "tables")]
+mod file;
+#[cfg(not(feature = "tables"))]
+#[path = "no_file.rs"]
+mod file;
 
-use parquet::basic::Compression;
-use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
-use parquet::file::writer::SerializedFileWriter;
-use parquet::record::{RecordReader as _, RecordWriter as _};
+use std::path::PathBuf;
+
+#[cfg(feature = "tables")]
 use parquet_derive::{ParquetRecordReader, ParquetRecordWriter};
 use serde::Serialize;
 
 use super::verdict::{Class, Verdict};
+pub use file::{read, write};
 
 /// One run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, ParquetRecordWriter, ParquetRecordReader)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(feature = "tables", derive(ParquetRecordWriter, ParquetRecordReader))]
 pub struct Row {
     /// Place of the run in the campaign.
     pub run: i64,
@@ -62,6 +64,9 @@ pub enum ResultsError {
         /// Why not.
         source: std::io::Error,
     },
+    /// This program was built without tables.
+    #[error(transparent)]
+    LeftOut(#[from] crate::left_out::LeftOut),
     /// The file is no table of results.
     #[error("{path} is not a table of a campaign's results: {problem}")]
     Format {
@@ -124,46 +129,4 @@ impl Row {
     pub fn class(&self) -> Option<Class> {
         CLASSES.iter().find(|(_, name)| *name == self.class).map(|(class, _)| *class)
     }
-}
-
-/// Writes rows. The same rows make the same bytes.
-///
-/// # Errors
-/// See [`ResultsError`].
-pub fn write(path: &Path, rows: &[Row]) -> Result<(), ResultsError> {
-    let format = |problem: parquet::errors::ParquetError| ResultsError::Format {
-        path: path.to_path_buf(),
-        problem: problem.to_string(),
-    };
-    let schema = rows.schema().map_err(format)?;
-    let file = File::create(path).map_err(|source| ResultsError::Io { path: path.to_path_buf(), source })?;
-    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).map_err(format)?;
-    let mut group = writer.next_row_group().map_err(format)?;
-    rows.write_to_row_group(&mut group).map_err(format)?;
-    group.close().map_err(format)?;
-    writer.close().map_err(format)?;
-    Ok(())
-}
-
-/// Reads rows.
-///
-/// # Errors
-/// See [`ResultsError`].
-pub fn read(path: &Path) -> Result<Vec<Row>, ResultsError> {
-    let format = |problem: parquet::errors::ParquetError| ResultsError::Format {
-        path: path.to_path_buf(),
-        problem: problem.to_string(),
-    };
-    let file = File::open(path).map_err(|source| ResultsError::Io { path: path.to_path_buf(), source })?;
-    let reader = SerializedFileReader::new(file).map_err(format)?;
-    let mut rows: Vec<Row> = Vec::new();
-    for index in 0..reader.num_row_groups() {
-        let mut group = reader.get_row_group(index).map_err(format)?;
-        let count = group.metadata().num_rows() as usize;
-        let mut some: Vec<Row> = Vec::new();
-        some.read_from_row_group(&mut *group, count).map_err(format)?;
-        rows.extend(some);
-    }
-    Ok(rows)
 }

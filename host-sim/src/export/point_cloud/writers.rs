@@ -1,8 +1,8 @@
-//! Point clouds for other programs: PCD, PLY and LAS.
+//! The formats of point clouds.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_lidar3d::packet::Point;
 use pcd_rs::{DataKind, PcdSerialize, Schema, ValueKind, WriterInit};
@@ -11,82 +11,7 @@ use ply_rs_bw::ply::{Addable, ElementDef, Encoding, Ply, PropertyAccess, Propert
 /// Length of a count of a coordinate in LAS, m.
 const LAS_RESOLUTION: f64 = 1e-4;
 
-/// Why a cloud could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum PointCloudError {
-    /// The ending of the name is none of those that are known.
-    #[error("{}: the name does not end in .pcd, .ply or .las", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file cannot be written.
-    #[error("{}: {reason}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system or the format says.
-        reason: String,
-    },
-}
-
-/// A format of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Point Cloud Library.
-    Pcd,
-    /// Stanford polygon file.
-    Ply,
-    /// ASPRS LAS 1.2.
-    Las,
-}
-
-impl Format {
-    /// By the ending of a name.
-    ///
-    /// # Errors
-    /// [`PointCloudError::Format`].
-    pub fn of(path: &Path) -> Result<Self, PointCloudError> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-        match ending.as_deref() {
-            Some("pcd") => Ok(Self::Pcd),
-            Some("ply") => Ok(Self::Ply),
-            Some("las") => Ok(Self::Las),
-            _ => Err(PointCloudError::Format { path: path.to_owned() }),
-        }
-    }
-}
-
-/// Writes points: x, y, z in m, intensity and the number of the laser (in LAS: user data).
-///
-/// # Errors
-/// See [`PointCloudError`].
-pub fn write(path: &Path, points: &[Point]) -> Result<(), PointCloudError> {
-    let outcome = match Format::of(path)? {
-        Format::Pcd => write_pcd(path, points.iter().map(|point| PcdPoint(Some(*point))), points.len(), 1),
-        Format::Ply => write_ply(path, points).map_err(|error| error.to_string()),
-        Format::Las => write_las(path, points).map_err(|error| error.to_string()),
-    };
-    outcome.map_err(|reason| PointCloudError::Write { path: path.to_owned(), reason })
-}
-
-/// Writes an organised cloud as PCD: a ring a row, not a number where nothing was seen.
-///
-/// # Errors
-/// See [`PointCloudError`].
-pub fn write_organised(path: &Path, cloud: &[Option<[f32; 3]>], rings: usize) -> Result<(), PointCloudError> {
-    if Format::of(path)? != Format::Pcd {
-        let reason = "only PCD holds organised clouds".to_owned();
-        return Err(PointCloudError::Write { path: path.to_owned(), reason });
-    }
-    let columns = cloud.len() / rings.max(1);
-    let points = cloud.iter().enumerate().map(|(place, position)| {
-        let laser = (place / columns.max(1)) as u8;
-        PcdPoint(position.map(|position| Point { position, azimuth: 0, laser, intensity: 0 }))
-    });
-    write_pcd(path, points, columns, rings).map_err(|reason| PointCloudError::Write { path: path.to_owned(), reason })
-}
-
+/// A point as the writer of PCD asks for it.
 struct PcdPoint(Option<Point>);
 
 impl PcdSerialize for PcdPoint {
@@ -119,7 +44,13 @@ impl PcdSerialize for PcdPoint {
     }
 }
 
-fn write_pcd(path: &Path, points: impl Iterator<Item = PcdPoint>, width: usize, height: usize) -> Result<(), String> {
+/// Writes points, or not a number where there is none, as PCD of `height` rows.
+pub(super) fn write_pcd(
+    path: &Path,
+    points: impl Iterator<Item = Option<Point>>,
+    width: usize,
+    height: usize,
+) -> Result<(), String> {
     let init = WriterInit {
         width: width as u64,
         height: height as u64,
@@ -130,7 +61,7 @@ fn write_pcd(path: &Path, points: impl Iterator<Item = PcdPoint>, width: usize, 
     };
     let mut writer = init.create(path).map_err(|error| error.to_string())?;
     for point in points {
-        writer.push(&point).map_err(|error| error.to_string())?;
+        writer.push(&PcdPoint(point)).map_err(|error| error.to_string())?;
     }
     writer.finish().map_err(|error| error.to_string())
 }
@@ -162,7 +93,12 @@ impl PropertyAccess for PlyPoint {
     }
 }
 
-fn write_ply(path: &Path, points: &[Point]) -> io::Result<()> {
+/// Writes points as PLY.
+pub(super) fn write_ply(path: &Path, points: &[Point]) -> Result<(), String> {
+    try_ply(path, points).map_err(|error| error.to_string())
+}
+
+fn try_ply(path: &Path, points: &[Point]) -> io::Result<()> {
     let mut element = ElementDef::new("vertex".to_owned());
     for name in ["x", "y", "z"] {
         element.properties.add(PropertyDef::new(name.to_owned(), PropertyType::Scalar(ScalarType::Float)));
@@ -179,7 +115,12 @@ fn write_ply(path: &Path, points: &[Point]) -> io::Result<()> {
     file.flush()
 }
 
-fn write_las(path: &Path, points: &[Point]) -> las::Result<()> {
+/// Writes points as LAS.
+pub(super) fn write_las(path: &Path, points: &[Point]) -> Result<(), String> {
+    try_las(path, points).map_err(|error| error.to_string())
+}
+
+fn try_las(path: &Path, points: &[Point]) -> las::Result<()> {
     let mut builder = las::Builder::from((1, 2));
     let transform = las::Transform { scale: LAS_RESOLUTION, offset: 0.0 };
     builder.transforms = las::Vector { x: transform, y: transform, z: transform };

@@ -1,12 +1,19 @@
 //! `agv export`.
 
+#[cfg(feature = "bags")]
+mod messages;
+#[cfg(not(feature = "bags"))]
+#[path = "no_messages.rs"]
+mod messages;
+
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use agv_host_sim::evaluate::drive::Track;
-use agv_host_sim::export::{answered, candump, csv, mcap, rosbag2, tum};
+use agv_host_sim::export::{answered, candump, csv, tum};
+use agv_host_sim::left_out;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::Replay;
 use anyhow::{Context, bail, ensure};
@@ -87,18 +94,14 @@ impl Export {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.format {
-            Format::Mcap(command) => command.run_messages(mcap::write),
-            Format::Rosbag2(command) => command.run_messages(rosbag2::write),
+            Format::Mcap(command) => command.run_messages(messages::mcap),
+            Format::Rosbag2(command) => command.run_messages(messages::rosbag2),
             Format::Csv(command) => command.run_csv(),
             Format::Tum(command) => command.run(),
             Format::Candump(command) => command.run(),
         }
     }
 }
-
-/// How a drive becomes messages.
-type WriteMessages =
-    fn(&Path, &Recording, &Replay, Box<dyn FnMut(usize)>) -> Result<mcap::McapSummary, mcap::McapExportError>;
 
 fn create(path: &Path) -> anyhow::Result<BufWriter<File>> {
     Ok(BufWriter::new(File::create(path).with_context(|| path.display().to_string())?))
@@ -126,13 +129,14 @@ impl Drive {
         Ok(answered)
     }
 
-    fn run_messages(self, write: WriteMessages) -> anyhow::Result<()> {
+    fn run_messages(self, write: messages::Write) -> anyhow::Result<()> {
+        left_out::BAGS.check()?;
         let (recording, answers) = self.read()?;
         let bar = progress::bar("writing", recording.events.len() as u64);
         let shown = bar.clone();
-        let summary = write(&self.output, &recording, &answers, Box::new(move |done| shown.set_position(done as u64)))?;
+        let counts = write(&self.output, &recording, &answers, Box::new(move |done| shown.set_position(done as u64)))?;
         bar.finish_and_clear();
-        print_counts(&summary.messages, self.json)
+        print_counts(&counts, self.json)
     }
 
     fn run_csv(self) -> anyhow::Result<()> {

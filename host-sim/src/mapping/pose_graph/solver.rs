@@ -1,4 +1,4 @@
-//! Poses that agree best with what is known of pairs of them.
+//! One solution of a pose graph, by Levenberg and Marquardt.
 
 use agv_core::geometry::Pose;
 use factrs::core::{BetweenResidual, GemanMcClure, Graph, LevenMarquardt, PriorResidual, SE2, Values};
@@ -6,7 +6,8 @@ use factrs::fac;
 use factrs::noise::GaussianNoise;
 use factrs::optimizers::OptError;
 use factrs::traits::Optimizer;
-use nalgebra::Matrix3;
+
+use super::{Edge, PoseGraphError};
 
 mod symbol {
     #![allow(missing_docs, reason = "the macro documents nothing")]
@@ -17,61 +18,11 @@ mod symbol {
 }
 use symbol::X;
 
-/// What is known of two poses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
-    /// Number of the pose in whose frame the displacement is given.
-    pub from: usize,
-    /// Number of the other pose.
-    pub to: usize,
-    /// Pose of `to` in the frame of `from`.
-    pub displacement: Pose,
-    /// Inverse of its covariance: x, y in the frame of `to` (m), heading (rad).
-    pub information: Matrix3<f64>,
-    /// Whether it may be wrong altogether.
-    pub is_doubtful: bool,
-}
-
-impl Edge {
-    /// What remains of the edge at these poses: the displacement that the edge would have to be corrected by.
-    #[must_use]
-    pub fn error(&self, poses: &[Pose]) -> Pose {
-        self.displacement.between(&poses[self.from].between(&poses[self.to]))
-    }
-}
-
-/// Why poses cannot be found.
-#[derive(Debug, thiserror::Error)]
-pub enum PoseGraphError {
-    /// The solver gave up.
-    #[error("the pose graph cannot be solved: {0}")]
-    Unsolvable(String),
-    /// What is known of an edge is no information.
-    #[error("the information of the edge from {0} to {1} is not positive definite")]
-    NotDefinite(usize, usize),
-}
-
 /// Deviation of the first pose, which is held, m and rad.
 const HELD: f64 = 1e-3;
 
-/// Error of a doubtful edge, in standard deviations, at which it loses most of its weight: from one that leaves all edges
-/// theirs to the last.
-const DOUBT: [f64; 6] = [1000.0, 300.0, 100.0, 30.0, 10.0, 4.0];
-
-/// Moves poses to where they agree best with the edges; the first one stays. Edges that may be wrong lose their weight
-/// where they disagree (Geman and McClure's loss), little at first and more as the poses settle: no start is needed that
-/// is near the solution.
-///
-/// # Errors
-/// See [`PoseGraphError`].
-pub fn optimise(poses: &[Pose], edges: &[Edge]) -> Result<Vec<Pose>, PoseGraphError> {
-    let is_doubtful = edges.iter().any(|edge| edge.is_doubtful);
-    let rounds = if is_doubtful { DOUBT.as_slice() } else { &DOUBT[..1] };
-    rounds.iter().try_fold(poses.to_vec(), |poses, &doubt| settle(&poses, edges, doubt))
-}
-
 /// Solves the graph with one loss for the edges that may be wrong.
-fn settle(poses: &[Pose], edges: &[Edge], doubt: f64) -> Result<Vec<Pose>, PoseGraphError> {
+pub(super) fn settle(poses: &[Pose], edges: &[Edge], doubt: f64) -> Result<Vec<Pose>, PoseGraphError> {
     let mut values = Values::new();
     for (number, pose) in (0..).zip(poses) {
         values.insert(X(number), SE2::new(pose.theta, pose.x, pose.y));

@@ -1,0 +1,69 @@
+//! The Python of the tests: an environment of the project's own, so that it does not matter whose `python3` is on the path.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::{debian, install, succeeds};
+use crate::repository;
+
+/// Packages, and the modules that they bring.
+const PACKAGES: [(&str, &str); 11] = [
+    ("numpy>=1.24,<3", "numpy"),
+    ("scipy>=1.10,<2", "scipy"),
+    ("shapely>=2,<3", "shapely"),
+    ("cantools>=39,<50", "cantools"),
+    ("canopen>=2.2,<3", "canopen"),
+    ("mcap>=1.2,<2", "mcap"),
+    ("mcap-ros2-support>=0.5,<1", "mcap_ros2"),
+    ("rosbags>=0.10,<1", "rosbags"),
+    ("evo>=1.30,<2", "evo"),
+    ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
+    (include_str!("../../../host-sim/ray/requirements.txt").trim_ascii(), "ray"),
+];
+
+/// Debian's own, for machines whose first `python3` cannot make environments.
+const DEBIAN: &str = "/usr/bin/python3";
+
+/// Makes the environment. Returns what is still missing, one line each.
+pub fn prepare() -> Vec<String> {
+    let folder = repository().join("target/python");
+    let python = folder.join("bin/python3");
+    let is_missing = |(_, module): &(&str, &str)| !has(&python, module);
+    let missing: Vec<&str> = PACKAGES.into_iter().filter(is_missing).map(|(package, _)| package).collect();
+    if missing.is_empty() {
+        return Vec::new();
+    }
+    if !has(&python, "pip")
+        && let Err(why) = make(&folder)
+    {
+        return vec![format!("missing: Python for the tests; install the Debian package python3-venv: {why}")];
+    }
+    eprintln!("installing {} into {}", missing.join(" "), folder.display());
+    // Installed together they agree about what they share. If one cannot be had, the others are installed all the same.
+    let _ = pip(&python, &missing);
+    let still_missing = PACKAGES.into_iter().filter(is_missing);
+    still_missing
+        .filter_map(|package @ (name, _)| {
+            let why = pip(&python, &[name]).err().unwrap_or_else(|| "it cannot be imported".to_owned());
+            is_missing(&package).then(|| format!("missing: {name} in {}: {why}", folder.display()))
+        })
+        .collect()
+}
+
+fn has(python: &Path, module: &str) -> bool {
+    succeeds(Command::new(python).args(["-c", &format!("import {module}")]))
+}
+
+fn make(folder: &Path) -> Result<(), String> {
+    let venv = |python: &Path| install(Command::new(python).args(["-m", "venv", "--clear"]).arg(folder));
+    let first = PathBuf::from("python3");
+    venv(&first).or_else(|why| {
+        debian::install("python3-venv").map_err(|debian| format!("{why}\n{debian}"))?;
+        venv(Path::new(DEBIAN))
+    })
+}
+
+fn pip(python: &Path, packages: &[&str]) -> Result<(), String> {
+    let arguments = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+    install(Command::new(python).args(arguments).args(packages))
+}
