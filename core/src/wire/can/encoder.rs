@@ -73,7 +73,8 @@ pub struct EncoderSettings {
     pub heartbeat: u16,
     /// How long it may think about an answer, s.
     pub answer_timeout: f64,
-    /// Its range, where the one that it tells is wrong.
+    /// The range that its counter is read with, if it is known. A node that tells another one is set up nevertheless:
+    /// see [`Identity::tells_other_range`].
     pub range: Option<CounterRange>,
 }
 
@@ -100,6 +101,8 @@ pub struct Identity {
     pub mapping: PdoMapping,
     /// How many settings it did not take.
     pub refused_settings: u8,
+    /// Whether it tells another range than the one in its settings, so that its counter wraps elsewhere.
+    pub tells_other_range: bool,
 }
 
 /// Why an encoder could not be set up. The master tries again.
@@ -207,6 +210,7 @@ impl Encoder {
             pdo_id: None,
             mapping: PdoMapping::new(),
             refused_settings: 0,
+            tells_other_range: false,
         };
         Self {
             settings,
@@ -447,8 +451,10 @@ impl Encoder {
                 Step::ReadRange
             }
             Step::ReadRange => {
-                let range = self.settings.range.or(value.and_then(range_of));
-                identity.range = range.ok_or(SetupError::NoRange)?;
+                let told = value.and_then(range_of);
+                identity.range = self.settings.range.or(told).ok_or(SetupError::NoRange)?;
+                identity.tells_other_range =
+                    told.is_some() && !value.is_some_and(|told| is_range(told, identity.range));
                 Step::ReadResolution
             }
             Step::ReadResolution => {
@@ -530,6 +536,11 @@ impl Encoder {
         };
         EncoderEvent::Started
     }
+}
+
+/// Whether 6002h tells that range, as the number of positions or as the largest one.
+fn is_range(told: u32, range: CounterRange) -> bool {
+    matches!(range.values().checked_sub(u64::from(told)), Some(0 | 1))
 }
 
 /// The range that 6002h tells. Many devices tell the largest position instead of the number of positions: all bits one.
