@@ -101,6 +101,8 @@ pub struct Identity {
     pub mapping: PdoMapping,
     /// How many settings it did not take.
     pub refused_settings: u8,
+    /// Whether it took the timer and the transmission type that obeys it. Without them it reports as it likes.
+    pub keeps_timer: bool,
     /// Whether it tells another range than the one in its settings, so that its counter wraps elsewhere.
     pub tells_other_range: bool,
 }
@@ -210,6 +212,7 @@ impl Encoder {
             pdo_id: None,
             mapping: PdoMapping::new(),
             refused_settings: 0,
+            keeps_timer: false,
             tells_other_range: false,
         };
         Self {
@@ -344,8 +347,7 @@ impl Encoder {
         }
         let time = match (self.settings.reporting, self.last_sync) {
             (Reporting::Synchronous, Some(sync)) => sync,
-            // A node that does not take the timer reports as it likes.
-            (Reporting::Timer { .. }, _) if self.identity.refused_settings == 0 => self.reports.time(time),
+            (Reporting::Timer { .. }, _) if self.identity.keeps_timer => self.reports.time(time),
             _ => time,
         };
         Some(EncoderReading { time, position, speed })
@@ -382,6 +384,7 @@ impl Encoder {
         self.identity.pdo_id = None;
         self.identity.mapping = PdoMapping::new();
         self.identity.refused_settings = 0;
+        self.identity.keeps_timer = false;
         self.phase = Phase::Setup(Step::ReadUnits);
     }
 
@@ -498,6 +501,7 @@ impl Encoder {
             }
             Step::WriteTransmission => {
                 identity.refused_settings += u8::from(!is_ok);
+                identity.keeps_timer = is_ok;
                 if self.settings.reporting == Reporting::Synchronous {
                     return Ok(self.write_heartbeat());
                 }
@@ -511,6 +515,7 @@ impl Encoder {
             Step::WriteEventTimer => return Ok(self.write_heartbeat()),
             Step::WriteCyclicTimer => {
                 identity.refused_settings += u8::from(!is_ok);
+                identity.keeps_timer &= is_ok;
                 return Ok(self.write_heartbeat());
             }
             Step::WriteHeartbeat => {
