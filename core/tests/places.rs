@@ -213,6 +213,22 @@ fn associations_find_the_pose_among_points_that_only_one_scan_has() {
 }
 
 #[test]
+fn votes_find_the_pose_however_many_keypoints_there_are() {
+    let mut hough = Box::<AffineHough>::default();
+    let pose = Pose::new(0.75, -0.55, 0.2);
+    let wide = HoughParameters { cell: 0.3, ..HoughParameters::default() };
+    for common in [254, 255, 256, 257, 300] {
+        let mut random = Random(common as u64);
+        let mut place = || Point::new(30.0 * random.unit() - 15.0, 30.0 * random.unit() - 15.0);
+        let target: Vec<_> = (0..common).map(|_| keypoint(place(), 0.0)).collect();
+        let source: Vec<_> =
+            target.iter().map(|one| keypoint(pose.inverse_transform(&one.position.cast()), -pose.theta)).collect();
+        let found = hough.associate(&source, &target, &wide).unwrap();
+        assert!(is_near(&found.pose, &pose), "{common}: {found:?} {pose:?}");
+    }
+}
+
+#[test]
 fn mirror_images_are_refused() {
     let mut graph = Box::new(CorrespondenceGraph::<512, 16>::new());
     for seed in 0..40 {
