@@ -30,6 +30,20 @@ proptest! {
         prop_assert_eq!(range.step(from as u32, to), step);
     }
 
+    /// Ranges come from records and files, too.
+    #[test]
+    fn a_range_that_no_counter_has_is_read_from_nowhere(values in prop_oneof![0_u64..4, any::<u32>().prop_map(u64::from), (1_u64 << 32) - 2..=(1 << 32) + 2, any::<u64>()]) {
+        let mut room = [0; 16];
+        let bytes = postcard::to_slice(&values, &mut room).unwrap();
+        let read = postcard::from_bytes::<CounterRange>(bytes).ok();
+        prop_assert_eq!(read, CounterRange::new(values));
+        prop_assert_eq!(read.is_some(), (2..=1 << 32).contains(&values));
+        if let Some(range) = read {
+            let mut again = [0; 16];
+            prop_assert_eq!(&*bytes, &*postcard::to_slice(&range, &mut again).unwrap());
+        }
+    }
+
     #[test]
     fn the_control_jacobian_is_a_finite_difference(
         distance in -0.5f64..0.5, start in -1.2f64..1.2, change in -0.1f64..0.1,

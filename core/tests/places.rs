@@ -213,6 +213,22 @@ fn associations_find_the_pose_among_points_that_only_one_scan_has() {
 }
 
 #[test]
+fn votes_find_the_pose_however_many_keypoints_there_are() {
+    let mut hough = Box::<AffineHough>::default();
+    let pose = Pose::new(0.75, -0.55, 0.2);
+    let wide = HoughParameters { cell: 0.3, ..HoughParameters::default() };
+    for common in [254, 255, 256, 257, 300] {
+        let mut random = Random(common as u64);
+        let mut place = || Point::new(30.0 * random.unit() - 15.0, 30.0 * random.unit() - 15.0);
+        let target: Vec<_> = (0..common).map(|_| keypoint(place(), 0.0)).collect();
+        let source: Vec<_> =
+            target.iter().map(|one| keypoint(pose.inverse_transform(&one.position.cast()), -pose.theta)).collect();
+        let found = hough.associate(&source, &target, &wide).unwrap();
+        assert!(is_near(&found.pose, &pose), "{common}: {found:?} {pose:?}");
+    }
+}
+
+#[test]
 fn mirror_images_are_refused() {
     let mut graph = Box::new(CorrespondenceGraph::<512, 16>::new());
     for seed in 0..40 {
@@ -234,10 +250,15 @@ fn mirror_images_are_refused() {
 
 /// A room whose walls are lines, seen from inside.
 fn room(pose: &Pose, beams: usize) -> Box<PointScan<720>> {
+    room_swept(pose, -PI, 2.0 * PI / beams as f64, beams)
+}
+
+/// The same room as a sweep from `first_bearing` in steps of `bearing_step`, rad, sees it.
+fn room_swept(pose: &Pose, first_bearing: f64, bearing_step: f64, beams: usize) -> Box<PointScan<720>> {
     let corners = [(-4.0, -3.0), (5.0, -3.0), (5.0, 1.0), (3.0, 1.0), (3.0, 4.0), (-4.0, 4.0)];
     let ranges: Vec<f32> = (0..beams)
         .map(|beam| {
-            let angle = pose.theta - PI + 2.0 * PI * beam as f64 / beams as f64;
+            let angle = pose.theta + first_bearing + bearing_step * beam as f64;
             let (sine, cosine) = angle.sin_cos();
             let mut nearest = f64::INFINITY;
             for (index, (ax, ay)) in corners.iter().enumerate() {
@@ -260,8 +281,8 @@ fn room(pose: &Pose, beams: usize) -> Box<PointScan<720>> {
     let scan = Scan {
         start: Time::default(),
         beam_interval: 0.0,
-        first_bearing: -PI,
-        bearing_step: 2.0 * PI / beams as f64,
+        first_bearing,
+        bearing_step,
         ranges: &ranges,
         intensities: &[],
     };
@@ -285,6 +306,31 @@ fn scans_of_a_room_are_aligned_and_agree_only_where_they_were_taken() {
     let wrong = overlap(&source, &target, &truth.compose(&Pose::new(1.5, 0.5, 1.0)), &parameters);
     assert!(right.agreement() > 0.97 && right.contradicting == 0, "{right:?}");
     assert!(wrong.agreement() < 0.5 && wrong.contradicting > 100, "{wrong:?}");
+}
+
+#[test]
+fn the_sense_in_which_a_laser_turns_and_where_it_begins_do_not_matter() {
+    let (first, second) = (Pose::new(0.0, 0.0, 0.3), Pose::new(0.4, -0.3, 0.1));
+    let truth = second.between(&first);
+    let start = truth.compose(&Pose::new(0.15, -0.1, 0.04));
+    let step = PI / 180.0;
+    // A circle, and three quarters of one that are about the front.
+    for (beams, begins) in [(360, [-PI, 0.0, 2.0, 4.0]), (270, [-2.35, -2.4, -2.3, -2.35 - 2.0 * PI])] {
+        let sweep = |pose, begin: f64, is_clockwise| {
+            let sign = if is_clockwise { -1.0 } else { 1.0 };
+            room_swept(pose, sign * begin, sign * step, beams)
+        };
+        for (begin, senses) in begins.iter().flat_map(|begin| (0..4).map(|senses| (*begin, senses))) {
+            let (source, target) = (sweep(&first, begin, senses & 1 != 0), sweep(&second, begin, senses & 2 != 0));
+            let found = align_scans(&source, &target, &start, &ScanAlignmentParameters::default()).unwrap();
+            let error = truth.between(&found.pose);
+            assert!(error.position().norm() < 5e-3 && error.theta.abs() < 1e-3, "{beams} {begin} {senses}: {error:?}");
+            let right = overlap(&source, &target, &truth, &OverlapParameters::default());
+            assert!(right.agreement() > 0.97 && right.contradicting == 0, "{beams} {begin} {senses}: {right:?}");
+            // Beams that look where the other sensor's do not.
+            assert!(right.outside <= if beams == 360 { 0 } else { 20 }, "{beams} {begin} {senses}: {right:?}");
+        }
+    }
 }
 
 #[test]

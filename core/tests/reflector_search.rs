@@ -126,6 +126,41 @@ proptest! {
     }
 }
 
+/// What a revolution may see at most, and maps in which most pairs of it are like most pairs of the map.
+#[test]
+fn no_step_takes_much_more_than_its_slice() {
+    const SLICE: u32 = 2_000;
+    let lattice = |count: usize, columns: usize, spacing: f64| -> Vec<Point> {
+        let place = |number: usize| Point::new((number % columns) as f64, (number / columns) as f64) * spacing;
+        (0..count).map(place).collect()
+    };
+    for (columns, seen_columns, spacing) in [(40, 8, 2.5), (25, 8, 1.0), (1000, 64, 3.0)] {
+        let map_positions = lattice(1000, columns, spacing);
+        let seen_positions = lattice(64, seen_columns, spacing);
+        let (mut map, mut index) = (Box::new(FixedMap::<1000>::new()), Box::new(ReflectorIndex::<1024>::new()));
+        for (id, position) in (0..).zip(&map_positions) {
+            map.extend(&[Landmark::reflector(id, *position, 0.002)]).unwrap();
+        }
+        index.build(&map);
+        let reflectors = IndexedReflectors { map: &map, index: &index };
+        let mut snapshot = ReflectorSnapshot::<64>::new();
+        for position in &seen_positions {
+            snapshot.see(position, position.norm(), &ReflectorNoise::default());
+        }
+        assert_eq!(snapshot.reflectors().len(), 64);
+        let mut relocalizer = ReflectorRelocalizer::<64>::new(RelocalizationParameters::default());
+        relocalizer.begin(&snapshot, &reflectors);
+        let mut worst = 0;
+        for _ in 0..3_000 {
+            if let RelocalizationProgress::Done(_) = relocalizer.advance(&reflectors, SLICE) {
+                break;
+            }
+            worst = worst.max(relocalizer.debt());
+        }
+        assert!(worst > 0 && worst < 2 * SLICE, "{columns} columns: {worst} beyond a slice of {SLICE}");
+    }
+}
+
 #[test]
 fn three_reflectors_are_too_few() {
     let positions = [Point::new(1.0, 2.0), Point::new(5.0, 1.0), Point::new(3.0, 9.0)];

@@ -1,6 +1,6 @@
 //! What is expected of the encoders, from the settings.
 
-use agv_core::odometry::Vehicle;
+use agv_core::odometry::{Tricycle, Vehicle};
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
 use agv_core::wire::can::encoder_pair::ChannelSettings;
@@ -30,19 +30,27 @@ const FIRST: NodeId = match NodeId::new(1) {
 /// The driving wheel's encoder, and the steering's.
 #[must_use]
 pub fn channels(settings: &Settings) -> [ChannelSettings; 2] {
-    let (drive_scale, steering_scale) = match settings.parameters.vehicle {
-        Vehicle::Tricycle(vehicle) => (vehicle.drive_scale.abs(), vehicle.steering_scale.abs()),
-        _ => (1.0, 1.0),
+    let (drive_scale, steering_scale, drive_range, steering_range) = match settings.parameters.vehicle {
+        Vehicle::Tricycle(Tricycle { drive_scale, steering_scale, drive_range, steering_range, .. }) => {
+            (drive_scale.abs(), steering_scale.abs(), Some(drive_range), Some(steering_range))
+        }
+        _ => (1.0, 1.0, None, None),
     };
-    let channel = |number, fastest, braking| ChannelSettings {
+    let channel = |number, range, fastest, braking| ChannelSettings {
         encoder: EncoderSettings {
             reporting: Reporting::Timer { period: settings.encoder_period },
+            range,
             ..EncoderSettings::new(node(number))
         },
         limits: SupervisionLimits::every(1e-3 * f64::from(settings.encoder_period), fastest, braking),
     };
     [
-        channel(settings.nodes.drive, settings.parameters.limits.fastest / drive_scale, BRAKING / drive_scale),
-        channel(settings.nodes.steering, STEERING.0 / steering_scale, STEERING.1 / steering_scale),
+        channel(
+            settings.nodes.drive,
+            drive_range,
+            settings.parameters.limits.fastest / drive_scale,
+            BRAKING / drive_scale,
+        ),
+        channel(settings.nodes.steering, steering_range, STEERING.0 / steering_scale, STEERING.1 / steering_scale),
     ]
 }

@@ -125,11 +125,18 @@ impl Disc {
     }
 }
 
-/// Number of beams whose directions differ by less than asin(`sine`); possibly one more, never one less.
+/// Number of beams to each side that may meet a disc whose radius is `sine` of its centre's range: those whose directions
+/// differ by less than asin(`sine`), or all of half a turn if the sensor is in the disc. Possibly a few more, never one less.
 #[inline]
 pub(super) fn beams_within(sine: f32, bearing_step: f32) -> usize {
-    // x + x^3 / 4 is never below asin(x) for x up to 0.8, and close to it for the small x of most neighbourhoods.
-    let angle = sine * (1.0 + 0.25 * sine * sine);
+    let angle = if sine <= 0.8 {
+        // Never below asin(x), and close to it for the small x of most neighbourhoods.
+        sine * (1.0 + 0.25 * sine * sine)
+    } else if sine < 1.0 {
+        libm::asinf(sine)
+    } else {
+        core::f32::consts::PI
+    };
     // As many as there are numbers, if beams hardly differ.
     ((angle / bearing_step) as usize).saturating_add(1)
 }

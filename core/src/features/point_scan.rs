@@ -16,6 +16,8 @@ pub struct PointScan<const BEAMS: usize> {
     pub first_bearing: f32,
     /// Angle between neighbouring beams, rad, positive.
     pub bearing_step: f32,
+    /// Whether beams follow one another clockwise.
+    pub is_clockwise: bool,
     /// Whether the last beam and the first one are neighbours.
     pub is_full_circle: bool,
 }
@@ -24,7 +26,14 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
     /// An empty scan.
     #[must_use]
     pub const fn new() -> Self {
-        Self { points: Vec::new(), ranges: Vec::new(), first_bearing: 0.0, bearing_step: 0.0, is_full_circle: false }
+        Self {
+            points: Vec::new(),
+            ranges: Vec::new(),
+            first_bearing: 0.0,
+            bearing_step: 0.0,
+            is_clockwise: false,
+            is_full_circle: false,
+        }
     }
 
     /// Replaces the content by the points of `scan` in S, as if all beams were simultaneous. Ranges that are not
@@ -34,6 +43,7 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
         self.ranges.clear();
         self.first_bearing = scan.first_bearing as f32;
         self.bearing_step = libm::fabs(scan.bearing_step) as f32;
+        self.is_clockwise = scan.bearing_step < 0.0;
         self.is_full_circle = scan.is_full_circle() && scan.ranges.len() <= BEAMS;
         let (step_sine, step_cosine) = libm::sincos(scan.bearing_step);
         let (mut sine, mut cosine) = libm::sincos(scan.first_bearing);

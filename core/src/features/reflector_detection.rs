@@ -27,34 +27,106 @@ impl Default for ReflectorDetection {
     }
 }
 
+/// Most single weak or missing beams that lie next to each other in a reflector, and one.
+const LONGEST_STEP: usize = 2;
+
 /// Beams that belong to one reflector.
+#[derive(Clone, Copy)]
 struct Group {
     first: usize,
     last: usize,
     beams: f64,
     index_sum: f64,
     range_sum: f64,
+    first_range: f32,
     last_range: f32,
 }
 
 impl Group {
-    fn observation(&self, scan: &Scan, parameters: &ReflectorDetection) -> Option<ReflectorObservation> {
-        let range = self.range_sum / self.beams;
-        let width = range * libm::fabs(scan.bearing_step) * (self.last - self.first) as f64;
-        if width > f64::from(parameters.largest_width) {
-            return None;
+    fn new(index: usize, range: f32) -> Self {
+        Self {
+            first: index,
+            last: index,
+            beams: 1.0,
+            index_sum: index as f64,
+            range_sum: f64::from(range),
+            first_range: range,
+            last_range: range,
         }
-        let index = self.index_sum / self.beams;
-        Some(ReflectorObservation {
-            time: scan.start.offset(index * scan.beam_interval),
-            range: range as f32 + parameters.centre_offset,
-            bearing: (scan.first_bearing + index * scan.bearing_step) as f32,
+    }
+
+    /// Whether a strong return `steps` beams after the last one is of the same reflector.
+    fn goes_on(&self, steps: usize, range: f32, parameters: &ReflectorDetection) -> bool {
+        steps <= LONGEST_STEP && libm::fabsf(range - self.last_range) <= parameters.largest_step
+    }
+
+    fn add(&mut self, index: usize, range: f32) {
+        self.last = index;
+        self.last_range = range;
+        self.beams += 1.0;
+        self.index_sum += index as f64;
+        self.range_sum += f64::from(range);
+    }
+
+    fn index(&self) -> f64 {
+        self.index_sum / self.beams
+    }
+
+    fn range(&self) -> f64 {
+        self.range_sum / self.beams
+    }
+
+    fn observation(&self, scan: &Scan, parameters: &ReflectorDetection) -> Option<ReflectorObservation> {
+        let mean = Mean { time: self.index(), direction: self.index(), range: self.range() };
+        mean.observation(self.last - self.first, scan, parameters)
+    }
+
+    /// Whether the group that ends a full circle and `head`, which begins it, are of the same reflector.
+    fn meets(&self, head: &Self, scan: &Scan, parameters: &ReflectorDetection) -> bool {
+        self.goes_on(scan.ranges.len() - self.last + head.first, head.first_range, parameters)
+    }
+
+    /// This group and `head`, beyond the seam, as one. The two were seen a revolution apart: their ends lie about the
+    /// direction, and their ranges about the range, that the reflector had in the middle of that time.
+    fn observation_with(
+        &self,
+        head: &Self,
+        scan: &Scan,
+        parameters: &ReflectorDetection,
+    ) -> Option<ReflectorObservation> {
+        let circle = scan.ranges.len();
+        let direction = (self.index_sum + head.index_sum + head.beams * circle as f64) / (self.beams + head.beams);
+        let mean = Mean {
+            time: 0.5 * (self.index() + head.index()),
+            direction: if direction < circle as f64 { direction } else { direction - circle as f64 },
+            range: 0.5 * (self.range() + head.range()),
+        };
+        mean.observation(head.last + circle - self.first, scan, parameters)
+    }
+}
+
+/// What the beams of a reflector say together; time and direction in beams.
+struct Mean {
+    time: f64,
+    direction: f64,
+    range: f64,
+}
+
+impl Mean {
+    /// The reflector, if it is no wider than one can be.
+    fn observation(&self, steps: usize, scan: &Scan, parameters: &ReflectorDetection) -> Option<ReflectorObservation> {
+        let width = self.range * libm::fabs(scan.bearing_step) * steps as f64;
+        (width <= f64::from(parameters.largest_width)).then(|| ReflectorObservation {
+            time: scan.start.offset(self.time * scan.beam_interval),
+            range: self.range as f32 + parameters.centre_offset,
+            bearing: (scan.first_bearing + self.direction * scan.bearing_step) as f32,
         })
     }
 }
 
 /// Finds groups of strong returns and gives the mean direction and range of each, in order of time. A group may have
-/// single weak or missing beams inside. What exceeds the capacity of `found` is left out.
+/// single weak or missing beams inside, and goes on across the seam of a full circle. What exceeds the capacity of
+/// `found` is left out.
 pub fn detect_reflectors<const REFLECTORS: usize>(
     scan: &Scan,
     parameters: &ReflectorDetection,
@@ -62,35 +134,52 @@ pub fn detect_reflectors<const REFLECTORS: usize>(
 ) {
     found.clear();
     let mut group: Option<Group> = None;
+    let mut head: Option<Group> = None;
     for (index, (&range, &intensity)) in scan.ranges.iter().zip(scan.intensities).enumerate() {
         let is_strong = intensity >= parameters.least_intensity && range > 0.0 && range <= parameters.farthest;
         if !is_strong {
             continue;
         }
-        if let Some(open) = &mut group {
-            let is_same = index - open.last <= 2 && libm::fabsf(range - open.last_range) <= parameters.largest_step;
-            if is_same {
-                open.last = index;
-                open.last_range = range;
-                open.beams += 1.0;
-                open.index_sum += index as f64;
-                open.range_sum += f64::from(range);
-                continue;
-            }
-            if let Some(observation) = open.observation(scan, parameters) {
-                let _ = found.push(observation);
+        match &mut group {
+            Some(open) if open.goes_on(index - open.last, range, parameters) => open.add(index, range),
+            _ => {
+                if let Some(closed) = group.replace(Group::new(index, range)) {
+                    head.get_or_insert(closed);
+                    push(closed.observation(scan, parameters), found);
+                }
             }
         }
-        group = Some(Group {
-            first: index,
-            last: index,
-            beams: 1.0,
-            index_sum: index as f64,
-            range_sum: f64::from(range),
-            last_range: range,
-        });
     }
-    if let Some(observation) = group.and_then(|open| open.observation(scan, parameters)) {
+    let Some(tail) = group else { return };
+    match head.filter(|head| scan.is_full_circle() && tail.meets(head, scan, parameters)) {
+        None => push(tail.observation(scan, parameters), found),
+        Some(head) => {
+            // What is too wide is not there, and with the rest of it is wider still.
+            let mut is_there = head.observation(scan, parameters).is_some();
+            found.retain(|_| !core::mem::take(&mut is_there));
+            push(tail.observation_with(&head, scan, parameters), found);
+            sort_last(found);
+        }
+    }
+}
+
+fn push<const REFLECTORS: usize>(
+    observation: Option<ReflectorObservation>,
+    found: &mut Vec<ReflectorObservation, REFLECTORS>,
+) {
+    if let Some(observation) = observation {
         let _ = found.push(observation);
+    }
+}
+
+/// Moves the last observation to its place among the others, which are in order of time.
+fn sort_last(found: &mut [ReflectorObservation]) {
+    let mut rest = found;
+    while let Some((last, others)) = rest.split_last_mut() {
+        match others.last_mut() {
+            Some(before) if before.time > last.time => core::mem::swap(before, last),
+            _ => return,
+        }
+        rest = others;
     }
 }

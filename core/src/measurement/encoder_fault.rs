@@ -22,6 +22,8 @@ pub enum EncoderFault {
     Reported,
     /// The encoder's heartbeat has ceased.
     HeartbeatLost,
+    /// The encoder tells another number of positions than the vehicle's settings do.
+    WrongRange,
 }
 
 /// The faults that a vehicle's encoders have at one moment.

@@ -2,9 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
+/// No counter takes so many values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CounterRangeError;
+
+impl core::fmt::Display for CounterRangeError {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.write_str("a counter takes 2 to 2^32 values")
+    }
+}
+
+impl core::error::Error for CounterRangeError {}
+
 /// How many values a counter takes before it starts again at zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(try_from = "u64", into = "u64")]
 pub struct CounterRange(u64);
 
 impl CounterRange {
@@ -52,5 +64,19 @@ impl CounterRange {
     #[must_use]
     pub const fn signed(self, reading: u32) -> i64 {
         self.step(0, reading)
+    }
+}
+
+impl TryFrom<u64> for CounterRange {
+    type Error = CounterRangeError;
+
+    fn try_from(values: u64) -> Result<Self, CounterRangeError> {
+        Self::new(values).ok_or(CounterRangeError)
+    }
+}
+
+impl From<CounterRange> for u64 {
+    fn from(range: CounterRange) -> Self {
+        range.values()
     }
 }

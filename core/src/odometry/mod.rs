@@ -11,7 +11,7 @@ mod vehicle;
 
 pub use bias::{BiasJacobian, OdometryBias};
 pub use coasting::Coasting;
-pub use counter::CounterRange;
+pub use counter::{CounterRange, CounterRangeError};
 pub use integration::{Control, Integration};
 pub use motion::Motion;
 pub use noise::OdometryNoise;

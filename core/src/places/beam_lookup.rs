@@ -1,5 +1,7 @@
 //! Which beams of a scan look towards a point.
 
+use core::f32::consts::TAU;
+
 use crate::features::PointScan;
 use crate::geometry::ScanPoint;
 
@@ -10,6 +12,7 @@ pub(super) struct BeamLookup<'a> {
     ranges: &'a [f32],
     first_bearing: f32,
     per_radian: f32,
+    is_clockwise: bool,
     is_full_circle: bool,
 }
 
@@ -29,6 +32,7 @@ impl<'a> BeamLookup<'a> {
             ranges: &scan.ranges,
             first_bearing: scan.first_bearing,
             per_radian: 1.0 / scan.bearing_step.max(1e-6),
+            is_clockwise: scan.is_clockwise,
             is_full_circle: scan.is_full_circle,
         }
     }
@@ -36,8 +40,9 @@ impl<'a> BeamLookup<'a> {
     /// Number of the beam whose direction is nearest to that of `point`; it need not exist.
     pub(super) fn towards(&self, point: &ScanPoint) -> isize {
         let bearing = libm::atan2f(point.y, point.x) - self.first_bearing;
-        let bearing = if bearing < 0.0 { bearing + core::f32::consts::TAU } else { bearing };
-        (bearing * self.per_radian + 0.5) as isize
+        let turn = if self.is_clockwise { -bearing } else { bearing };
+        let turn = if (0.0..TAU).contains(&turn) { turn } else { turn - TAU * libm::floorf(turn / TAU) };
+        (turn * self.per_radian + 0.5) as isize
     }
 
     /// The return of a beam, counted around a full circle. None if there is no such beam, or it has no return.

@@ -43,7 +43,7 @@ const MOST_ROTATIONS: i16 = 512;
 
 impl AffineHough {
     /// Finds the cell with the most pairs of keypoints, and fits the pose of the source in the target to them. None
-    /// if no cell has two pairs.
+    /// if no cell has two pairs. Of each scan the first 256 keypoints take part: a [`Correspondence`] numbers no more.
     pub fn associate(
         &mut self,
         source: &[Keypoint],
@@ -94,10 +94,10 @@ fn each_vote(
 ) {
     let (sine, cosine) = libm::sincosf(f32::from(rotation) * parameters.rotation_step);
     let per_metre = 1.0 / parameters.cell;
-    for (from, keypoint) in (0_u8..).zip(source) {
+    for (from, keypoint) in (0..=u8::MAX).zip(source) {
         let point = keypoint.position;
         let turned = ScanPoint::new(cosine * point.x - sine * point.y, sine * point.x + cosine * point.y);
-        for (to, other) in (0_u8..).zip(target) {
+        for (to, other) in (0..=u8::MAX).zip(target) {
             let shift = (other.position - turned) * per_metre + ScanPoint::repeat(0.5 * CELLS as f32);
             let is_inside = |value: f32| value >= 0.0 && value < CELLS as f32;
             if is_inside(shift.x) && is_inside(shift.y) {

@@ -130,6 +130,32 @@ fn the_older_timer_serves_where_the_event_timer_is_refused() {
     assert_eq!(bench.master.identity().unwrap().refused_settings, 0);
 }
 
+/// When the readings of a node, whose reports are made every 10 ms, are said to be true, if one of them is 8 ms late.
+fn times_with_one_late(refused: &[(u16, u8)]) -> Vec<Time> {
+    let mut node = Node::new(1);
+    node.refusals.extend(refused.iter().map(|object| (*object, 0x0601_0002)));
+    let mut bench = Bench::new(settings(1), node);
+    bench.run(0..50);
+    for number in 0..4 {
+        let late = if number == 2 { 8 } else { 0 };
+        bench.hear(&bench.node.position(number), at(60 + 10 * u64::from(number) + late));
+    }
+    bench.readings().iter().map(|reading| reading.time).collect()
+}
+
+#[test]
+fn a_late_report_is_known_to_be_late_while_the_node_keeps_the_timer() {
+    // Inhibit time and heartbeat say nothing of when a report is made.
+    for refused in [&[][..], &[(0x1800, 3)], &[(0x1017, 0)], &[(0x1800, 3), (0x1017, 0)]] {
+        let times = times_with_one_late(refused);
+        assert!(times[2].since(at(80)).abs() < 0.001, "{refused:04X?}: {times:?}");
+    }
+    // A node whose reports do not follow the timer reports as it likes: the timer and the type that obeys it.
+    for refused in [&[(0x1800, 5), (0x6200, 0)][..], &[(0x1800, 2)]] {
+        assert_eq!(times_with_one_late(refused)[2], at(88), "{refused:04X?}");
+    }
+}
+
 #[test]
 fn a_late_node_is_found_whenever_it_boots() {
     for boot in [300, 1700, 4999] {

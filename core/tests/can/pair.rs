@@ -166,6 +166,50 @@ fn an_emergency_holds_until_it_is_over() {
 }
 
 #[test]
+fn an_encoder_whose_range_is_not_that_of_the_settings_gives_a_fault_and_no_samples() {
+    // What 6002h tells (none: it refuses), the number of positions in the settings, and whether both can be true.
+    let cases = [
+        (Some(0x1FFF), 1 << 16, false),
+        (Some(0x1FFF), 1 << 13, true),
+        (Some(0x2000), 1 << 13, true),
+        (Some(0xFFFF), 1 << 13, false),
+        (Some(0x00FF_FFFF), 1 << 32, false),
+        (Some(0xFFFF_FFFF), 1 << 32, true),
+        (Some(35_999), 36_000, true),
+        (Some(36_000), 36_000, true),
+        (Some(36_000), 35_999, false),
+        (Some(0), 36_000, true),
+        (None, 36_000, true),
+    ];
+    for ((told, set, is_right), is_drive) in cases.iter().flat_map(|case| [(*case, false), (*case, true)]) {
+        let range = CounterRange::new(set);
+        let given = |number, is_it: bool| {
+            let channel = channel(number, Reporting::Timer { period: 10 });
+            let range = is_it.then_some(range).flatten();
+            ChannelSettings { encoder: EncoderSettings { range, ..channel.encoder }, ..channel }
+        };
+        let mut bench = Bench::new(Reporting::Timer { period: 10 });
+        bench.pair = EncoderPair::new(&given(1, is_drive), &given(2, !is_drive), 0.010, at(0));
+        let node = &mut bench.nodes[usize::from(!is_drive)];
+        match told {
+            Some(told) => _ = node.objects.insert((0x6002, 0), (told, 4)),
+            None => _ = node.objects.remove(&(0x6002, 0)),
+        }
+        (0..30).for_each(|millisecond| bench.poll(at(millisecond)));
+        assert_eq!(bench.pair.states(), [EncoderState::Reporting; 2]);
+        for step in 0..100 {
+            // Counters just below zero, where a wrong range becomes a wrong angle.
+            bench.report(30 + 10 * step, 0x1F00, 0x1F00, 0);
+            let faults = bench.pair.faults(at(30 + 10 * step));
+            let (its, other) = if is_drive { (faults.drive, faults.steering) } else { (faults.steering, faults.drive) };
+            let expected = (!is_right).then_some(EncoderFault::WrongRange);
+            assert_eq!((its, other), (expected, None), "{told:?} {set} {step}");
+        }
+        assert_eq!(bench.samples.len(), if is_right { 100 } else { 0 }, "{told:?} {set}");
+    }
+}
+
+#[test]
 fn faults_are_told_when_they_change_and_while_they_last() {
     let mut bench = Bench::start(Reporting::Timer { period: 10 });
     let mut told = Vec::new();

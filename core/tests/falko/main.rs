@@ -295,6 +295,30 @@ fn any_range() -> impl Strategy<Value = f32> {
     ]
 }
 
+#[test]
+fn a_neighbourhood_that_nearly_reaches_the_sensor_is_whole() {
+    // The disc about the return straight ahead is seen under asin(share) to each side. There, on the rays' nearest points
+    // to its centre, lie the only neighbours.
+    let step = PI / 720.0;
+    for share in [0.3, 0.6, 0.79, 0.81, 0.9, 0.95, 0.99] {
+        let within = (f64::asin(share) / step).floor() as usize;
+        let mut ranges = vec![0.0_f32; BEAMS];
+        ranges[BEAMS / 2] = 2.0;
+        for beams in within - 2..=within {
+            let range = 2.0 * (step * beams as f64).cos() as f32;
+            (ranges[BEAMS / 2 - beams], ranges[BEAMS / 2 + beams]) = (range, range);
+        }
+        let parameters = Parameters {
+            radius_scale: 2.0 * share as f32,
+            radius_growth: 0.0,
+            suppression_radius: 0.0,
+            ..Parameters::thesis()
+        };
+        let found = detect(&points(&ranges, -PI, step), parameters);
+        assert!(found.iter().any(|keypoint| usize::from(keypoint.beam) == BEAMS / 2), "{share}: {found:?}");
+    }
+}
+
 proptest! {
     #[test]
     fn score_equals_the_printed_double_sum(sectors in prop::collection::vec(0_usize..16, 0..80)) {

@@ -70,7 +70,7 @@ fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
 
 /// Every value that a status can name.
 fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
-    use EncoderFault::{Frozen, HeartbeatLost, Jumped, Late, Missing, OutOfRange, Reported};
+    use EncoderFault::{Frozen, HeartbeatLost, Jumped, Late, Missing, OutOfRange, Reported, WrongRange};
     let modes = [
         Mode::NotLocalised,
         Mode::Reflectors,
@@ -104,6 +104,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Some(OutOfRange),
         Some(Reported),
         Some(HeartbeatLost),
+        Some(WrongRange),
     ];
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
     let searches =
@@ -111,7 +112,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
     (0..12)
         .map(|index| {
             let (mode, reason) = (modes[index % 8], reasons[index]);
-            let (drive, steering, laser) = (faults[index % 8], faults[(23 - index) % 8], lasers[index % 4]);
+            let (drive, steering, laser) = (faults[index % 9], faults[(23 - index) % 9], lasers[index % 4]);
             let start_search = searches[index % 5];
             let fault = |fault: Option<EncoderFault>| fault.map_or("None".to_owned(), |fault| format!("{fault:?}"));
             let status = Content::Status {

@@ -36,8 +36,7 @@ pub(super) fn is_best_within<const BEAMS: usize>(
         return false;
     };
     let count = costs.len();
-    let sine = (radius / range).min(0.8);
-    let reach = beams_within(sine, scan.bearing_step).min(count.saturating_sub(1) / 2);
+    let reach = beams_within(radius / range, scan.bearing_step).min(count.saturating_sub(1) / 2);
     let squared_radius = radius * radius;
     let beaten = |other: usize, wins_ties: bool| {
         let Some(cost) = costs.get(other).filter(|cost| cost.is_candidate()) else { return false };

@@ -76,8 +76,10 @@ pub struct ReflectorRelocalizer<const SEEN: usize = 64> {
     needed: usize,
     /// The mapped pair that is looked at next.
     at: (usize, usize),
+    /// How much of it has been tried: two hypotheses for each sought pair.
+    tried: u8,
     /// Effort that was spent beyond what was allowed.
-    debt: i64,
+    debt: u32,
     best: Vec<ReflectorFix, KEPT>,
 }
 
@@ -91,6 +93,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
             sought: SoughtPairs::new(),
             needed: 0,
             at: (0, 1),
+            tried: 0,
             debt: 0,
             best: Vec::new(),
         }
@@ -108,6 +111,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         self.sought.clear();
         self.best.clear();
         self.at = (0, 1);
+        self.tried = 0;
         self.debt = 0;
         let count = self.seen.len();
         self.needed = usize::from(self.parameters.fewest).max(count.div_ceil(2));
@@ -117,7 +121,7 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
     }
 
     /// Goes on with the search until `effort` is spent: a look at a mapped pair is one, about 15 instructions. What a last
-    /// piece of work takes beyond it is spent of the next call's.
+    /// piece of work, at most the verification of one hypothesis, takes beyond it is spent of the next call's.
     pub fn advance<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
         reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
@@ -126,29 +130,40 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         if self.seen.len() < self.needed || self.needed == 0 {
             return RelocalizationProgress::Done(ReflectorAnswer::TooFew);
         }
-        let mut left = i64::from(effort) - self.debt;
+        let mut left = i64::from(effort) - i64::from(self.debt);
         self.debt = 0;
         let landmarks = reflectors.map.landmarks();
         while let Some(first) = landmarks.get(self.at.0) {
             for second in landmarks.get(self.at.1..).unwrap_or_default() {
                 if left <= 0 {
-                    self.debt = -left;
-                    return RelocalizationProgress::Searching;
+                    return self.pause(left);
                 }
                 left -= 1;
-                self.at.1 += 1;
                 let (x, y) = (second.x - first.x, second.y - first.y);
                 let square = (x * x + y * y) as f32;
-                if self.sought.may_hold(square) {
-                    left -= self.try_pair(reflectors, first, second, square);
+                if self.sought.may_hold(square) && !self.try_pair(reflectors, first, second, square, &mut left) {
+                    return self.pause(left);
                 }
+                self.at.1 += 1;
             }
             self.at = (self.at.0 + 1, self.at.0 + 2);
         }
         RelocalizationProgress::Done(self.answer())
     }
 
-    /// Tries what a mapped pair may be, either way around, and returns the effort.
+    /// Effort that the last piece of work took beyond what was allowed; the next call of [`Self::advance`] has so much less.
+    #[must_use]
+    pub const fn debt(&self) -> u32 {
+        self.debt
+    }
+
+    fn pause(&mut self, left: i64) -> RelocalizationProgress {
+        self.debt = u32::try_from(-left).unwrap_or(u32::MAX);
+        RelocalizationProgress::Searching
+    }
+
+    /// Tries what a mapped pair may be, either way around, from where it was left while there is effort left. Whether all
+    /// has been tried.
     #[inline(never)]
     fn try_pair<const REFLECTORS: usize, const WORDS: usize>(
         &mut self,
@@ -156,31 +171,36 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
         first: &Landmark,
         second: &Landmark,
         square: f32,
-    ) -> i64 {
+        left: &mut i64,
+    ) -> bool {
         let origin = reflectors.origin();
         let from_origin = |landmark: &Landmark| (landmark.position() - origin).cast();
         let (p, q): (ScanPoint, ScanPoint) = (from_origin(first), from_origin(second));
-        let mut effort = 0;
-        for number in 0..self.sought.pairs().len() {
-            let Some(pair) = self.sought.pairs().get(number).copied() else { break };
-            effort += 1;
-            if !(pair.least..=pair.largest).contains(&square) {
-                continue;
-            }
+        while let Some(pair) = self.sought.pairs().get(usize::from(self.tried / 2)).copied() {
             let position = |number: u8| self.seen.get(usize::from(number)).map(|seen| seen.position);
-            let (Some(a), Some(b)) = (position(pair.first), position(pair.second)) else { continue };
-            for mapped in [(p, q), (q, p)] {
-                effort += HYPOTHESIS;
-                let Some(transform) = Transform::between((a, b), mapped) else { continue };
-                if self.is_promising(reflectors, &transform) {
-                    effort += VERIFICATION;
-                    if let Some(fix) = self.verify(reflectors, transform.pose(), (a, b)) {
-                        self.keep(fix);
-                    }
+            let is_like = (pair.least..=pair.largest).contains(&square);
+            let (true, Some(a), Some(b)) = (is_like, position(pair.first), position(pair.second)) else {
+                *left -= 1;
+                self.tried += 2;
+                continue;
+            };
+            let is_turned = self.tried % 2 == 1;
+            *left -= if is_turned { HYPOTHESIS } else { HYPOTHESIS + 1 };
+            self.tried += 1;
+            if let Some(transform) = Transform::between((a, b), if is_turned { (q, p) } else { (p, q) })
+                && self.is_promising(reflectors, &transform)
+            {
+                *left -= VERIFICATION;
+                if let Some(fix) = self.verify(reflectors, transform.pose(), (a, b)) {
+                    self.keep(fix);
                 }
             }
+            if *left <= 0 {
+                return false;
+            }
         }
-        effort
+        self.tried = 0;
+        true
     }
 
     /// Splits the seen reflectors into groups, cheapest pairs first, and notes the pairs within groups.

@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::squared_distance::{bucket, buckets};
 
-/// Most pairs that are sought.
+/// Most pairs that are sought; twice as many are counted in a byte.
 const PAIRS: usize = 96;
 
 /// A factor of two of squared distance is divided into 256: buckets of 6 cm at 30 m.

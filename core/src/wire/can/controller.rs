@@ -154,7 +154,7 @@ const REASONS: [(u64, Reason); 12] = [
 ];
 
 /// Numbers of the encoder faults on the bus; 0 is none.
-const FAULTS: [(u64, EncoderFault); 7] = [
+const FAULTS: [(u64, EncoderFault); 8] = [
     (1, EncoderFault::Late),
     (2, EncoderFault::Missing),
     (3, EncoderFault::Frozen),
@@ -162,6 +162,7 @@ const FAULTS: [(u64, EncoderFault); 7] = [
     (5, EncoderFault::OutOfRange),
     (6, EncoderFault::Reported),
     (7, EncoderFault::HeartbeatLost),
+    (8, EncoderFault::WrongRange),
 ];
 
 /// Whether the laser can be used.

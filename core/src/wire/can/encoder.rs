@@ -73,7 +73,8 @@ pub struct EncoderSettings {
     pub heartbeat: u16,
     /// How long it may think about an answer, s.
     pub answer_timeout: f64,
-    /// Its range, where the one that it tells is wrong.
+    /// The range that its counter is read with, if it is known. A node that tells another one is set up nevertheless:
+    /// see [`Identity::tells_other_range`].
     pub range: Option<CounterRange>,
 }
 
@@ -100,6 +101,10 @@ pub struct Identity {
     pub mapping: PdoMapping,
     /// How many settings it did not take.
     pub refused_settings: u8,
+    /// Whether it took the timer and the transmission type that obeys it. Without them it reports as it likes.
+    pub keeps_timer: bool,
+    /// Whether it tells another range than the one in its settings, so that its counter wraps elsewhere.
+    pub tells_other_range: bool,
 }
 
 /// Why an encoder could not be set up. The master tries again.
@@ -207,6 +212,8 @@ impl Encoder {
             pdo_id: None,
             mapping: PdoMapping::new(),
             refused_settings: 0,
+            keeps_timer: false,
+            tells_other_range: false,
         };
         Self {
             settings,
@@ -340,8 +347,7 @@ impl Encoder {
         }
         let time = match (self.settings.reporting, self.last_sync) {
             (Reporting::Synchronous, Some(sync)) => sync,
-            // A node that does not take the timer reports as it likes.
-            (Reporting::Timer { .. }, _) if self.identity.refused_settings == 0 => self.reports.time(time),
+            (Reporting::Timer { .. }, _) if self.identity.keeps_timer => self.reports.time(time),
             _ => time,
         };
         Some(EncoderReading { time, position, speed })
@@ -378,6 +384,7 @@ impl Encoder {
         self.identity.pdo_id = None;
         self.identity.mapping = PdoMapping::new();
         self.identity.refused_settings = 0;
+        self.identity.keeps_timer = false;
         self.phase = Phase::Setup(Step::ReadUnits);
     }
 
@@ -447,8 +454,10 @@ impl Encoder {
                 Step::ReadRange
             }
             Step::ReadRange => {
-                let range = self.settings.range.or(value.and_then(range_of));
-                identity.range = range.ok_or(SetupError::NoRange)?;
+                let told = value.and_then(range_of);
+                identity.range = self.settings.range.or(told).ok_or(SetupError::NoRange)?;
+                identity.tells_other_range =
+                    told.is_some() && !value.is_some_and(|told| is_range(told, identity.range));
                 Step::ReadResolution
             }
             Step::ReadResolution => {
@@ -492,6 +501,7 @@ impl Encoder {
             }
             Step::WriteTransmission => {
                 identity.refused_settings += u8::from(!is_ok);
+                identity.keeps_timer = is_ok;
                 if self.settings.reporting == Reporting::Synchronous {
                     return Ok(self.write_heartbeat());
                 }
@@ -505,6 +515,7 @@ impl Encoder {
             Step::WriteEventTimer => return Ok(self.write_heartbeat()),
             Step::WriteCyclicTimer => {
                 identity.refused_settings += u8::from(!is_ok);
+                identity.keeps_timer &= is_ok;
                 return Ok(self.write_heartbeat());
             }
             Step::WriteHeartbeat => {
@@ -530,6 +541,11 @@ impl Encoder {
         };
         EncoderEvent::Started
     }
+}
+
+/// Whether 6002h tells that range, as the number of positions or as the largest one.
+fn is_range(told: u32, range: CounterRange) -> bool {
+    matches!(range.values().checked_sub(u64::from(told)), Some(0 | 1))
 }
 
 /// The range that 6002h tells. Many devices tell the largest position instead of the number of positions: all bits one.

@@ -74,7 +74,9 @@ impl Channel {
     }
 
     fn check(&mut self, now: Time) -> Option<EncoderFault> {
-        if self.has_error {
+        if self.encoder.identity().is_some_and(|identity| identity.tells_other_range) {
+            self.supervisor.raise(EncoderFault::WrongRange, now);
+        } else if self.has_error {
             self.supervisor.raise(EncoderFault::Reported, now);
         } else if self.encoder.is_heartbeat_lost(now) {
             self.supervisor.raise(EncoderFault::HeartbeatLost, now);

@@ -36,7 +36,7 @@ pub struct Drive {
 /// Time between two samples, s.
 const SAMPLE: f64 = 0.01;
 
-const FAULTS: [EncoderFault; 7] = [
+const FAULTS: [EncoderFault; 8] = [
     EncoderFault::Late,
     EncoderFault::Missing,
     EncoderFault::Frozen,
@@ -44,6 +44,7 @@ const FAULTS: [EncoderFault; 7] = [
     EncoderFault::OutOfRange,
     EncoderFault::Reported,
     EncoderFault::HeartbeatLost,
+    EncoderFault::WrongRange,
 ];
 
 impl Drive {
@@ -177,7 +178,7 @@ impl Drive {
 
     fn faults(&mut self, dice: &mut Dice<impl Source>) -> EncoderFaults {
         let time = self.time(dice);
-        let mut fault = || FAULTS.get(usize::from(dice.below(14))).copied();
+        let mut fault = || FAULTS.get(usize::from(dice.below(16))).copied();
         EncoderFaults { time, drive: fault(), steering: fault() }
     }
 

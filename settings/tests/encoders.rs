@@ -1,0 +1,17 @@
+//! What the encoders are expected to be.
+
+use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_settings::Settings;
+use agv_settings::encoders::channels;
+
+#[test]
+fn the_encoders_are_held_to_the_ranges_that_the_odometry_wraps_by() {
+    let mut settings = Settings::default();
+    let Vehicle::Tricycle(tricycle) = settings.parameters.vehicle else { panic!("the default is a tricycle") };
+    let (drive_range, steering_range) = (CounterRange::BITS_24, CounterRange::new(1 << 13).unwrap());
+    settings.parameters.vehicle = Vehicle::Tricycle(Tricycle { drive_range, steering_range, ..tricycle });
+    assert_eq!(channels(&settings).map(|channel| channel.encoder.range), [Some(drive_range), Some(steering_range)]);
+    // Another vehicle has no counters of its own.
+    settings.parameters.vehicle = Vehicle::Increments;
+    assert_eq!(channels(&settings).map(|channel| channel.encoder.range), [None, None]);
+}
