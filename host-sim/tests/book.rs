@@ -6,6 +6,7 @@
 
 mod support;
 
+use agv_host_sim::data;
 use agv_tests::recordings;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -43,12 +43,40 @@ fn output(command: &mut Command) -> Option<String> {
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
+/// Whether a compiler that says `rustc 1.95.0 (...)` of itself builds this workspace.
+fn is_new_enough(version: &str) -> bool {
+    let number = |text: &str| {
+        let mut parts = text.split('.').map_while(|part| part.parse::<u32>().ok());
+        Some((parts.next()?, parts.next()?))
+    };
+    let told = version.split_whitespace().nth(1).and_then(number);
+    told.zip(number(env!("CARGO_PKG_RUST_VERSION"))).is_some_and(|(told, needed)| told >= needed)
+}
+
 fn has_target() -> bool {
     let folder = output(Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]));
     folder.is_some_and(|folder| Path::new(&folder).is_dir())
 }
 
+/// Whether Debian's pair is there, and new enough.
 fn has_sources() -> bool {
+    let version = output(Command::new(DEBIAN).arg("--version"));
+    if !version.is_some_and(|version| is_new_enough(&version)) {
+        return false;
+    }
     let root = output(Command::new(DEBIAN).args(["--print", "sysroot"]));
     root.is_some_and(|root| Path::new(&root).join("lib/rustlib/src/rust/library/core").is_dir())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_new_enough;
+
+    #[test]
+    fn an_old_compiler_is_not_taken() {
+        assert!(is_new_enough("rustc 1.96.0 (ac68faa20 2026-05-25) (built from a source tarball)"));
+        assert!(is_new_enough("rustc 2.0.0"));
+        assert!(!is_new_enough("rustc 1.85.0 (4d91de4e4 2025-02-17) (built from a source tarball)"));
+        assert!(!is_new_enough("") && !is_new_enough("rustc what"));
+    }
 }

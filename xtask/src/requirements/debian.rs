@@ -1,13 +1,14 @@
 //! Packages of Debian.
 
 use std::process::Command;
+use std::sync::Once;
 
 use super::succeeds;
 
 /// How long to wait for another installation to end, s.
 const LOCK_TIMEOUT: &str = "DPkg::Lock::Timeout=600";
 
-/// Installs a package, if this is Debian and this user may.
+/// Installs a package, or a newer one than is there, if this is Debian and this user may.
 ///
 /// # Errors
 /// Why it is not installed.
@@ -24,9 +25,14 @@ pub fn install(package: &str) -> Result<(), String> {
         command.args(["-o", LOCK_TIMEOUT]).args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
         super::install(&mut command)
     };
-    let options = ["install", "--yes", "--no-install-recommends", package];
-    // A new machine has no list of packages yet, or an old one.
-    apt(&options).or_else(|_| apt(&["update"]).and_then(|()| apt(&options)))
+    // A new machine has no list of packages yet, or an old one, which names packages that are gone or too old.
+    static UPDATED: Once = Once::new();
+    UPDATED.call_once(|| {
+        if let Err(why) = apt(&["update"]) {
+            eprintln!("the list of packages stays as it is: {why}");
+        }
+    });
+    apt(&["install", "--yes", "--no-install-recommends", package])
 }
 
 fn is_root() -> bool {
