@@ -60,24 +60,15 @@ impl<
         self.corrected_at = None;
     }
 
-    /// Compares what a revolution has shown with what the odometry says; `before` is the estimate before it was used.
-    pub(super) fn check_motion(&mut self, before: &Estimate) {
+    /// Compares what an event has shown with what the odometry says; `before` is the estimate before it was used, and
+    /// `is_revolution` says whether the event tells the reflectors of a revolution.
+    pub(super) fn check_motion(&mut self, before: &Estimate, is_revolution: bool) {
         let Some(after) = self.estimate() else { return };
-        let to_odometry = before.smooth.compose(&before.pose.inverse());
-        let mut is_corrected = false;
-        self.motion_check.begin(self.timeline.now());
-        for seen in &self.outputs.uses {
-            is_corrected |= seen.verdict == Verdict::Accepted;
-            if seen.kind == LandmarkKind::Reflector {
-                let [x, y] = seen.position.map(f64::from);
-                let place = to_odometry.transform(&seen.located.into());
-                self.motion_check.see(&place, libm::hypot(x, y));
-            }
+        // One that tells no reflectors contradicts none of them.
+        if is_revolution {
+            self.check_reflectors(before);
         }
-        if self.lost.is_none() && self.motion_check.disagrees() {
-            self.lost = Some(Reason::MotionDisagrees);
-        }
-        if !is_corrected {
+        if !self.outputs.uses.iter().any(|seen| seen.verdict == Verdict::Accepted) {
             return;
         }
         if let Some(last) = self.corrected_at {
@@ -93,5 +84,19 @@ impl<
             }
         }
         self.corrected_at = Some(after.smooth);
+    }
+
+    /// Whether the reflectors of a revolution are where those before have been, as the odometry says.
+    fn check_reflectors(&mut self, before: &Estimate) {
+        let to_odometry = before.smooth.compose(&before.pose.inverse());
+        self.motion_check.begin(self.timeline.now());
+        for seen in self.outputs.uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector) {
+            let [x, y] = seen.position.map(f64::from);
+            let place = to_odometry.transform(&seen.located.into());
+            self.motion_check.see(&place, libm::hypot(x, y));
+        }
+        if self.lost.is_none() && self.motion_check.disagrees() {
+            self.lost = Some(Reason::MotionDisagrees);
+        }
     }
 }

@@ -177,6 +177,7 @@ impl<
         self.outputs.uses.clear();
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
+        let is_revolution = self.tells_reflectors(event);
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
@@ -205,10 +206,20 @@ impl<
             Event::SetPose(fix) => self.set_pose(fix),
         }
         if let Some(before) = before {
-            self.check_motion(&before);
+            self.check_motion(&before, is_revolution);
         }
         self.publish(sees);
         &self.outputs
+    }
+
+    /// Whether an event tells which reflectors one revolution has seen, be it none. Not every scan does: the laser may have
+    /// told its reflectors before.
+    fn tells_reflectors(&self, event: &Event) -> bool {
+        match event {
+            Event::Reflectors(_) => self.parameters.maps.reflectors,
+            Event::Scan(scan) => self.parameters.detection_in(scan).is_some(),
+            _ => false,
+        }
     }
 
     fn set_pose(&mut self, fix: &PoseFix) {
@@ -291,10 +302,7 @@ impl<
         if maps.features || maps.dynamic || maps.slam {
             workspace.path.set(scan.start, &self.parameters.laser, timeline.relative_path(scan.start, scan.end()));
         }
-        if let Some(detection) = &self.parameters.reflectors.detection
-            && maps.reflectors
-            && !scan.intensities.is_empty()
-        {
+        if let Some(detection) = self.parameters.detection_in(scan) {
             detect_reflectors(scan, detection, &mut workspace.reflectors);
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);

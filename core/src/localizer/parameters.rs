@@ -7,6 +7,7 @@ use crate::features::{ReflectorDetection, falko};
 use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
 use crate::landmarks::DynamicMapParameters;
+use crate::measurement::Scan;
 use crate::odometry::{Integration, OdometryNoise, Vehicle};
 
 /// What the localiser believes of its vehicle and its sensors.
@@ -56,6 +57,12 @@ impl Parameters {
             consistency: ConsistencyParameters::default(),
             limits: Limits::default(),
         }
+    }
+
+    /// How reflectors are to be found in a scan, if they are.
+    pub(super) fn detection_in(&self, scan: &Scan) -> Option<&ReflectorDetection> {
+        let can_tell = self.maps.reflectors && !scan.intensities.is_empty();
+        self.reflectors.detection.as_ref().filter(|_| can_tell)
     }
 }
 
