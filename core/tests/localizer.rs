@@ -1,7 +1,7 @@
 //! The localiser as a whole: what it says of itself, and that nothing from outside can hurt it.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use agv_core::features::ReflectorDetection;
+use agv_core::features::{ReflectorDetection, falko};
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason};
@@ -573,4 +573,31 @@ fn an_increment_of_more_than_half_a_turn_is_no_motion() {
         assert_eq!((output.mode, output.reason), (Mode::WithoutOdometry, Reason::OdometryImplausible));
         assert_eq!(output.pose, pose);
     }
+}
+
+#[test]
+fn a_vehicle_that_is_lost_learns_no_landmarks() {
+    let mut drive = Drive::start();
+    let mut parameters = parameters();
+    parameters.maps.dynamic = true;
+    parameters.features.detector = falko::Parameters::thesis();
+    parameters.limits.lost_after = 2.0;
+    *drive.localizer = Small::new(parameters);
+    drive.set_pose(Pose::default());
+    // A square room of 5 m whose corners are seen.
+    let ranges: Vec<f32> = (0..360)
+        .map(|degree| f64::from(degree).to_radians())
+        .map(|angle| (2.5 / angle.cos().abs().max(angle.sin().abs())) as f32)
+        .collect();
+    let look = |drive: &mut Drive| {
+        let start = drive.travel();
+        drive.localizer.handle(&scan(start, &ranges, &[]));
+    };
+    look(&mut drive);
+    let learnt = drive.localizer.dynamic_landmarks().to_vec();
+    assert!(!learnt.is_empty());
+    drive.revolutions(30, |_| false);
+    assert_eq!(drive.localizer.outputs().pose.mode, Mode::Lost);
+    look(&mut drive);
+    assert_eq!(drive.localizer.dynamic_landmarks(), learnt);
 }
