@@ -143,6 +143,12 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.entries.back().map_or(Time::default(), Entry::time)
     }
 
+    /// The time of the oldest entry that is left if one more comes; none if there is room.
+    #[must_use]
+    pub fn oldest_after_next(&self) -> Option<Time> {
+        self.entries.is_full().then(|| self.entries.get(1).map(Entry::time)).flatten()
+    }
+
     /// The state at the newest entry.
     #[must_use]
     pub fn state(&mut self) -> Ekf {

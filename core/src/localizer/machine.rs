@@ -253,8 +253,7 @@ impl<
                     motion
                 };
                 self.blindness = None;
-                self.distance.advance(motion.distance);
-                timeline.advance(&motion);
+                self.go_on(&motion);
             }
             Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
             // The first sample behind a fault: the next one says how the vehicle moves.
@@ -265,6 +264,19 @@ impl<
             }
             _ => {}
         }
+    }
+
+    fn go_on(&mut self, motion: &Motion) {
+        self.distance.advance(motion.distance);
+        // Motions that the filter with landmarks has not seen are not to be forgotten while the laser is silent.
+        if self.parameters.maps.slam
+            && self.lost.is_none()
+            && let Some(time) = self.timeline.oldest_after_next()
+            && time > self.slam.time()
+        {
+            self.slam.advance(time, &self.timeline, self.parameters.vehicle.steering_lever());
+        }
+        self.timeline.advance(motion);
     }
 
     fn doubt_encoders(&mut self, faults: &EncoderFaults) {
@@ -287,8 +299,7 @@ impl<
         let mut coasting =
             self.blindness.map_or_else(|| Coasting::new(*timeline.last_motion()), |blindness| blindness.coasting);
         if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
-            self.distance.advance(motion.distance);
-            timeline.advance(&motion);
+            self.go_on(&motion);
         }
         self.blindness = Some(Blindness { reason, coasting });
     }
