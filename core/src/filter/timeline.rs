@@ -167,10 +167,39 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
                 self.last_motion = *motion;
                 return;
             }
+            // A motion that was not assumed, but told, counts.
+            None if motion.start < self.now() => {
+                self.last_motion = *motion;
+                if motion.end > self.now() {
+                    self.append(motion.split(self.now()).1);
+                }
+                return;
+            }
             None => *motion,
         };
         self.last_motion = *motion;
         self.append(rest);
+    }
+
+    /// Goes on from the newest entry by a motion that is assumed until the odometry reports what it was.
+    pub fn assume(&mut self, motion: &Motion) {
+        let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
+        self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
+        self.append(*motion);
+    }
+
+    /// Whether the state at `time` can be told.
+    ///
+    /// # Errors
+    /// See [`TimelineError`].
+    pub fn reaches(&self, time: Time) -> Result<(), TimelineError> {
+        if self.position(time).is_none() {
+            return Err(TimelineError::TooLate);
+        }
+        if time > self.now() && time.since(self.last_motion.end) > self.longest_extrapolation {
+            return Err(TimelineError::TooEarly);
+        }
+        Ok(())
     }
 
     /// The last motion that the odometry reported.

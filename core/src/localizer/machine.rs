@@ -46,17 +46,25 @@ pub struct Localizer<
     pub(super) corrected_at: Option<Pose>,
     pub(super) lost: Option<Reason>,
     blindness: Option<Blindness>,
+    /// Samples of the odometry in a row that were not later than the one before.
+    repeated: u8,
     pub(super) distance: DistanceSince,
     pub(super) workspace: Workspace<BEAMS>,
     pub(super) outputs: Outputs,
 }
 
-/// The odometry is not believed.
+/// The odometry is not believed, or not heard.
 #[derive(Clone, Copy, Debug)]
 struct Blindness {
     reason: Reason,
     coasting: Coasting,
 }
+
+/// An odometry that says so often in a row what is not later than before has a clock that stands.
+const MOST_REPEATED: u8 = 10;
+
+/// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
+const LONGEST_BRIDGE: f64 = 1.0;
 
 impl<
     const BEAMS: usize,
@@ -106,6 +114,7 @@ impl<
             corrected_at: None,
             lost: None,
             blindness: None,
+            repeated: 0,
             distance: DistanceSince::NEVER,
             workspace: Workspace {
                 points: PointScan::new(),
@@ -171,10 +180,14 @@ impl<
         &self.outputs
     }
 
-    /// Takes one event. Events of one sensor come in order of time; those of different sensors may overtake each other
-    /// by as much as the filter remembers, about 0.4 s.
+    /// Takes one event. Events of one sensor come in order of time. Those of the laser may be as late as the filter
+    /// remembers, about 0.4 s, and ahead of the odometry by [`super::Limits::longest_extrapolation`]; an odometry that is
+    /// further behind is silent.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
+        if let Some(time) = event.seen_until() {
+            self.bridge(time);
+        }
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
         let is_revolution = self.tells_reflectors(event);
@@ -253,6 +266,7 @@ impl<
                     motion
                 };
                 self.blindness = None;
+                self.repeated = 0;
                 self.go_on(&motion);
             }
             Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
@@ -262,13 +276,56 @@ impl<
                     self.coast(time, blindness.reason);
                 }
             }
-            _ => {}
+            // What the odometry should say does not come.
+            Err(OdometryError::WrongVehicle) => self.bridge(time),
+            // Once it is a frame that was sent twice.
+            Err(OdometryError::OutOfOrder) => {
+                self.repeated = self.repeated.saturating_add(1);
+                if self.repeated >= MOST_REPEATED {
+                    self.doubt_odometry(Reason::OdometryImplausible);
+                }
+            }
+            Ok(_) => {}
         }
+    }
+
+    /// Goes on to `time`, at which something was seen, if that is too far ahead of an odometry that is silent. What the
+    /// odometry says later of the same time counts instead.
+    fn bridge(&mut self, time: Time) {
+        let limit = self.parameters.limits.longest_extrapolation;
+        let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_motion().end) > limit)
+        else {
+            return;
+        };
+        let now = timeline.now();
+        let mut coasting =
+            self.doubt_odometry(self.blindness.map_or(Reason::OdometrySilent, |blindness| blindness.reason));
+        // What was extrapolated has been assumed already.
+        let _ = coasting.to(now, &self.parameters.odometry_noise);
+        if time.since(now) <= LONGEST_BRIDGE
+            && let Some(motion) = coasting.to(time, &self.parameters.odometry_noise)
+        {
+            self.keep_up();
+            self.timeline.assume(&motion);
+        }
+    }
+
+    /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
+    fn doubt_odometry(&mut self, reason: Reason) -> Coasting {
+        let last = self.timeline.last_motion();
+        let coasting = self.blindness.map_or_else(|| Coasting::new(*last), |blindness| blindness.coasting);
+        self.blindness = Some(Blindness { reason, coasting });
+        coasting
     }
 
     fn go_on(&mut self, motion: &Motion) {
         self.distance.advance(motion.distance);
-        // Motions that the filter with landmarks has not seen are not to be forgotten while the laser is silent.
+        self.keep_up();
+        self.timeline.advance(motion);
+    }
+
+    /// Before a motion is forgotten that the filter with landmarks has not seen, as the laser is silent.
+    fn keep_up(&mut self) {
         if self.parameters.maps.slam
             && self.lost.is_none()
             && let Some(time) = self.timeline.oldest_after_next()
@@ -276,7 +333,6 @@ impl<
         {
             self.slam.advance(time, &self.timeline, self.parameters.vehicle.steering_lever());
         }
-        self.timeline.advance(motion);
     }
 
     fn doubt_encoders(&mut self, faults: &EncoderFaults) {
@@ -293,11 +349,10 @@ impl<
 
     /// Goes on to `time` without the odometry.
     fn coast(&mut self, time: Time, reason: Reason) {
-        let Some(timeline) = self.timeline.begun_mut() else {
+        if self.timeline.begun().is_none() {
             return;
-        };
-        let mut coasting =
-            self.blindness.map_or_else(|| Coasting::new(*timeline.last_motion()), |blindness| blindness.coasting);
+        }
+        let mut coasting = self.doubt_odometry(reason);
         if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
             self.go_on(&motion);
         }

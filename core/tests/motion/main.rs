@@ -4,8 +4,9 @@
 
 mod drive;
 
-use agv_core::localizer::Mode;
-use drive::{Drive, KINDS, Path};
+use agv_core::localizer::{Event, Mode, Reason};
+use agv_core::measurement::SpeedSample;
+use drive::{Drive, KINDS, Kind, Path};
 
 /// Time after which the pose is as good as it gets, s.
 const SETTLED: f64 = 3.0;
@@ -28,4 +29,77 @@ fn no_motion_is_lost_while_the_laser_is_silent() {
             assert_eq!(drive.said().mode, Mode::Reflectors);
         }
     }
+}
+
+#[test]
+fn an_odometry_that_is_silent_is_told_and_its_motion_is_made_up_for() {
+    let path = Path::straight(16.0);
+    for kind in KINDS {
+        for slam in [false, true] {
+            let mut drive = Drive::start(&path, kind, slam, 100);
+            drive.go(SETTLED, |_| {});
+            assert_eq!(drive.said().mode, Mode::Reflectors);
+            drive.is_odometry_silent = true;
+            drive.go(0.3, |_| {});
+            assert_eq!(drive.said().reason, Reason::OdometrySilent, "{kind:?} slam {slam}");
+            drive.go(1.0, |_| {});
+            // Landmarks alone lead it on, behind by less than a revolution.
+            let said = drive.said();
+            assert_eq!(said.mode, Mode::WithoutOdometry, "{kind:?} slam {slam}");
+            assert!(drive.time().since(said.time) < 0.26, "it says {said:?} at {:?}", drive.time());
+            let error = path.error(&said);
+            assert!(error < 0.03, "{error} m, {kind:?} slam {slam}");
+            drive.is_odometry_silent = false;
+            drive.go(0.5, |drive| {
+                let error = path.error(&drive.said());
+                assert!(error < 0.03, "{error} m behind the silence, {kind:?} slam {slam}");
+            });
+            assert_eq!(drive.said().mode, Mode::Reflectors, "{kind:?} slam {slam}");
+        }
+    }
+}
+
+#[test]
+fn a_short_silence_of_the_odometry_costs_no_motion() {
+    let path = Path::new(16.0, |time| (1.0 - 0.5 * (2.0 * time).sin(), 0.1 * (1.5 * time).sin()));
+    for kind in KINDS {
+        // It counts on while it is not heard, and no landmark could make up for it.
+        let mut drive = Drive::start(&path, kind, false, 100);
+        drive.go(SETTLED, |_| {});
+        let before = path.error(&drive.said());
+        drive.is_odometry_silent = true;
+        drive.go(0.2, |_| {});
+        drive.is_odometry_silent = false;
+        drive.is_laser_silent = true;
+        drive.go(0.2, |_| {});
+        let error = path.error(&drive.said());
+        assert!(error < before + 0.01, "{error} m after {before} m, {kind:?}");
+    }
+}
+
+#[test]
+fn samples_of_another_vehicle_are_told() {
+    let path = Path::straight(4.0);
+    let mut drive = Drive::start(&path, Kind::Encoders, false, 100);
+    drive.go(1.0, |_| {});
+    for step in 1..=30 {
+        let time = drive.time().offset(f64::from(step) * 0.01);
+        drive.localizer.handle(&Event::Speed(SpeedSample { time, speed: 1.0, steering: 0.0 }));
+    }
+    assert_eq!((drive.said().mode, drive.said().reason), (Mode::WithoutOdometry, Reason::OdometrySilent));
+}
+
+#[test]
+fn an_odometry_whose_clock_stands_still_is_told_and_a_repeated_sample_is_not() {
+    let path = Path::straight(4.0);
+    let mut drive = Drive::start(&path, Kind::Encoders, false, 100);
+    drive.go(1.0, |_| {});
+    let repeated = drive.sample(1_000_000);
+    assert_eq!(drive.localizer.handle(&repeated).pose.mode, Mode::Reflectors);
+    for _ in 0..30 {
+        drive.localizer.handle(&repeated);
+    }
+    assert_eq!(drive.said().mode, Mode::WithoutOdometry);
+    drive.go(0.1, |_| {});
+    assert_eq!(drive.said().mode, Mode::Reflectors);
 }

@@ -107,6 +107,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Reason::MotionDisagrees,
         Reason::LaserMoved,
         Reason::OdometryDisagrees,
+        Reason::OdometrySilent,
     ];
     let faults = [
         None,
@@ -121,7 +122,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
     let searches =
         [StartSearch::Idle, StartSearch::Searching, StartSearch::Ambiguous, StartSearch::TooFew, StartSearch::Unknown];
-    (0..12)
+    (0..13)
         .map(|index| {
             let (mode, reason) = (modes[index % 8], reasons[index]);
             let (drive, steering, laser) = (faults[index % 8], faults[(23 - index) % 8], lasers[index % 4]);
