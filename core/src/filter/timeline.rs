@@ -107,9 +107,15 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         }
     }
 
-    /// Begins, or begins anew, with a state that is true at `time`. In place: a timeline is too large for the stack of a
-    /// controller.
+    /// Begins, or begins anew, with a state that is true at `time`. If that is within what is remembered, the motions since
+    /// are kept, and lead on to the newest entry; corrections are not, as they were chosen for another state. In place: a
+    /// timeline is too large for the stack of a controller.
     pub fn begin(&mut self, time: Time, state: Ekf) {
+        let past = self.position(time).filter(|_| time < self.now());
+        if let Some(position) = past {
+            self.begin_in_past(position, time, state);
+            return;
+        }
         self.entries.clear();
         // A ring without room would be useless but not unsound.
         let _ = self.entries.push_back(Entry { motion: Motion::none(time), fusion: Fusion::Nothing, state });
@@ -117,6 +123,27 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.ahead = None;
         self.last_motion = Motion::none(time);
         self.odometry_pose = state.pose;
+        self.start = time;
+    }
+
+    /// Begins anew behind the entry at `position`, which is not the newest.
+    fn begin_in_past(&mut self, position: usize, time: Time, state: Ekf) {
+        for _ in 0..position {
+            self.entries.pop_front();
+        }
+        self.odometry_pose = state.pose;
+        let mut entries = self.entries.iter_mut();
+        if let Some(first) = entries.next() {
+            *first = Entry { motion: Motion::none(time), fusion: Fusion::Nothing, state };
+        }
+        for entry in entries {
+            if entry.motion.start < time {
+                entry.motion = entry.motion.split(time).1;
+            }
+            entry.fusion = Fusion::Nothing;
+            self.odometry_pose = self.odometry_pose.compose(&entry.motion.displacement);
+        }
+        self.settled = 1;
         self.start = time;
     }
 

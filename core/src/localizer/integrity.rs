@@ -3,6 +3,7 @@
 use super::{Localizer, PoseFix, Reason};
 use crate::geometry::Pose;
 use crate::landmarks::{LandmarkKind, Verdict};
+use crate::measurement::Time;
 
 /// Where the vehicle is, and where it would be by odometry alone.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +42,12 @@ impl<
         Some(Estimate { pose: timeline.state().pose, smooth: *timeline.odometry_pose() })
     }
 
+    /// The pose at `time`, or that for now if there is none for then.
+    fn pose_at(&mut self, time: Time) -> Option<Pose> {
+        let timeline = self.timeline.begun_mut()?;
+        Some(timeline.state_at(time).unwrap_or_else(|_| timeline.state()).pose)
+    }
+
     /// Begins the checks anew for a pose that is given, before it is taken.
     pub(super) fn restart_checks(&mut self, fix: &PoseFix) {
         let is_contradicted = matches!(
@@ -50,8 +57,8 @@ impl<
         // Who was never right after the last pose was told it wrongly.
         if is_contradicted
             && self.corrected_at.is_some()
-            && let Some(before) = self.estimate()
-            && is_knock(&before.pose.between(&fix.pose), 0.0)
+            && let Some(before) = self.pose_at(fix.time)
+            && is_knock(&before.between(&fix.pose), 0.0)
         {
             self.drift_check.suspect_laser();
         }

@@ -239,6 +239,10 @@ impl<
         if !fix.is_sound() {
             return;
         }
+        let is_past = self.timeline.begun().is_some_and(|timeline| fix.time < timeline.now());
+        if is_past && self.timeline.reaches(fix.time).is_err() {
+            return;
+        }
         let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
         let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
         self.restart_checks(fix);
@@ -246,9 +250,12 @@ impl<
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
-        self.blindness =
-            self.blindness.map(|blindness| Blindness { coasting: Coasting::new(Motion::none(fix.time)), ..blindness });
-        self.distance = DistanceSince { fix: 0.0, ..DistanceSince::NEVER };
+        if !is_past {
+            let standing = Coasting::new(Motion::none(fix.time));
+            self.blindness = self.blindness.map(|blindness| Blindness { coasting: standing, ..blindness });
+        }
+        let since = self.timeline.motions(fix.time, self.timeline.now()).fold(0.0, |way, motion| way + motion.distance);
+        self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
         self.maps.dynamic.clear();
     }
 

@@ -103,3 +103,37 @@ fn an_odometry_whose_clock_stands_still_is_told_and_a_repeated_sample_is_not() {
     drive.go(0.1, |_| {});
     assert_eq!(drive.said().mode, Mode::Reflectors);
 }
+
+#[test]
+fn a_pose_of_a_moment_ago_is_carried_on_by_what_the_odometry_said_since() {
+    let path = Path::new(16.0, |time| (1.5, 0.1 * (1.5 * time).sin()));
+    for kind in KINDS {
+        for slam in [false, true] {
+            let mut drive = Drive::start(&path, kind, slam, 100);
+            drive.is_laser_silent = true;
+            drive.go(3.0, |_| {});
+            let before = drive.said();
+            let said = drive.set_pose(0.5);
+            assert!(said.time >= before.time, "from {:?} back to {:?}", before.time, said.time);
+            let error = path.error(&said);
+            assert!(error < 0.005, "{error} m, {kind:?} slam {slam}");
+            assert!(said.covariance[0] > before.covariance[0].min(1e-4), "what was driven since is not sure");
+            drive.is_laser_silent = false;
+            drive.go(1.0, |drive| {
+                let error = path.error(&drive.said());
+                assert!(error < 0.02, "{error} m, {kind:?} slam {slam}");
+            });
+            assert_eq!(drive.said().mode, Mode::Reflectors);
+        }
+    }
+}
+
+#[test]
+fn a_pose_of_longer_ago_than_is_remembered_is_left_alone() {
+    let path = Path::straight(16.0);
+    let mut drive = Drive::start(&path, Kind::Encoders, false, 100);
+    drive.go(5.0, |_| {});
+    let before = drive.said();
+    assert_eq!(drive.set_pose(4.0).pose, before.pose);
+    assert_eq!(drive.said().mode, before.mode);
+}
