@@ -6,11 +6,13 @@
     reason = "a panic is how a test fails"
 )]
 
+use agv_core::filter::Ekf;
 use agv_core::geometry::{Pose, difference};
 use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
-    Ackermann, Control, CounterRange, Integration, Odometer, OdometryError, OdometryNoise, Tricycle, Vehicle,
+    Ackermann, Control, CounterRange, Integration, Motion, Odometer, OdometryError, OdometryNoise, Tricycle, Vehicle,
 };
+use nalgebra::Matrix3;
 use proptest::prelude::*;
 
 const WHEELBASE: f64 = 1.5;
@@ -84,6 +86,32 @@ proptest! {
         let guess = Pose::new(0.01, -0.002, 0.003);
         let rest = motion.remainder(&guess, Time::from_micros(micros));
         prop_assert!(same(&guess.compose(&rest.displacement), &motion.displacement, 1e-14));
+    }
+}
+
+proptest! {
+    #[test]
+    fn two_motions_as_one_lead_a_filter_to_the_same_state(
+        x in -0.1f64..0.1, turn in -0.3f64..0.3, next in -0.1f64..0.1, next_turn in -0.3f64..0.3, heading in -3.0f64..3.0,
+    ) {
+        let motion = |start: u64, x: f64, turn: f64| Motion {
+            start: Time::from_micros(start),
+            end: Time::from_micros(start + 10_000),
+            displacement: Pose::new(x, 0.3 * x, turn),
+            covariance: Matrix3::new(2e-6, 1e-7, 3e-7, 1e-7, 1e-6, 2e-7, 3e-7, 2e-7, 4e-6),
+            distance: x.abs(),
+        };
+        let (first, second) = (motion(0, x, turn), motion(10_000, next, next_turn));
+        let start = Ekf::new(Pose::new(1.0, -2.0, heading), 0.02, 0.01);
+        let (mut apart, mut together) = (start, start);
+        apart.predict(&first);
+        apart.predict(&second);
+        let both = first.then(&second);
+        together.predict(&both);
+        prop_assert!(same(&apart.pose, &together.pose, 1e-12));
+        prop_assert!((apart.covariance - together.covariance).norm() < 1e-12);
+        prop_assert_eq!((both.start, both.end), (first.start, second.end));
+        prop_assert!((both.distance - x.abs() - next.abs()).abs() < 1e-15);
     }
 }
 

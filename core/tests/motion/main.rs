@@ -4,9 +4,9 @@
 
 mod drive;
 
-use agv_core::localizer::{Event, Mode, Reason};
-use agv_core::measurement::SpeedSample;
-use drive::{Drive, KINDS, Kind, Path};
+use agv_core::localizer::{Event, Mode, OutputPredictor, Reason};
+use agv_core::measurement::{EncoderSample, SpeedSample};
+use drive::{Drive, KINDS, Kind, Path, parameters};
 
 /// Time after which the pose is as good as it gets, s.
 const SETTLED: f64 = 3.0;
@@ -136,4 +136,46 @@ fn a_pose_of_longer_ago_than_is_remembered_is_left_alone() {
     let before = drive.said();
     assert_eq!(drive.set_pose(4.0).pose, before.pose);
     assert_eq!(drive.said().mode, before.mode);
+}
+
+fn encoders(event: Event) -> EncoderSample {
+    let Event::Encoders(sample) = event else { panic!("{event:?}") };
+    sample
+}
+
+#[test]
+fn a_localiser_that_hangs_is_told_and_its_pose_does_not_step_back() {
+    let path = Path::new(16.0, |time| (1.0 + 0.3 * (2.0 * time).sin(), 0.05));
+    for rate in [100, 1000] {
+        let mut drive = Drive::start(&path, Kind::Encoders, false, rate);
+        let mut predictor: OutputPredictor<16> = OutputPredictor::new(&parameters(Kind::Encoders, false));
+        drive.go(SETTLED, |drive| {
+            let micros = drive.time().micros() - 1_000_000;
+            predictor.encoders(&encoders(drive.sample(micros)));
+            predictor.update(&drive.said());
+        });
+        assert_eq!(predictor.output().unwrap().mode, Mode::Reflectors);
+        let last = predictor.output().unwrap();
+        let mut samples = Vec::new();
+        for step in 1..=rate {
+            samples.push(encoders(drive.sample(3_000_000 + step * 1_000_000 / rate)));
+            predictor.encoders(samples.last().unwrap());
+            let said = predictor.output().unwrap();
+            let age = said.time.since(last.time);
+            let is_told = !matches!(said.mode, Mode::Reflectors | Mode::Mixed | Mode::Features);
+            assert_eq!(is_told, age > 0.25, "{:?} after {age} s at {rate} Hz", said.mode);
+        }
+        let before = predictor.output().unwrap();
+        let way = samples.last().unwrap().drive - encoders(drive.sample(3_000_000)).drive;
+        let counted = before.dead_reckoning_distance - last.dead_reckoning_distance;
+        assert!((counted - f64::from(way) * 1e-4).abs() < 1e-6, "{counted} m of {way} ticks");
+        // It goes on, and is half a second behind at first.
+        for sample in samples.iter().take(rate as usize / 2) {
+            drive.localizer.handle(&Event::Encoders(*sample));
+        }
+        predictor.update(&drive.said());
+        let after = predictor.output().unwrap();
+        let step = (after.pose.position() - before.pose.position()).norm();
+        assert!(after.time >= before.time && step < 1e-3, "{step} m at {rate} Hz");
+    }
 }
