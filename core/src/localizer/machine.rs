@@ -100,6 +100,7 @@ impl<
                 parameters.odometry_noise,
                 parameters.integration,
                 parameters.limits.fastest,
+                parameters.limits.longest_interval(),
             ),
             maps: Maps {
                 reflectors: FixedMap::new(),
@@ -277,6 +278,7 @@ impl<
                 self.go_on(&motion);
             }
             Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
+            Err(OdometryError::Pause) => self.coast(time, Reason::OdometrySilent),
             // The first sample behind a fault: the next one says how the vehicle moves.
             Err(OdometryError::First) => {
                 if let Some(blindness) = self.blindness {

@@ -39,6 +39,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
                 parameters.odometry_noise,
                 parameters.integration,
                 parameters.limits.fastest,
+                parameters.limits.longest_interval(),
             ),
             dead_reckoning_from: parameters.limits.dead_reckoning_from,
             motions: Vec::new(),

@@ -78,6 +78,26 @@ fn a_short_silence_of_the_odometry_costs_no_motion() {
 }
 
 #[test]
+fn a_long_silence_of_the_odometry_is_no_straight_step_that_is_believed() {
+    // A quarter of a circle.
+    let path = Path::new(16.0, |_| (1.0, 0.3));
+    for kind in KINDS {
+        let mut drive = Drive::start(&path, kind, false, 100);
+        drive.go(SETTLED, |_| {});
+        drive.is_laser_silent = true;
+        drive.is_odometry_silent = true;
+        drive.go(5.0, |_| {});
+        drive.is_odometry_silent = false;
+        drive.go(0.5, |_| {});
+        let said = drive.said();
+        assert_eq!((said.mode, said.reason), (Mode::Lost, Reason::Uncertain), "{kind:?}");
+        let deviation = said.covariance[0].min(said.covariance[2]).sqrt();
+        let error = path.error(&said);
+        assert!(error < 3.0 * deviation, "{error} m, {kind:?} says {deviation} m");
+    }
+}
+
+#[test]
 fn samples_of_another_vehicle_are_told() {
     let path = Path::straight(4.0);
     let mut drive = Drive::start(&path, Kind::Encoders, false, 100);

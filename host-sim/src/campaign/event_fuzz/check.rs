@@ -56,10 +56,7 @@ fn fits(mode: Mode, reason: Reason) -> bool {
         Mode::WithoutOdometry => {
             matches!(
                 reason,
-                Reason::OdometryImplausible
-                    | Reason::DriveEncoder
-                    | Reason::SteeringEncoder
-                    | Reason::OdometrySilent
+                Reason::OdometryImplausible | Reason::DriveEncoder | Reason::SteeringEncoder | Reason::OdometrySilent
             )
         }
         Mode::Lost => matches!(
