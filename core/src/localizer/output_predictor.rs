@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 
 use super::Parameters;
 use crate::filter::Ekf;
-use crate::measurement::{EncoderFaults, EncoderSample};
+use crate::measurement::{EncoderFaults, EncoderSample, Time};
 use crate::odometry::{Motion, Odometer};
 use crate::state::{Mode, PoseOutput, Reason};
 
@@ -57,12 +57,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         let covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, heading);
         self.state = Ekf { pose: output.pose, covariance };
         for motion in &self.motions {
-            // Of a motion that is partly known the rest counts.
-            if motion.start < output.time {
-                self.state.predict(&motion.split(output.time).1);
-            } else {
-                self.state.predict(motion);
-            }
+            go_on(&mut self.state, motion, output.time);
         }
     }
 
@@ -77,8 +72,8 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         }
         // There is room.
         let _ = self.motions.push(motion);
-        if self.base.is_some_and(|base| motion.end > base.time) {
-            self.state.predict(&motion);
+        if let Some(base) = self.base.filter(|base| motion.end > base.time) {
+            go_on(&mut self.state, &motion, base.time);
         }
     }
 
@@ -136,5 +131,14 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             dead_reckoning_distance: distance,
             ..base
         })
+    }
+}
+
+/// Goes on by a motion. Of one that the localiser has used, or assumed, up to `known`, the rest counts.
+fn go_on(state: &mut Ekf, motion: &Motion, known: Time) {
+    if motion.start < known {
+        state.predict(&motion.split(known).1);
+    } else {
+        state.predict(motion);
     }
 }

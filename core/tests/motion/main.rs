@@ -7,7 +7,7 @@ mod drive;
 use agv_core::features::SensorPath;
 use agv_core::geometry::{Pose, Twist};
 use agv_core::localizer::{Event, Mode, OutputPredictor, Reason};
-use agv_core::measurement::{EncoderSample, SpeedSample, Time};
+use agv_core::measurement::{EncoderSample, Reflectors, SpeedSample, Time};
 use drive::{Drive, KINDS, Kind, Path, parameters};
 
 /// Time after which the pose is as good as it gets, s.
@@ -263,4 +263,28 @@ fn a_scan_is_corrected_up_to_its_last_beam_at_every_rate() {
             assert!(error < allowed, "{error} m at {seconds} s, a node each {interval} us");
         }
     }
+}
+
+#[test]
+fn what_the_localiser_has_assumed_already_is_not_published_twice() {
+    let path = Path::new(8.0, |_| (1.5, 0.05));
+    let mut drive = Drive::start(&path, Kind::Encoders, false, 100);
+    let mut predictor: OutputPredictor<16> = OutputPredictor::new(&parameters(Kind::Encoders, false));
+    // The last beam of the twenty-fourth revolution is 9 ms behind the last sample.
+    drive.is_laser_silent = true;
+    drive.go(2.99, |drive| {
+        predictor.encoders(&encoders(drive.sample(drive.time().micros() - 1_000_000)));
+    });
+    let mut seen = drive.revolution(23);
+    seen.last_mut().unwrap().time = drive.time().offset(0.009);
+    let observations = &seen[seen.len() - 1..];
+    drive.localizer.handle(&Event::Reflectors(Reflectors { observations }));
+    assert!(drive.said().time > drive.time());
+    predictor.update(&drive.said());
+    let sample = encoders(drive.sample(3_000_000));
+    predictor.encoders(&sample);
+    drive.localizer.handle(&Event::Encoders(sample));
+    let (said, expected) = (predictor.output().unwrap(), drive.said());
+    let error = (said.pose.position() - expected.pose.position()).norm();
+    assert!(said.time == expected.time && error < 1e-4, "{error} m");
 }
