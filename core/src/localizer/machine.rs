@@ -12,7 +12,7 @@ use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline
 use crate::geometry::{Point, Pose, wrap};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
 use crate::measurement::{EncoderFaults, Scan, Time};
-use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
+use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -175,6 +175,12 @@ impl<
         self.slam.landmarks()
     }
 
+    /// What has been learnt of the odometry's lasting errors, and is taken from its motions; none without SLAM.
+    #[must_use]
+    pub fn odometry_bias(&self) -> OdometryBias {
+        if self.parameters.maps.slam { self.slam.bias() } else { OdometryBias::default() }
+    }
+
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {
@@ -261,18 +267,14 @@ impl<
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
-        let Some(timeline) = self.timeline.begun_mut() else {
+        let Some(start) = self.timeline.begun().map(Timeline::start) else {
             return;
         };
         match motion {
             // A pose may be given for a time between two samples; only what follows it counts.
-            Ok(motion) if motion.end > timeline.start() => {
-                let motion = if motion.start < timeline.start() { motion.split(timeline.start()).1 } else { motion };
-                let motion = if self.parameters.maps.slam {
-                    motion.corrected(&self.slam.bias(), self.parameters.vehicle.steering_lever())
-                } else {
-                    motion
-                };
+            Ok(motion) if motion.end > start => {
+                let motion = if motion.start < start { motion.split(start).1 } else { motion };
+                let motion = motion.corrected(&self.odometry_bias(), self.parameters.vehicle.steering_lever());
                 self.blindness = None;
                 self.repeated = 0;
                 self.go_on(&motion);

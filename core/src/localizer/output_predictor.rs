@@ -10,7 +10,7 @@ use nalgebra::Matrix3;
 use super::Parameters;
 use crate::filter::Ekf;
 use crate::measurement::{EncoderFaults, EncoderSample, Time};
-use crate::odometry::{Motion, Odometer};
+use crate::odometry::{Motion, Odometer, OdometryBias};
 use crate::state::{Mode, PoseOutput, Reason};
 
 /// Longest time, s, for which a localiser that says nothing is merely busy: the longest scan, twice.
@@ -26,6 +26,7 @@ pub struct OutputPredictor<const MOTIONS: usize = 40> {
     motions: Vec<Motion, MOTIONS>,
     base: Option<PoseOutput>,
     state: Ekf,
+    bias: OdometryBias,
     faults: EncoderFaults,
 }
 
@@ -45,19 +46,22 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             motions: Vec::new(),
             base: None,
             state: Ekf::new(crate::geometry::Pose::default(), 0.0, 0.0),
+            bias: OdometryBias::default(),
             faults: EncoderFaults::default(),
         }
     }
 
-    /// Takes what the localiser said last.
-    pub fn update(&mut self, output: &PoseOutput) {
+    /// Takes what the localiser said last, and what it has learnt of the odometry.
+    pub fn update(&mut self, output: &PoseOutput, bias: &OdometryBias) {
+        self.bias = *bias;
         self.motions.retain(|motion| motion.end > output.time);
         self.base = Some(*output);
         let [xx, xy, yy, x_heading, y_heading, heading] = output.covariance;
         let covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, heading);
         self.state = Ekf { pose: output.pose, covariance };
+        let lever = self.odometer.vehicle().steering_lever();
         for motion in &self.motions {
-            go_on(&mut self.state, motion, output.time);
+            go_on(&mut self.state, &motion.corrected(bias, lever), output.time);
         }
     }
 
@@ -73,6 +77,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         // There is room.
         let _ = self.motions.push(motion);
         if let Some(base) = self.base.filter(|base| motion.end > base.time) {
+            let motion = motion.corrected(&self.bias, self.odometer.vehicle().steering_lever());
             go_on(&mut self.state, &motion, base.time);
         }
     }

@@ -67,6 +67,12 @@ impl Odometer {
         Self { vehicle, noise, integration, fastest, longest_interval, last: None }
     }
 
+    /// The vehicle whose samples it takes.
+    #[must_use]
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
     /// Forgets the last sample: what comes next cannot be compared with it.
     pub fn restart(&mut self) {
         self.last = None;

@@ -174,7 +174,7 @@ fn a_localiser_that_hangs_is_told_and_its_pose_does_not_step_back() {
         drive.go(SETTLED, |drive| {
             let micros = drive.time().micros() - 1_000_000;
             predictor.encoders(&encoders(drive.sample(micros)));
-            predictor.update(&drive.said());
+            predictor.update(&drive.said(), &drive.localizer.odometry_bias());
         });
         assert_eq!(predictor.output().unwrap().mode, Mode::Reflectors);
         let last = predictor.output().unwrap();
@@ -195,7 +195,7 @@ fn a_localiser_that_hangs_is_told_and_its_pose_does_not_step_back() {
         for sample in samples.iter().take(rate as usize / 2) {
             drive.localizer.handle(&Event::Encoders(*sample));
         }
-        predictor.update(&drive.said());
+        predictor.update(&drive.said(), &drive.localizer.odometry_bias());
         let after = predictor.output().unwrap();
         let step = (after.pose.position() - before.pose.position()).norm();
         assert!(after.time >= before.time && step < 1e-3, "{step} m at {rate} Hz");
@@ -280,11 +280,30 @@ fn what_the_localiser_has_assumed_already_is_not_published_twice() {
     let observations = &seen[seen.len() - 1..];
     drive.localizer.handle(&Event::Reflectors(Reflectors { observations }));
     assert!(drive.said().time > drive.time());
-    predictor.update(&drive.said());
+    predictor.update(&drive.said(), &drive.localizer.odometry_bias());
     let sample = encoders(drive.sample(3_000_000));
     predictor.encoders(&sample);
     drive.localizer.handle(&Event::Encoders(sample));
     let (said, expected) = (predictor.output().unwrap(), drive.said());
     let error = (said.pose.position() - expected.pose.position()).norm();
     assert!(said.time == expected.time && error < 1e-4, "{error} m");
+}
+
+#[test]
+fn what_was_learnt_of_the_odometry_is_in_what_is_published() {
+    let path = Path::new(40.0, |time| (1.0, 0.3 * (0.5 * time).sin()));
+    let mut drive = Drive::start(&path, Kind::Encoders, true, 100);
+    drive.scale = 0.015;
+    drive.go(30.0, |_| {});
+    let mut predictor: OutputPredictor<16> = OutputPredictor::new(&parameters(Kind::Encoders, true));
+    predictor.encoders(&encoders(drive.sample(30_000_000)));
+    predictor.update(&drive.said(), &drive.localizer.odometry_bias());
+    for step in 1..=16 {
+        let sample = encoders(drive.sample(30_000_000 + step * 10_000));
+        predictor.encoders(&sample);
+        drive.localizer.handle(&Event::Encoders(sample));
+    }
+    let (said, expected) = (predictor.output().unwrap(), drive.said());
+    let error = (said.pose.position() - expected.pose.position()).norm();
+    assert!(said.time == expected.time && error < 1e-5, "{error} m");
 }
