@@ -191,6 +191,39 @@ fn late_measurements_give_what_timely_ones_would_have_given() {
 }
 
 #[test]
+fn at_a_thousand_motions_a_second_the_past_is_as_long_and_the_order_of_measurements_hardly_counts() {
+    // Speeding up by 1 m/s^2, in a bend.
+    let motion = |step: u64| {
+        let way = (0.5 + step as f64 * 1e-3) * 1e-3;
+        Motion {
+            start: Time::from_micros(step * 1_000),
+            end: Time::from_micros((step + 1) * 1_000),
+            displacement: Pose::new(way, 0.0, 0.3 * way),
+            covariance: Matrix3::from_diagonal(&Vector3::new(1e-7, 1e-8, 1e-8)),
+            distance: way,
+        }
+    };
+    let seen = observations();
+    let mut timely = past();
+    let mut late = past();
+    let mut pending = seen.iter().peekable();
+    for step in 0..400 {
+        late.advance(&motion(step));
+        timely.advance(&motion(step));
+        while let Some((time, correction)) = pending.next_if(|(time, _)| *time <= motion(step).end) {
+            assert_eq!(timely.correct(*time, |_| Some(*correction)), Ok(true));
+        }
+    }
+    for (time, correction) in seen.iter().rev() {
+        assert_eq!(late.correct(*time, |_| Some(*correction)), Ok(true), "{time:?} is remembered");
+    }
+    assert!(pending.next().is_none());
+    let (timely, late) = (timely.state().pose, late.state().pose);
+    let off = (timely.position() - late.position()).norm();
+    assert!(off < 5e-5 && difference(timely.theta, late.theta).abs() < 1e-5, "{off} m");
+}
+
+#[test]
 fn measurements_ahead_of_the_odometry_are_extrapolated_and_set_right() {
     let seen = observations();
     let mut timeline = past();

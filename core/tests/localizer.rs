@@ -1,6 +1,7 @@
 //! The localiser as a whole: what it says of itself, and that nothing from outside can hurt it.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use agv_core::features::{ReflectorDetection, falko};
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason};
@@ -73,15 +74,21 @@ impl Drive {
     /// Drives for some revolutions; `sees` says which reflectors are seen, by their ids.
     fn revolutions(&mut self, count: usize, sees: impl Fn(u16) -> bool) -> PoseOutput {
         for _ in 0..count {
-            let start = self.time();
-            for _ in 0..12 {
-                self.step += 1;
-                let drive = ((self.step - self.stood) as f64 * 0.01 / TICK).round() as u32;
-                self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive, steering: 0 }));
-            }
+            let start = self.travel();
             self.see(start, &sees);
         }
         self.localizer.outputs().pose
+    }
+
+    /// Drives for the time of a revolution, and returns when it began.
+    fn travel(&mut self) -> Time {
+        let start = self.time();
+        for _ in 0..12 {
+            self.step += 1;
+            let drive = ((self.step - self.stood) as f64 * 0.01 / TICK).round() as u32;
+            self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive, steering: 0 }));
+        }
+        start
     }
 
     /// Takes the reflectors of the revolution that has just ended.
@@ -255,6 +262,68 @@ fn a_vehicle_that_was_carried_away_is_lost_and_can_be_put_back() {
     assert_eq!(drive.revolutions(4, |_| true).mode, Mode::Reflectors);
 }
 
+/// A scan of a revolution that has just ended: of walls without features, and of the reflectors that are seen.
+fn scan_of(start: Time, seen: &[ReflectorObservation]) -> (Vec<f32>, Vec<u16>) {
+    let mut ranges = vec![0.0; 360];
+    let mut intensities = vec![0; 360];
+    for one in seen {
+        let beam = (one.time.since(start) / BEAM).round() as usize % 360;
+        ranges[beam] = one.range;
+        intensities[beam] = 200;
+    }
+    (ranges, intensities)
+}
+
+/// Time between two beams of a scan of 360, s.
+const BEAM: f64 = 0.12 / 360.0;
+
+fn scan<'a>(start: Time, ranges: &'a [f32], intensities: &'a [u16]) -> Event<'a> {
+    let bearing_step = std::f64::consts::TAU / 360.0;
+    Event::Scan(Scan { start, beam_interval: BEAM, first_bearing: 0.0, bearing_step, ranges, intensities })
+}
+
+#[test]
+fn a_vehicle_that_was_carried_away_is_lost_though_each_revolution_has_a_scan_too() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    let revolution = |drive: &mut Drive| {
+        let start = drive.time();
+        drive.revolutions(1, |_| true);
+        let (ranges, _) = scan_of(start, &[]);
+        drive.localizer.handle(&scan(start, &ranges, &[])).pose
+    };
+    for _ in 0..8 {
+        assert_eq!(revolution(&mut drive).mode, Mode::Reflectors);
+    }
+    drive.offset = 0.6;
+    let told = (0..6).map(|_| revolution(&mut drive)).find(|output| output.mode == Mode::Lost);
+    assert_eq!(told.map(|output| output.reason), Some(Reason::MotionDisagrees));
+}
+
+#[test]
+fn a_vehicle_that_was_carried_away_is_lost_where_its_reflectors_are_found_in_scans() {
+    let mut drive = Drive::start();
+    let mut parameters = parameters();
+    parameters.reflectors.detection = Some(ReflectorDetection::default());
+    // A beam a degree.
+    parameters.reflectors.bearing_deviation = 0.01;
+    *drive.localizer = Small::new(parameters);
+    drive.localizer.add_landmarks(&reflectors()).unwrap();
+    drive.set_pose(Pose::default());
+    let revolution = |drive: &mut Drive| {
+        let start = drive.travel();
+        let seen: Vec<_> = reflectors().iter().filter_map(|reflector| drive.observe(start, reflector)).collect();
+        let (ranges, intensities) = scan_of(start, &seen);
+        drive.localizer.handle(&scan(start, &ranges, &intensities)).pose
+    };
+    for _ in 0..8 {
+        assert_eq!(revolution(&mut drive).mode, Mode::Reflectors);
+    }
+    drive.offset = 0.6;
+    let told = (0..6).map(|_| revolution(&mut drive)).find(|output| output.mode == Mode::Lost);
+    assert_eq!(told.map(|output| output.reason), Some(Reason::MotionDisagrees));
+}
+
 #[test]
 fn some_false_reflectors_change_nothing() {
     let mut drive = Drive::start();
@@ -333,7 +402,7 @@ fn the_predictor_says_at_once_what_the_localiser_will_say() {
     drive.localizer.handle(&Event::Encoders(sample(0)));
     predictor.encoders(&sample(0));
     drive.set_pose(Pose::new(0.1, -0.2, 0.3));
-    predictor.update(&drive.localizer.outputs().pose);
+    predictor.update(&drive.localizer.outputs().pose, &drive.localizer.odometry_bias());
     let mut pending = Vec::new();
     for step in 1..200 {
         predictor.encoders(&sample(step));
@@ -353,7 +422,7 @@ fn the_predictor_says_at_once_what_the_localiser_will_say() {
             for sample in pending.drain(..) {
                 drive.localizer.handle(&Event::Encoders(sample));
             }
-            predictor.update(&drive.localizer.outputs().pose);
+            predictor.update(&drive.localizer.outputs().pose, &drive.localizer.odometry_bias());
         }
     }
     let faults = EncoderFaults { time: sample(200).time, drive: None, steering: Some(EncoderFault::Late) };
@@ -504,4 +573,31 @@ fn an_increment_of_more_than_half_a_turn_is_no_motion() {
         assert_eq!((output.mode, output.reason), (Mode::WithoutOdometry, Reason::OdometryImplausible));
         assert_eq!(output.pose, pose);
     }
+}
+
+#[test]
+fn a_vehicle_that_is_lost_learns_no_landmarks() {
+    let mut drive = Drive::start();
+    let mut parameters = parameters();
+    parameters.maps.dynamic = true;
+    parameters.features.detector = falko::Parameters::thesis();
+    parameters.limits.lost_after = 2.0;
+    *drive.localizer = Small::new(parameters);
+    drive.set_pose(Pose::default());
+    // A square room of 5 m whose corners are seen.
+    let ranges: Vec<f32> = (0..360)
+        .map(|degree| f64::from(degree).to_radians())
+        .map(|angle| (2.5 / angle.cos().abs().max(angle.sin().abs())) as f32)
+        .collect();
+    let look = |drive: &mut Drive| {
+        let start = drive.travel();
+        drive.localizer.handle(&scan(start, &ranges, &[]));
+    };
+    look(&mut drive);
+    let learnt = drive.localizer.dynamic_landmarks().to_vec();
+    assert!(!learnt.is_empty());
+    drive.revolutions(30, |_| false);
+    assert_eq!(drive.localizer.outputs().pose.mode, Mode::Lost);
+    look(&mut drive);
+    assert_eq!(drive.localizer.dynamic_landmarks(), learnt);
 }

@@ -6,11 +6,13 @@
     reason = "a panic is how a test fails"
 )]
 
+use agv_core::filter::Ekf;
 use agv_core::geometry::{Pose, difference};
 use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
-    Ackermann, Control, CounterRange, Integration, Odometer, OdometryError, OdometryNoise, Tricycle, Vehicle,
+    Ackermann, Control, CounterRange, Integration, Motion, Odometer, OdometryError, OdometryNoise, Tricycle, Vehicle,
 };
+use nalgebra::Matrix3;
 use proptest::prelude::*;
 
 const WHEELBASE: f64 = 1.5;
@@ -101,6 +103,32 @@ proptest! {
     }
 }
 
+proptest! {
+    #[test]
+    fn two_motions_as_one_lead_a_filter_to_the_same_state(
+        x in -0.1f64..0.1, turn in -0.3f64..0.3, next in -0.1f64..0.1, next_turn in -0.3f64..0.3, heading in -3.0f64..3.0,
+    ) {
+        let motion = |start: u64, x: f64, turn: f64| Motion {
+            start: Time::from_micros(start),
+            end: Time::from_micros(start + 10_000),
+            displacement: Pose::new(x, 0.3 * x, turn),
+            covariance: Matrix3::new(2e-6, 1e-7, 3e-7, 1e-7, 1e-6, 2e-7, 3e-7, 2e-7, 4e-6),
+            distance: x.abs(),
+        };
+        let (first, second) = (motion(0, x, turn), motion(10_000, next, next_turn));
+        let start = Ekf::new(Pose::new(1.0, -2.0, heading), 0.02, 0.01);
+        let (mut apart, mut together) = (start, start);
+        apart.predict(&first);
+        apart.predict(&second);
+        let both = first.then(&second);
+        together.predict(&both);
+        prop_assert!(same(&apart.pose, &together.pose, 1e-12));
+        prop_assert!((apart.covariance - together.covariance).norm() < 1e-12);
+        prop_assert_eq!((both.start, both.end), (first.start, second.end));
+        prop_assert!((both.distance - x.abs() - next.abs()).abs() < 1e-15);
+    }
+}
+
 fn same(a: &Pose, b: &Pose, tolerance: f64) -> bool {
     (a.x - b.x).abs() < tolerance && (a.y - b.y).abs() < tolerance && difference(a.theta, b.theta).abs() < tolerance
 }
@@ -118,7 +146,7 @@ fn tricycle() -> Tricycle {
 }
 
 fn tricycle_odometer() -> Odometer {
-    Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::RungeKutta2, 100.0)
+    Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::RungeKutta2, 100.0, 0.25)
 }
 
 /// Error of the end pose after a drive of 2 m whose steering angle is `rate * way`, in `steps` steps, against the
@@ -174,11 +202,12 @@ fn an_arc_of_constant_steering_is_exact() {
 #[test]
 fn the_asymmetric_model_uses_the_offset_of_the_direction() {
     let asymmetric = Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
-    let mut odometer = Odometer::new(Vehicle::Tricycle(asymmetric), OdometryNoise::default(), Integration::Arc, 100.0);
+    let mut odometer =
+        Odometer::new(Vehicle::Tricycle(asymmetric), OdometryNoise::default(), Integration::Arc, 100.0, 0.25);
     let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
     assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
-    let forward = odometer.encoders(&sample(1_000_000, 10_000)).unwrap();
-    let backward = odometer.encoders(&sample(2_000_000, 0)).unwrap();
+    let forward = odometer.encoders(&sample(100_000, 10_000)).unwrap();
+    let backward = odometer.encoders(&sample(200_000, 0)).unwrap();
     assert!((forward.displacement.theta - 0.01f64.sin() / WHEELBASE).abs() < 1e-15);
     assert!((backward.displacement.theta - 0.02f64.sin() / WHEELBASE).abs() < 1e-15);
 }
@@ -186,7 +215,7 @@ fn the_asymmetric_model_uses_the_offset_of_the_direction() {
 #[test]
 fn a_drive_counter_that_wraps_goes_on() {
     let small = Tricycle { drive_range: CounterRange::new(5_000).unwrap(), ..tricycle() };
-    let mut odometer = Odometer::new(Vehicle::Tricycle(small), OdometryNoise::default(), Integration::Arc, 100.0);
+    let mut odometer = Odometer::new(Vehicle::Tricycle(small), OdometryNoise::default(), Integration::Arc, 20.0, 0.25);
     let mut way = 0.0;
     for step in 0u64..100 {
         let drive = (step * 700 % 5_000) as u32;
@@ -202,22 +231,23 @@ fn a_drive_counter_that_wraps_goes_on() {
 fn a_car_turns_about_the_point_that_its_wheels_agree_on() {
     // Rear-left wheel at radius R - H, rear axle's centre at R = L / tan(steering).
     let car = Ackermann { wheelbase: 2.83, encoder_offset: 0.76 };
-    let mut odometer = Odometer::new(Vehicle::Ackermann(car), OdometryNoise::default(), Integration::Arc, 100.0);
+    let mut odometer = Odometer::new(Vehicle::Ackermann(car), OdometryNoise::default(), Integration::Arc, 100.0, 0.25);
     let steering: f64 = 0.3;
     let radius = 2.83 / steering.tan();
     let turn_rate = 0.4;
     let speed = turn_rate * (radius - 0.76);
     let sample = |time| SpeedSample { time: Time::from_micros(time), speed, steering };
     assert_eq!(odometer.speed(&sample(0)), Err(OdometryError::First));
-    let motion = odometer.speed(&sample(500_000)).unwrap();
-    let turned: f64 = 0.5 * turn_rate;
+    let motion = odometer.speed(&sample(200_000)).unwrap();
+    let turned: f64 = 0.2 * turn_rate;
     let expected = Pose::new(radius * turned.sin(), radius * (1.0 - turned.cos()), turned);
     assert!(same(&motion.displacement, &expected, 1e-12));
 }
 
 #[test]
 fn samples_that_cannot_be_are_refused() {
-    let mut odometer = Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::Arc, 2.0);
+    let mut odometer =
+        Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::Arc, 2.0, 0.25);
     let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
     assert_eq!(odometer.encoders(&sample(100, 0)), Err(OdometryError::First));
     assert_eq!(odometer.encoders(&sample(100, 1)), Err(OdometryError::OutOfOrder));
@@ -227,6 +257,46 @@ fn samples_that_cannot_be_are_refused() {
     assert_eq!(odometer.speed(&speed), Err(OdometryError::WrongVehicle));
     let increment = PoseIncrement { time: Time::from_micros(0), displacement: Pose::default() };
     assert_eq!(odometer.increment(&increment), Err(OdometryError::WrongVehicle));
+}
+
+#[test]
+fn samples_too_far_apart_make_no_motion_and_the_next_one_does() {
+    let odometer = |vehicle| Odometer::new(vehicle, OdometryNoise::default(), Integration::Arc, 5.0, 0.25);
+    let time = Time::from_micros;
+    let mut encoders = odometer(Vehicle::Tricycle(tricycle()));
+    let mut speeds = odometer(Vehicle::Ackermann(Ackermann { wheelbase: 2.0, encoder_offset: 0.0 }));
+    let mut increments = odometer(Vehicle::Increments);
+    let told = [0, 240_000, 5_240_000, 5_250_000].map(|micros| {
+        let displacement = Pose::new(0.1, 0.0, 0.0);
+        [
+            encoders.encoders(&EncoderSample { time: time(micros), drive: micros as u32 / 1_000, steering: 0 }),
+            speeds.speed(&SpeedSample { time: time(micros), speed: 1.0, steering: 0.1 }),
+            increments.increment(&PoseIncrement { time: time(micros), displacement: displacement.fraction(0.1) }),
+        ]
+    });
+    assert!(told[0].iter().all(|told| *told == Err(OdometryError::First)));
+    assert!(told[1].iter().all(Result::is_ok));
+    assert!(told[2].iter().all(|told| *told == Err(OdometryError::Pause)), "{:?}", told[2]);
+    assert!(told[3].iter().all(|told| told.is_ok_and(|motion| motion.start == time(5_240_000))));
+}
+
+#[test]
+fn a_counter_of_which_the_fastest_vehicle_may_go_half_the_range_is_not_believed() {
+    // Half of 16 bits are 0.328 m, which 5 m/s are in 65.5 ms.
+    let short = Tricycle { drive_scale: 1e-5, drive_range: CounterRange::BITS_16, ..tricycle() };
+    for (micros, is_told) in [(60_000, true), (65_000, true), (66_000, false), (120_000, false)] {
+        let mut odometer =
+            Odometer::new(Vehicle::Tricycle(short), OdometryNoise::default(), Integration::Arc, 5.0, 0.25);
+        let sample = |time, drive| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
+        assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
+        // The vehicle goes at 4.9 m/s.
+        let drive = (micros as f64 * 4.9e-6 / 1e-5) as u32 & 0xFFFF;
+        let told = odometer.encoders(&sample(micros, drive));
+        assert_eq!(told.is_ok(), is_told, "{micros} us: {told:?}");
+        if let Ok(motion) = told {
+            assert!((motion.displacement.x - micros as f64 * 4.9e-6).abs() < 2e-5);
+        }
+    }
 }
 
 #[test]

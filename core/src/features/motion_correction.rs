@@ -6,10 +6,10 @@ use super::PointScan;
 use crate::geometry::{Point, Pose, ScanPoint};
 use crate::measurement::{Scan, Time};
 
-/// Nodes of a path; more than the odometry delivers in one revolution.
+/// Nodes of a path. If there are more, every second one is left out.
 const NODES: usize = 48;
 
-/// Nodes closer in time than this, s, add nothing.
+/// Nodes closer in time than this, s, add nothing at first.
 const LEAST_SPACING: f64 = 2e-3;
 
 /// Where the sensor was during a scan, relative to where it was at the first beam; linear between nodes.
@@ -42,17 +42,43 @@ impl SensorPath {
         self.nodes.clear();
         let back = laser.inverse();
         let mut last = f64::NEG_INFINITY;
-        for (time, displacement) in displacements {
-            let time = time.since(start);
-            if time - last < LEAST_SPACING {
-                continue;
-            }
-            last = time;
+        let mut spacing = LEAST_SPACING;
+        let node = |time: f64, displacement: &Pose| {
             let pose = back.compose(&displacement.compose(laser));
             let (sine, cosine) = libm::sincos(pose.theta);
-            // A path that is too long is held at its last node.
-            let _ = self.nodes.push(Node { time, x: pose.x, y: pose.y, sine, cosine });
+            Node { time, x: pose.x, y: pose.y, sine, cosine }
+        };
+        let mut skipped = None;
+        for (time, displacement) in displacements {
+            let time = time.since(start);
+            if time - last < spacing {
+                skipped = Some((time, displacement));
+                continue;
+            }
+            if self.nodes.is_full() {
+                self.thin_out();
+                spacing *= 2.0;
+            }
+            (last, skipped) = (time, None);
+            // There is room.
+            let _ = self.nodes.push(node(time, &displacement));
         }
+        // Its end is as near as the first spacing would leave it.
+        if let Some((time, displacement)) = skipped.filter(|(time, _)| time - last >= LEAST_SPACING) {
+            if self.nodes.is_full() {
+                self.thin_out();
+            }
+            let _ = self.nodes.push(node(time, &displacement));
+        }
+    }
+
+    /// Leaves out every second node.
+    fn thin_out(&mut self) {
+        let mut is_kept = false;
+        self.nodes.retain(|_| {
+            is_kept = !is_kept;
+            is_kept
+        });
     }
 
     /// Where the sensor was `time` seconds after the first beam, in its frame at the first beam.

@@ -4,6 +4,11 @@
 //! its end, if any, and the state after both. A correction in the past is inserted at its own time, and everything
 //! behind it is computed again; so the result does not depend on the order in which measurements arrive. States are
 //! computed when they are asked for, so that the corrections of one scan, made in order of time, cost one pass.
+//!
+//! Motions of an odometry that reports more often than 143 times a second become one as long as no correction lies between
+//! them, so that the ring spans about as much time at every rate. A correction that comes late may then meet a motion that a
+//! timely one would have met in parts, as if the vehicle had kept its velocity for those 14 ms: at an acceleration of
+//! 1 m/s^2 that is less than 0.03 mm, by which the order of measurements counts at such rates.
 
 use heapless::Deque;
 
@@ -11,6 +16,9 @@ use super::{Ekf, Observation};
 use crate::geometry::{Point, Pose};
 use crate::measurement::Time;
 use crate::odometry::Motion;
+
+/// Motions become one up to this time, s; one that takes more than half of it stays as it is.
+const LONGEST_JOINED: f64 = 0.014;
 
 /// An observation that was taken for one landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,9 +115,15 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         }
     }
 
-    /// Begins, or begins anew, with a state that is true at `time`. In place: a timeline is too large for the stack of a
-    /// controller.
+    /// Begins, or begins anew, with a state that is true at `time`. If that is within what is remembered, the motions since
+    /// are kept, and lead on to the newest entry; corrections are not, as they were chosen for another state. In place: a
+    /// timeline is too large for the stack of a controller.
     pub fn begin(&mut self, time: Time, state: Ekf) {
+        let past = self.position(time).filter(|_| time < self.now());
+        if let Some(position) = past {
+            self.begin_in_past(position, time, state);
+            return;
+        }
         self.entries.clear();
         // A ring without room would be useless but not unsound.
         let _ = self.entries.push_back(Entry { motion: Motion::none(time), fusion: Fusion::Nothing, state });
@@ -117,6 +131,27 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.ahead = None;
         self.last_motion = Motion::none(time);
         self.odometry_pose = state.pose;
+        self.start = time;
+    }
+
+    /// Begins anew behind the entry at `position`, which is not the newest.
+    fn begin_in_past(&mut self, position: usize, time: Time, state: Ekf) {
+        for _ in 0..position {
+            self.entries.pop_front();
+        }
+        self.odometry_pose = state.pose;
+        let mut entries = self.entries.iter_mut();
+        if let Some(first) = entries.next() {
+            *first = Entry { motion: Motion::none(time), fusion: Fusion::Nothing, state };
+        }
+        for entry in entries {
+            if entry.motion.start < time {
+                entry.motion = entry.motion.split(time).1;
+            }
+            entry.fusion = Fusion::Nothing;
+            self.odometry_pose = self.odometry_pose.compose(&entry.motion.displacement);
+        }
+        self.settled = 1;
         self.start = time;
     }
 
@@ -143,6 +178,12 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.entries.back().map_or(Time::default(), Entry::time)
     }
 
+    /// The time of the oldest entry that is left if one more comes; none if there is room.
+    #[must_use]
+    pub fn oldest_after_next(&self) -> Option<Time> {
+        self.entries.is_full().then(|| self.entries.get(1).map(Entry::time)).flatten()
+    }
+
     /// The state at the newest entry.
     #[must_use]
     pub fn state(&mut self) -> Ekf {
@@ -161,10 +202,39 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
                 self.last_motion = *motion;
                 return;
             }
+            // A motion that was not assumed, but told, counts.
+            None if motion.start < self.now() => {
+                self.last_motion = *motion;
+                if motion.end > self.now() {
+                    self.append(motion.split(self.now()).1);
+                }
+                return;
+            }
             None => *motion,
         };
         self.last_motion = *motion;
         self.append(rest);
+    }
+
+    /// Goes on from the newest entry by a motion that is assumed until the odometry reports what it was.
+    pub fn assume(&mut self, motion: &Motion) {
+        let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
+        self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
+        self.append(*motion);
+    }
+
+    /// Whether the state at `time` can be told.
+    ///
+    /// # Errors
+    /// See [`TimelineError`].
+    pub fn reaches(&self, time: Time) -> Result<(), TimelineError> {
+        if self.position(time).is_none() {
+            return Err(TimelineError::TooLate);
+        }
+        if time > self.now() && time.since(self.last_motion.end) > self.longest_extrapolation {
+            return Err(TimelineError::TooEarly);
+        }
+        Ok(())
     }
 
     /// The last motion that the odometry reported.
@@ -308,12 +378,27 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
 
     fn append(&mut self, motion: Motion) {
         let state = self.state();
+        self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
+        if let Some(last) = self.joinable(&motion) {
+            last.motion = last.motion.then(&motion);
+            last.state.predict(&motion);
+            return;
+        }
         self.make_room();
         let mut entry = Entry { motion, fusion: Fusion::Nothing, state };
         entry.recompute(&state, &self.laser);
-        self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
         let _ = self.entries.push_back(entry);
         self.settled = self.entries.len();
+    }
+
+    /// The newest entry, if a short motion that follows can become one with its motion.
+    fn joinable(&mut self, motion: &Motion) -> Option<&mut Entry> {
+        let is_first = self.entries.len() < 2;
+        let last = self.entries.back_mut()?;
+        let is_short = 2.0 * motion.end.since(motion.start) <= LONGEST_JOINED
+            && motion.end.since(last.motion.start) <= LONGEST_JOINED
+            && motion.start == last.motion.end;
+        (is_short && !is_first && matches!(last.fusion, Fusion::Nothing)).then_some(last)
     }
 
     /// Drops the oldest entry if the ring is full; true if it did.

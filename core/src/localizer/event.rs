@@ -1,6 +1,6 @@
 //! What the localiser is told.
 
-use crate::measurement::{EncoderFaults, EncoderSample, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample};
+use crate::measurement::{EncoderFaults, EncoderSample, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample, Time};
 
 /// One thing that a sensor or an operator said, with the time at which it was true.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,4 +20,15 @@ pub enum Event<'a> {
     Scan(Scan<'a>),
     /// A pose from outside.
     SetPose(PoseFix),
+}
+
+impl Event<'_> {
+    /// When the last thing in it was seen.
+    pub(super) fn seen_until(&self) -> Option<Time> {
+        match self {
+            Self::Reflectors(reflectors) => reflectors.observations.last().map(|last| last.time),
+            Self::Scan(scan) => Some(scan.end()),
+            _ => None,
+        }
+    }
 }

@@ -48,9 +48,11 @@ impl<
         self.lost = evidence.judge(&mut self.consistency);
     }
 
-    /// Algorithm 1 (K 5.4.1) for the natural features of one scan, at the poses that the whole scan has led to.
+    /// Algorithm 1 (K 5.4.1) for the natural features of one scan, at the poses that the whole scan has led to. A vehicle
+    /// that is lost does not know where they are.
     pub(super) fn update_dynamic_map(&mut self) {
-        let Some(timeline) = self.timeline.begun_mut().filter(|_| self.parameters.maps.dynamic) else {
+        let is_wanted = self.parameters.maps.dynamic && self.lost.is_none();
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| is_wanted) else {
             return;
         };
         for sighting in &self.workspace.sightings {

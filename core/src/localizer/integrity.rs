@@ -3,6 +3,7 @@
 use super::{Localizer, PoseFix, Reason};
 use crate::geometry::Pose;
 use crate::landmarks::{LandmarkKind, Verdict};
+use crate::measurement::Time;
 
 /// Where the vehicle is, and where it would be by odometry alone.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +42,12 @@ impl<
         Some(Estimate { pose: timeline.state().pose, smooth: *timeline.odometry_pose() })
     }
 
+    /// The pose at `time`, or that for now if there is none for then.
+    fn pose_at(&mut self, time: Time) -> Option<Pose> {
+        let timeline = self.timeline.begun_mut()?;
+        Some(timeline.state_at(time).unwrap_or_else(|_| timeline.state()).pose)
+    }
+
     /// Begins the checks anew for a pose that is given, before it is taken.
     pub(super) fn restart_checks(&mut self, fix: &PoseFix) {
         let is_contradicted = matches!(
@@ -50,8 +57,8 @@ impl<
         // Who was never right after the last pose was told it wrongly.
         if is_contradicted
             && self.corrected_at.is_some()
-            && let Some(before) = self.estimate()
-            && is_knock(&before.pose.between(&fix.pose), 0.0)
+            && let Some(before) = self.pose_at(fix.time)
+            && is_knock(&before.between(&fix.pose), 0.0)
         {
             self.drift_check.suspect_laser();
         }
@@ -60,24 +67,15 @@ impl<
         self.corrected_at = None;
     }
 
-    /// Compares what a revolution has shown with what the odometry says; `before` is the estimate before it was used.
-    pub(super) fn check_motion(&mut self, before: &Estimate) {
+    /// Compares what an event has shown with what the odometry says; `before` is the estimate before it was used, and
+    /// `is_revolution` says whether the event tells the reflectors of a revolution.
+    pub(super) fn check_motion(&mut self, before: &Estimate, is_revolution: bool) {
         let Some(after) = self.estimate() else { return };
-        let to_odometry = before.smooth.compose(&before.pose.inverse());
-        let mut is_corrected = false;
-        self.motion_check.begin(self.timeline.now());
-        for seen in &self.outputs.uses {
-            is_corrected |= seen.verdict == Verdict::Accepted;
-            if seen.kind == LandmarkKind::Reflector {
-                let [x, y] = seen.position.map(f64::from);
-                let place = to_odometry.transform(&seen.located.into());
-                self.motion_check.see(&place, libm::hypot(x, y));
-            }
+        // One that tells no reflectors contradicts none of them.
+        if is_revolution {
+            self.check_reflectors(before);
         }
-        if self.lost.is_none() && self.motion_check.disagrees() {
-            self.lost = Some(Reason::MotionDisagrees);
-        }
-        if !is_corrected {
+        if !self.outputs.uses.iter().any(|seen| seen.verdict == Verdict::Accepted) {
             return;
         }
         if let Some(last) = self.corrected_at {
@@ -93,5 +91,19 @@ impl<
             }
         }
         self.corrected_at = Some(after.smooth);
+    }
+
+    /// Whether the reflectors of a revolution are where those before have been, as the odometry says.
+    fn check_reflectors(&mut self, before: &Estimate) {
+        let to_odometry = before.smooth.compose(&before.pose.inverse());
+        self.motion_check.begin(self.timeline.now());
+        for seen in self.outputs.uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector) {
+            let [x, y] = seen.position.map(f64::from);
+            let place = to_odometry.transform(&seen.located.into());
+            self.motion_check.see(&place, libm::hypot(x, y));
+        }
+        if self.lost.is_none() && self.motion_check.disagrees() {
+            self.lost = Some(Reason::MotionDisagrees);
+        }
     }
 }

@@ -12,7 +12,7 @@ use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline
 use crate::geometry::{Point, Pose, wrap};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
 use crate::measurement::{EncoderFaults, Scan, Time};
-use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
+use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -46,17 +46,25 @@ pub struct Localizer<
     pub(super) corrected_at: Option<Pose>,
     pub(super) lost: Option<Reason>,
     blindness: Option<Blindness>,
+    /// Samples of the odometry in a row that were not later than the one before.
+    repeated: u8,
     pub(super) distance: DistanceSince,
     pub(super) workspace: Workspace<BEAMS>,
     pub(super) outputs: Outputs,
 }
 
-/// The odometry is not believed.
+/// The odometry is not believed, or not heard.
 #[derive(Clone, Copy, Debug)]
 struct Blindness {
     reason: Reason,
     coasting: Coasting,
 }
+
+/// An odometry that says so often in a row what is not later than before has a clock that stands.
+const MOST_REPEATED: u8 = 10;
+
+/// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
+const LONGEST_BRIDGE: f64 = 1.0;
 
 impl<
     const BEAMS: usize,
@@ -92,6 +100,7 @@ impl<
                 parameters.odometry_noise,
                 parameters.integration,
                 parameters.limits.fastest,
+                parameters.limits.longest_interval(),
             ),
             maps: Maps {
                 reflectors: FixedMap::new(),
@@ -106,6 +115,7 @@ impl<
             corrected_at: None,
             lost: None,
             blindness: None,
+            repeated: 0,
             distance: DistanceSince::NEVER,
             workspace: Workspace {
                 points: PointScan::new(),
@@ -165,18 +175,29 @@ impl<
         self.slam.landmarks()
     }
 
+    /// What has been learnt of the odometry's lasting errors, and is taken from its motions; none without SLAM.
+    #[must_use]
+    pub fn odometry_bias(&self) -> OdometryBias {
+        if self.parameters.maps.slam { self.slam.bias() } else { OdometryBias::default() }
+    }
+
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
 
-    /// Takes one event. Events of one sensor come in order of time; those of different sensors may overtake each other
-    /// by as much as the filter remembers, about 0.4 s.
+    /// Takes one event. Events of one sensor come in order of time. Those of the laser may be as late as the filter
+    /// remembers, about 0.4 s, and ahead of the odometry by [`super::Limits::longest_extrapolation`]; an odometry that is
+    /// further behind is silent.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
+        if let Some(time) = event.seen_until() {
+            self.bridge(time);
+        }
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
+        let is_revolution = self.tells_reflectors(event);
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
@@ -205,14 +226,28 @@ impl<
             Event::SetPose(fix) => self.set_pose(fix),
         }
         if let Some(before) = before {
-            self.check_motion(&before);
+            self.check_motion(&before, is_revolution);
         }
         self.publish(sees);
         &self.outputs
     }
 
+    /// Whether an event tells which reflectors one revolution has seen, be it none. Not every scan does: the laser may have
+    /// told its reflectors before.
+    fn tells_reflectors(&self, event: &Event) -> bool {
+        match event {
+            Event::Reflectors(_) => self.parameters.maps.reflectors,
+            Event::Scan(scan) => self.parameters.detection_in(scan).is_some(),
+            _ => false,
+        }
+    }
+
     fn set_pose(&mut self, fix: &PoseFix) {
         if !fix.is_sound() {
+            return;
+        }
+        let is_past = self.timeline.begun().is_some_and(|timeline| fix.time < timeline.now());
+        if is_past && self.timeline.reaches(fix.time).is_err() {
             return;
         }
         let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
@@ -222,37 +257,92 @@ impl<
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
-        self.blindness =
-            self.blindness.map(|blindness| Blindness { coasting: Coasting::new(Motion::none(fix.time)), ..blindness });
-        self.distance = DistanceSince { fix: 0.0, ..DistanceSince::NEVER };
+        if !is_past {
+            let standing = Coasting::new(Motion::none(fix.time));
+            self.blindness = self.blindness.map(|blindness| Blindness { coasting: standing, ..blindness });
+        }
+        let since = self.timeline.motions(fix.time, self.timeline.now()).fold(0.0, |way, motion| way + motion.distance);
+        self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
         self.maps.dynamic.clear();
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
-        let Some(timeline) = self.timeline.begun_mut() else {
+        let Some(start) = self.timeline.begun().map(Timeline::start) else {
             return;
         };
         match motion {
             // A pose may be given for a time between two samples; only what follows it counts.
-            Ok(motion) if motion.end > timeline.start() => {
-                let motion = if motion.start < timeline.start() { motion.split(timeline.start()).1 } else { motion };
-                let motion = if self.parameters.maps.slam {
-                    motion.corrected(&self.slam.bias(), self.parameters.vehicle.steering_lever())
-                } else {
-                    motion
-                };
+            Ok(motion) if motion.end > start => {
+                let motion = if motion.start < start { motion.split(start).1 } else { motion };
+                let motion = motion.corrected(&self.odometry_bias(), self.parameters.vehicle.steering_lever());
                 self.blindness = None;
-                self.distance.advance(motion.distance);
-                timeline.advance(&motion);
+                self.repeated = 0;
+                self.go_on(&motion);
             }
             Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
+            Err(OdometryError::Pause) => self.coast(time, Reason::OdometrySilent),
             // The first sample behind a fault: the next one says how the vehicle moves.
             Err(OdometryError::First) => {
                 if let Some(blindness) = self.blindness {
                     self.coast(time, blindness.reason);
                 }
             }
-            _ => {}
+            // What the odometry should say does not come.
+            Err(OdometryError::WrongVehicle) => self.bridge(time),
+            // Once it is a frame that was sent twice.
+            Err(OdometryError::OutOfOrder) => {
+                self.repeated = self.repeated.saturating_add(1);
+                if self.repeated >= MOST_REPEATED {
+                    self.doubt_odometry(Reason::OdometryImplausible);
+                }
+            }
+            Ok(_) => {}
+        }
+    }
+
+    /// Goes on to `time`, at which something was seen, if that is too far ahead of an odometry that is silent. What the
+    /// odometry says later of the same time counts instead.
+    fn bridge(&mut self, time: Time) {
+        let limit = self.parameters.limits.longest_extrapolation;
+        let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_motion().end) > limit)
+        else {
+            return;
+        };
+        let now = timeline.now();
+        let mut coasting =
+            self.doubt_odometry(self.blindness.map_or(Reason::OdometrySilent, |blindness| blindness.reason));
+        // What was extrapolated has been assumed already.
+        let _ = coasting.to(now, &self.parameters.odometry_noise);
+        if time.since(now) <= LONGEST_BRIDGE
+            && let Some(motion) = coasting.to(time, &self.parameters.odometry_noise)
+        {
+            self.keep_up();
+            self.timeline.assume(&motion);
+        }
+    }
+
+    /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
+    fn doubt_odometry(&mut self, reason: Reason) -> Coasting {
+        let last = self.timeline.last_motion();
+        let coasting = self.blindness.map_or_else(|| Coasting::new(*last), |blindness| blindness.coasting);
+        self.blindness = Some(Blindness { reason, coasting });
+        coasting
+    }
+
+    fn go_on(&mut self, motion: &Motion) {
+        self.distance.advance(motion.distance);
+        self.keep_up();
+        self.timeline.advance(motion);
+    }
+
+    /// Before a motion is forgotten that the filter with landmarks has not seen, as the laser is silent.
+    fn keep_up(&mut self) {
+        if self.parameters.maps.slam
+            && self.lost.is_none()
+            && let Some(time) = self.timeline.oldest_after_next()
+            && time > self.slam.time()
+        {
+            self.slam.advance(time, &self.timeline, self.parameters.vehicle.steering_lever());
         }
     }
 
@@ -270,14 +360,12 @@ impl<
 
     /// Goes on to `time` without the odometry.
     fn coast(&mut self, time: Time, reason: Reason) {
-        let Some(timeline) = self.timeline.begun_mut() else {
+        if self.timeline.begun().is_none() {
             return;
-        };
-        let mut coasting =
-            self.blindness.map_or_else(|| Coasting::new(*timeline.last_motion()), |blindness| blindness.coasting);
+        }
+        let mut coasting = self.doubt_odometry(reason);
         if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
-            self.distance.advance(motion.distance);
-            timeline.advance(&motion);
+            self.go_on(&motion);
         }
         self.blindness = Some(Blindness { reason, coasting });
     }
@@ -291,10 +379,7 @@ impl<
         if maps.features || maps.dynamic || maps.slam {
             workspace.path.set(scan.start, &self.parameters.laser, timeline.relative_path(scan.start, scan.end()));
         }
-        if let Some(detection) = &self.parameters.reflectors.detection
-            && maps.reflectors
-            && !scan.intensities.is_empty()
-        {
+        if let Some(detection) = self.parameters.detection_in(scan) {
             detect_reflectors(scan, detection, &mut workspace.reflectors);
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);

@@ -4,23 +4,29 @@
 //! carries its last pose on by them at once: the output predictor of PX4's EKF2 and others, here without states of its
 //! own, as the pose is all that is published.
 
-use heapless::Deque;
+use heapless::Vec;
 use nalgebra::Matrix3;
 
 use super::Parameters;
 use crate::filter::Ekf;
-use crate::measurement::{EncoderFaults, EncoderSample};
-use crate::odometry::{Motion, Odometer};
+use crate::measurement::{EncoderFaults, EncoderSample, Time};
+use crate::odometry::{Motion, Odometer, OdometryBias};
 use crate::state::{Mode, PoseOutput, Reason};
 
-/// Carries the localiser's last pose on to the newest encoder sample. Remembers `MOTIONS` motions: with 100 samples a
-/// second, the localiser may be behind by as many hundredths of a second.
+/// Longest time, s, for which a localiser that says nothing is merely busy: the longest scan, twice.
+const LONGEST_BUSY: f64 = 0.25;
+
+/// Carries the localiser's last pose on to the newest encoder sample. Remembers all motion since, in `MOTIONS` parts: if
+/// there are more samples, neighbours become one, and a pose of the localiser that falls between them is met as if the
+/// vehicle had kept its velocity for that time.
 #[derive(Clone, Debug)]
 pub struct OutputPredictor<const MOTIONS: usize = 40> {
     odometer: Odometer,
-    motions: Deque<Motion, MOTIONS>,
+    dead_reckoning_from: f64,
+    motions: Vec<Motion, MOTIONS>,
     base: Option<PoseOutput>,
     state: Ekf,
+    bias: OdometryBias,
     faults: EncoderFaults,
 }
 
@@ -34,30 +40,28 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
                 parameters.odometry_noise,
                 parameters.integration,
                 parameters.limits.fastest,
+                parameters.limits.longest_interval(),
             ),
-            motions: Deque::new(),
+            dead_reckoning_from: parameters.limits.dead_reckoning_from,
+            motions: Vec::new(),
             base: None,
             state: Ekf::new(crate::geometry::Pose::default(), 0.0, 0.0),
+            bias: OdometryBias::default(),
             faults: EncoderFaults::default(),
         }
     }
 
-    /// Takes what the localiser said last.
-    pub fn update(&mut self, output: &PoseOutput) {
-        while self.motions.front().is_some_and(|motion| motion.end <= output.time) {
-            self.motions.pop_front();
-        }
+    /// Takes what the localiser said last, and what it has learnt of the odometry.
+    pub fn update(&mut self, output: &PoseOutput, bias: &OdometryBias) {
+        self.bias = *bias;
+        self.motions.retain(|motion| motion.end > output.time);
         self.base = Some(*output);
         let [xx, xy, yy, x_heading, y_heading, heading] = output.covariance;
         let covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, heading);
         self.state = Ekf { pose: output.pose, covariance };
+        let lever = self.odometer.vehicle().steering_lever();
         for motion in &self.motions {
-            // Of a motion that is partly known the rest counts.
-            if motion.start < output.time {
-                self.state.predict(&motion.split(output.time).1);
-            } else {
-                self.state.predict(motion);
-            }
+            go_on(&mut self.state, &motion.corrected(bias, lever), output.time);
         }
     }
 
@@ -68,12 +72,31 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             return;
         };
         if self.motions.is_full() {
-            self.motions.pop_front();
+            self.join_shortest();
         }
         // There is room.
-        let _ = self.motions.push_back(motion);
-        if self.base.is_some_and(|base| motion.end > base.time) {
-            self.state.predict(&motion);
+        let _ = self.motions.push(motion);
+        if let Some(base) = self.base.filter(|base| motion.end > base.time) {
+            let motion = motion.corrected(&self.bias, self.odometer.vehicle().steering_lever());
+            go_on(&mut self.state, &motion, base.time);
+        }
+    }
+
+    /// Makes one motion of the two neighbours that together take the least time.
+    fn join_shortest(&mut self) {
+        let duration = |index: usize| match self.motions.get(index..index + 2) {
+            Some([first, second]) => second.end.since(first.start),
+            _ => f64::INFINITY,
+        };
+        let pairs = 0..self.motions.len().saturating_sub(1);
+        let Some(index) = pairs.min_by(|a, b| duration(*a).total_cmp(&duration(*b))) else { return };
+        // Those behind the pair move up, and push its second out.
+        let Some(mut second) = self.motions.pop() else { return };
+        for place in self.motions.iter_mut().skip(index + 1).rev() {
+            core::mem::swap(place, &mut second);
+        }
+        if let Some(first) = self.motions.get_mut(index) {
+            *first = first.then(&second);
         }
     }
 
@@ -85,27 +108,42 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         }
     }
 
-    /// The pose for now. None before the localiser has said anything.
+    /// The pose for now. None before the localiser has said anything. What rests on landmarks that the localiser has used
+    /// too long ago is dead reckoning, even if it has no time to say so.
     #[must_use]
     pub fn output(&self) -> Option<PoseOutput> {
         let base = self.base?;
-        let newest = self.motions.back().filter(|motion| motion.end > base.time);
+        let newest = self.motions.last().filter(|motion| motion.end > base.time);
         let way: f64 = self.motions.iter().filter(|motion| motion.end > base.time).map(|motion| motion.distance).sum();
         let is_localised = !matches!(base.mode, Mode::NotLocalised | Mode::Lost);
+        let time = newest.map_or(base.time, |motion| motion.end);
+        let distance = base.dead_reckoning_distance + way;
+        let is_reckoned = matches!(base.mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
+            && (time.since(base.time) > LONGEST_BUSY || distance > self.dead_reckoning_from);
         let (mode, reason) = match (is_localised, self.faults.drive, self.faults.steering) {
             (true, Some(_), _) => (Mode::WithoutOdometry, Reason::DriveEncoder),
             (true, None, Some(_)) => (Mode::WithoutOdometry, Reason::SteeringEncoder),
+            _ if is_reckoned => (Mode::DeadReckoning, Reason::NoLandmarks),
             _ => (base.mode, base.reason),
         };
         Some(PoseOutput {
-            time: newest.map_or(base.time, |motion| motion.end),
+            time,
             pose: self.state.pose,
             smooth: base.smooth.compose(&base.pose.between(&self.state.pose)),
             covariance: self.state.covariance_entries(),
             mode,
             reason,
-            dead_reckoning_distance: base.dead_reckoning_distance + way,
+            dead_reckoning_distance: distance,
             ..base
         })
+    }
+}
+
+/// Goes on by a motion. Of one that the localiser has used, or assumed, up to `known`, the rest counts.
+fn go_on(state: &mut Ekf, motion: &Motion, known: Time) {
+    if motion.start < known {
+        state.predict(&motion.split(known).1);
+    } else {
+        state.predict(motion);
     }
 }

@@ -7,6 +7,7 @@ use crate::features::{ReflectorDetection, falko};
 use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
 use crate::landmarks::DynamicMapParameters;
+use crate::measurement::Scan;
 use crate::odometry::{Integration, OdometryNoise, Vehicle};
 
 /// What the localiser believes of its vehicle and its sensors.
@@ -56,6 +57,12 @@ impl Parameters {
             consistency: ConsistencyParameters::default(),
             limits: Limits::default(),
         }
+    }
+
+    /// How reflectors are to be found in a scan, if they are.
+    pub(super) fn detection_in(&self, scan: &Scan) -> Option<&ReflectorDetection> {
+        let can_tell = self.maps.reflectors && !scan.intensities.is_empty();
+        self.reflectors.detection.as_ref().filter(|_| can_tell)
     }
 }
 
@@ -164,8 +171,17 @@ pub struct Limits {
     pub largest_position_deviation: f64,
     /// Standard deviation of the heading above which it is lost, rad.
     pub largest_heading_deviation: f64,
-    /// How far ahead of the odometry a measurement may be, s.
+    /// How far ahead of the odometry a measurement may be, s. Two samples of the odometry may be 2.5 times as far apart,
+    /// and 0.25 s in any case.
     pub longest_extrapolation: f64,
+}
+
+impl Limits {
+    /// Longest time between two samples of the odometry, s: more than that is a silence, and no motion is made of it.
+    #[must_use]
+    pub fn longest_interval(&self) -> f64 {
+        (2.5 * self.longest_extrapolation).max(0.25)
+    }
 }
 
 impl Default for Limits {

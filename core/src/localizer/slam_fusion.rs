@@ -1,8 +1,9 @@
 //! Fusing what is seen into the filter with landmarks and past poses, a scan at a time.
 
 use super::Localizer;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Fate};
 use super::slam::{Seen, cartesian};
+use crate::geometry::Point;
 use crate::landmarks::{LandmarkKind, Verdict};
 use crate::measurement::{Scan, Time};
 
@@ -48,18 +49,31 @@ impl<
         self.end_slam();
     }
 
-    /// Brings the filter to `time`, or where it is if that is later, but not beyond `latest`. False if it cannot be there.
+    /// Brings the filter to `time`, or where it is if that is later, but not beyond `latest`. False if it cannot be there;
+    /// the sightings of the workspace are then told to be out of time.
     fn begin_slam(&mut self, time: Time, latest: Time) -> bool {
         let Some(timeline) = self.timeline.begun().filter(|_| self.lost.is_none()) else { return false };
-        if self.slam.time() > latest {
+        if self.slam.time() > latest || timeline.reaches(time.max(self.slam.time())).is_err() {
+            self.refuse_sightings();
             return false;
         }
         self.slam.advance(time, timeline, self.parameters.vehicle.steering_lever());
         true
     }
 
+    /// Tells that the sightings of the workspace are neither for nor against the pose.
+    fn refuse_sightings(&mut self) {
+        let gate = self.parameters.association.gate;
+        let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, true);
+        let fate = Fate { verdict: Verdict::OutOfTime, landmark: None, located: Point::default() };
+        for sighting in &mut self.workspace.sightings {
+            sighting.verdict = fate.verdict;
+            evidence.add(sighting, &fate, false);
+        }
+    }
+
     fn end_slam(&mut self) {
-        // The filter's time is one that the timeline remembers.
+        // The filter's time is one that the timeline reaches: see `begin_slam`.
         let _ = self.timeline.set_state(self.slam.time(), self.slam.state());
     }
 

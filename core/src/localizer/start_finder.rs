@@ -65,7 +65,13 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     pub fn new(parameters: Parameters, search: RelocalizationParameters) -> Self {
         let (vehicle, noise) = (parameters.vehicle, parameters.odometry_noise);
         Self {
-            odometer: Odometer::new(vehicle, noise, parameters.integration, parameters.limits.fastest),
+            odometer: Odometer::new(
+                vehicle,
+                noise,
+                parameters.integration,
+                parameters.limits.fastest,
+                parameters.limits.longest_interval(),
+            ),
             last_motion: Motion::none(Time::default()),
             snapshot: ReflectorSnapshot::new(),
             relocalizer: ReflectorRelocalizer::new(search),
@@ -138,7 +144,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 }
             }
             // What was seen before cannot be carried on.
-            Err(OdometryError::First | OdometryError::Implausible) => self.stand(time),
+            Err(OdometryError::First | OdometryError::Implausible | OdometryError::Pause) => self.stand(time),
             Err(OdometryError::OutOfOrder | OdometryError::WrongVehicle) => {}
         }
     }

@@ -7,6 +7,10 @@ use crate::geometry::Pose;
 
 /// A pose that is given from outside: by an operator, by a start position, or by relocalisation. One that is not sound
 /// ([`PoseFix::is_sound`]) is left alone.
+///
+/// One that was true a moment ago is carried on to now by what the odometry has said since. One that is older than what the
+/// localiser remembers, about 0.4 s among landmarks and 1.3 s without, is left alone, too: nobody knows where the vehicle
+/// has gone meanwhile, and the pose has to be given again. Before the first pose nothing is remembered, and any time will do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseFix {
     /// When the vehicle was there.

@@ -53,6 +53,9 @@ impl Motion {
     /// The motion without a bias; `lever` as in [`BiasJacobian::of`].
     #[must_use]
     pub fn corrected(&self, bias: &OdometryBias, lever: f64) -> Motion {
+        if *bias == OdometryBias::default() {
+            return *self;
+        }
         let jacobian = BiasJacobian::of(&self.displacement, lever);
         let [x, y, theta] = [0, 1, 2].map(|axis: usize| {
             let by = |column: &[f64; 3]| column.get(axis).copied().unwrap_or(0.0);

@@ -53,6 +53,21 @@ impl Motion {
         )
     }
 
+    /// This motion and the one that follows it, as one.
+    #[must_use]
+    pub fn then(&self, next: &Motion) -> Motion {
+        let (by_first, by_second) =
+            (self.displacement.compose_jacobian_first(&next.displacement), self.displacement.compose_jacobian_second());
+        Motion {
+            start: self.start,
+            end: next.end,
+            displacement: self.displacement.compose(&next.displacement),
+            covariance: by_first * self.covariance * by_first.transpose()
+                + by_second * next.covariance * by_second.transpose(),
+            distance: self.distance + next.distance,
+        }
+    }
+
     /// What remains of the motion after `done`, a displacement that was assumed from its start until `time`. The total
     /// displacement is kept exactly.
     #[must_use]

@@ -16,6 +16,8 @@ pub enum OdometryError {
     WrongVehicle,
     /// The vehicle cannot be that fast, or a value is not finite.
     Implausible,
+    /// So long after the one before that nobody knows what the vehicle did meanwhile, or how often its counter wrapped.
+    Pause,
 }
 
 /// Turns samples into motions; remembers the last sample only.
@@ -25,6 +27,7 @@ pub struct Odometer {
     noise: OdometryNoise,
     integration: Integration,
     fastest: f64,
+    longest_interval: f64,
     last: Option<Sample>,
 }
 
@@ -51,10 +54,23 @@ impl Tricycle {
 }
 
 impl Odometer {
-    /// An odometer that has seen no sample. Motions faster than `fastest` (m/s) are refused.
+    /// An odometer that has seen no sample. Motions faster than `fastest` (m/s) or longer than `longest_interval` (s) are
+    /// refused.
     #[must_use]
-    pub fn new(vehicle: Vehicle, noise: OdometryNoise, integration: Integration, fastest: f64) -> Self {
-        Self { vehicle, noise, integration, fastest, last: None }
+    pub fn new(
+        vehicle: Vehicle,
+        noise: OdometryNoise,
+        integration: Integration,
+        fastest: f64,
+        longest_interval: f64,
+    ) -> Self {
+        Self { vehicle, noise, integration, fastest, longest_interval, last: None }
+    }
+
+    /// The vehicle whose samples it takes.
+    #[must_use]
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
     }
 
     /// Forgets the last sample: what comes next cannot be compared with it.
@@ -79,6 +95,11 @@ impl Odometer {
         }
         let (control, backward) = tricycle.control(&last, sample, backward);
         self.last = Some(Sample::Encoders { sample: *sample, backward });
+        // At its fastest the vehicle may go half of the counter's range; beyond, it may seem to go the other way.
+        let half = 0.5 * tricycle.drive_range.values() as f64 * libm::fabs(tricycle.drive_scale);
+        if sample.time.since(last.time) * self.fastest > half {
+            return Err(OdometryError::Pause);
+        }
         self.motion(last.time, sample.time, &control, tricycle.wheelbase)
     }
 
@@ -131,6 +152,10 @@ impl Odometer {
             return Err(OdometryError::OutOfOrder);
         }
         let duration = increment.time.since(start);
+        // Increments that were lost meanwhile are not in it.
+        if duration > self.longest_interval {
+            return Err(OdometryError::Pause);
+        }
         let distance = libm::hypot(increment.displacement.x, increment.displacement.y);
         // Half a turn either way is all that a heading can say.
         let is_turn = libm::fabs(increment.displacement.theta) <= PI;
@@ -148,6 +173,9 @@ impl Odometer {
 
     fn motion(&self, start: Time, end: Time, control: &Control, wheelbase: f64) -> Result<Motion, OdometryError> {
         let duration = end.since(start);
+        if duration > self.longest_interval {
+            return Err(OdometryError::Pause);
+        }
         let distance = libm::fabs(control.distance);
         if distance.is_nan() || distance > self.fastest * duration {
             return Err(OdometryError::Implausible);

@@ -54,4 +54,6 @@ pub enum Reason {
     LaserMoved,
     /// The odometry's scale or steering is not what is believed; landmarks make up for it.
     OdometryDisagrees,
+    /// The odometry says nothing, or nothing that the vehicle as it is described can say.
+    OdometrySilent,
 }

@@ -4,6 +4,7 @@ use core::cell::RefCell;
 
 use agv_core::localizer::{OutputPredictor, PoseFix};
 use agv_core::measurement::{EncoderFaults, EncoderSample, Time};
+use agv_core::odometry::OdometryBias;
 use agv_core::state::PoseOutput;
 use agv_core::wire::can::controller::{LaserHealth, StartSearch};
 use agv_core::wire::nav350::Revolution;
@@ -130,11 +131,11 @@ pub fn pass_on(event: BusEvent) {
     }
 }
 
-/// The localiser has said something.
-pub fn update(output: &PoseOutput) {
+/// The localiser has said something, and what it has learnt of the odometry.
+pub fn update(output: &PoseOutput, bias: &OdometryBias) {
     with(|published| {
         if let Some(predictor) = &mut published.predictor {
-            predictor.update(output);
+            predictor.update(output, bias);
         }
     });
 }

@@ -55,10 +55,11 @@ impl Localization {
     /// Tells the localiser something, publishes what it says, and logs both.
     pub fn handle(&mut self, event: &Event) {
         self.log.write(&Record::Event(*event));
-        let outputs = self.localizer.handle(event);
-        exchange::update(&outputs.pose);
+        self.localizer.handle(event);
+        let outputs = self.localizer.outputs();
+        exchange::update(&outputs.pose, &self.localizer.odometry_bias());
         self.log.write(&Record::Output(Output::from(outputs)));
-        let mode = self.localizer.outputs().pose.mode;
+        let mode = outputs.pose.mode;
         self.search.handle(event, mode, self.localizer.reflectors());
     }
 

@@ -147,7 +147,7 @@ fn start() -> Vehicle {
     let search = build_search(&settings.parameters, settings.start_search);
     search.index(localizer.reflectors());
     exchange::start(OutputPredictor::new(&settings.parameters));
-    exchange::update(&localizer.outputs().pose);
+    exchange::update(&localizer.outputs().pose, &localizer.odometry_bias());
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
     let (sender, revolutions) = channel.split();
     let log = LogWriter::new(FRAME.take(), landmarks.len());

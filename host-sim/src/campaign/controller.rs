@@ -144,7 +144,7 @@ impl Controller {
 
     fn handle(&mut self, event: &Event) {
         let output = self.localizer.handle(event).pose;
-        self.predictor.update(&output);
+        self.predictor.update(&output, &self.localizer.odometry_bias());
         self.search.handle(event, output.mode, self.localizer.reflectors());
     }
 }

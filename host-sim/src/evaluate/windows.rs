@@ -70,7 +70,8 @@ impl Candidate {
         // at the 95 % mark, which hides any bias.
         parameters.odometry_noise = OdometryNoise { slip: 0.1, side_slip: 0.1, yaw: 0.1, ..OdometryNoise::default() };
         parameters.slam.biases = BiasDeviations { scale: 1e-6, steering: 1e-6, laser_yaw: 1e-6 };
-        parameters.limits.longest_extrapolation = 1.0;
+        // An increment is all that lies between two scans, however long that took.
+        parameters.limits.longest_extrapolation = 1e6;
         // Nothing tells the vehicle where it is, so it may grow uncertain.
         parameters.limits.largest_heading_deviation = 1.0;
         parameters.limits.largest_position_deviation = 10.0;

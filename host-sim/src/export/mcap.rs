@@ -289,6 +289,7 @@ impl Exporter {
                 parameters.odometry_noise,
                 parameters.integration,
                 parameters.limits.fastest,
+                parameters.limits.longest_interval(),
             ),
             odometry: Pose::default(),
             now,

@@ -38,14 +38,20 @@ pub fn drive(log: &ScanLog) -> Option<Recording> {
         y: posed.laser.y,
         heading: Some(posed.laser.theta),
     };
+    let mut parameters = Parameters::new(Vehicle::Increments, first.robot.between(&first.laser));
+    // An increment is all that lies between two poses, however long that took.
+    parameters.limits.longest_extrapolation = LONGEST_EXTRAPOLATION;
     Some(Recording {
-        parameters: Parameters::new(Vehicle::Increments, first.robot.between(&first.laser)),
+        parameters,
         landmarks: Vec::new(),
         events,
         truth: Vec::new(),
         references: log.scans.iter().map(reference).collect(),
     })
 }
+
+/// As long as can be set, s.
+const LONGEST_EXTRAPOLATION: f64 = 10.0;
 
 fn increments_of_poses(scans: &[PosedScan]) -> Vec<PoseIncrement> {
     let start = scans.first().map(|first| PoseIncrement { time: first.scan.start, displacement: Pose::default() });

@@ -94,6 +94,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Reason::MotionDisagrees,
         Reason::LaserMoved,
         Reason::OdometryDisagrees,
+        Reason::OdometrySilent,
     ];
     let faults = [
         None,
@@ -109,7 +110,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
     let searches =
         [StartSearch::Idle, StartSearch::Searching, StartSearch::Ambiguous, StartSearch::TooFew, StartSearch::Unknown];
-    (0..12)
+    (0..13)
         .map(|index| {
             let (mode, reason) = (modes[index % 8], reasons[index]);
             let (drive, steering, laser) = (faults[index % 9], faults[(23 - index) % 9], lasers[index % 4]);

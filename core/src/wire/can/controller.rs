@@ -138,7 +138,7 @@ const MODES: [(u64, Mode); 8] = [
 ];
 
 /// Numbers of the reasons on the bus.
-const REASONS: [(u64, Reason); 12] = [
+const REASONS: [(u64, Reason); 13] = [
     (0, Reason::None),
     (1, Reason::NoPose),
     (2, Reason::NoLandmarks),
@@ -151,6 +151,7 @@ const REASONS: [(u64, Reason); 12] = [
     (9, Reason::MotionDisagrees),
     (10, Reason::LaserMoved),
     (11, Reason::OdometryDisagrees),
+    (12, Reason::OdometrySilent),
 ];
 
 /// Numbers of the encoder faults on the bus; 0 is none.

@@ -54,7 +54,10 @@ fn fits(mode: Mode, reason: Reason) -> bool {
         Mode::Degraded => matches!(reason, Reason::LaserMoved | Reason::LandmarksRejected),
         Mode::DeadReckoning => reason == Reason::NoLandmarks,
         Mode::WithoutOdometry => {
-            matches!(reason, Reason::OdometryImplausible | Reason::DriveEncoder | Reason::SteeringEncoder)
+            matches!(
+                reason,
+                Reason::OdometryImplausible | Reason::DriveEncoder | Reason::SteeringEncoder | Reason::OdometrySilent
+            )
         }
         Mode::Lost => matches!(
             reason,

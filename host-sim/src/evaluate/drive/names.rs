@@ -34,6 +34,7 @@ pub fn reason_name(reason: Reason) -> &'static str {
         Reason::MotionDisagrees => "laser and odometry saw different motions",
         Reason::LaserMoved => "the laser has moved on the vehicle",
         Reason::OdometryDisagrees => "odometry is not as believed",
+        Reason::OdometrySilent => "no odometry",
     }
 }
 

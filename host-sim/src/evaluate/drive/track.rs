@@ -116,8 +116,13 @@ fn way_at(points: &[TrackPoint], time: Time) -> f64 {
 /// How far R moves with each event, by its odometry, m.
 fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
     let parameters = &recording.parameters;
-    let mut odometer =
-        Odometer::new(parameters.vehicle, parameters.odometry_noise, parameters.integration, parameters.limits.fastest);
+    let mut odometer = Odometer::new(
+        parameters.vehicle,
+        parameters.odometry_noise,
+        parameters.integration,
+        parameters.limits.fastest,
+        parameters.limits.longest_interval(),
+    );
     recording.events.iter().map(move |event| {
         let motion = match event {
             RecordedEvent::Encoders(sample) => odometer.encoders(sample),

@@ -4,6 +4,7 @@ use core::hint::black_box;
 
 use agv_core::localizer::{OutputPredictor, Parameters};
 use agv_core::measurement::{EncoderFaults, Time};
+use agv_core::odometry::OdometryBias;
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{Health, LaserHealth, OrderReceiver, PosePublisher, StartSearch};
 use agv_core::wire::can::controller_node::ControllerNode;
@@ -81,7 +82,7 @@ impl Bus {
             start_search: any(StartSearch::Idle),
         };
         if let Some(output) = self.predictor.output() {
-            self.predictor.update(&any(output));
+            self.predictor.update(&any(output), &any(OdometryBias::default()));
             black_box(self.publisher.poll(time, &output, &health));
         }
     }
