@@ -151,6 +151,34 @@ fn a_suspicion_of_the_laser_lasts_until_the_vehicle_has_driven_and_turned() {
     assert_eq!(check.suspect(), None);
 }
 
+#[test]
+fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_found() {
+    let step = 0.15;
+    for radius in [0.5, 1.0, 1.5, 2.5, 4.0, 5.0, 6.0] {
+        let motion = Pose::new(step, 0.0, step / radius);
+        // 1.2 m, 26 degrees, and 0.3 rad in a memory that fades by 1/e in 2.5 m and in 1.5 rad.
+        let remaining = libm::exp(-step / 2.5 - motion.theta / 1.5);
+        let in_memory = libm::log(1.0 - 0.3 * (1.0 - remaining) / motion.theta) / libm::log(remaining);
+        let expected = (1.2 / step).max(0.45 / motion.theta).max(in_memory);
+        let mut check = DriftCheck::new();
+        check.suspect_laser();
+        let ended = (1..100).find(|_| {
+            check.add(&motion, &Pose::default());
+            check.suspect().is_none()
+        });
+        assert!(
+            ended.is_some_and(|ended| (f64::from(ended) - expected).abs() <= 2.0),
+            "{radius}: {ended:?}, {expected}"
+        );
+        // Not while the laser stands elsewhere by twice what is found.
+        check.suspect_laser();
+        for _ in 0..100 {
+            check.add(&motion, &Pose::new(0.0, 0.2 * motion.theta, 0.0));
+        }
+        assert_eq!(check.suspect(), Some(Suspect::Laser), "{radius} m");
+    }
+}
+
 fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
     PoseOutput {
         time: Time::default(),

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use super::evidence::DistanceSince;
+use super::integrity::Corrected;
 use super::maps::Maps;
 use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
@@ -42,8 +43,7 @@ pub struct Localizer<
     pub(super) consistency: Consistency,
     pub(super) motion_check: MotionCheck,
     pub(super) drift_check: DriftCheck,
-    /// Pose by odometry at the last revolution that has corrected the pose.
-    pub(super) corrected_at: Option<Pose>,
+    pub(super) corrected_at: Option<Corrected>,
     pub(super) lost: Option<Reason>,
     blindness: Option<Blindness>,
     pub(super) distance: DistanceSince,
