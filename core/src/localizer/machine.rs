@@ -195,7 +195,7 @@ impl<
                 self.workspace.sightings.clear();
                 see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
                 if self.parameters.maps.slam {
-                    self.fuse_reflectors_by_slam();
+                    self.fuse_lone_reflectors_by_slam();
                 } else {
                     self.fuse();
                 }
@@ -299,7 +299,7 @@ impl<
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
             if maps.slam {
-                self.fuse_reflectors_by_slam();
+                self.fuse_reflectors_by_slam(scan.start);
             } else {
                 self.fuse();
             }

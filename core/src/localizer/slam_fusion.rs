@@ -17,14 +17,22 @@ impl<
     const ENTRIES: usize,
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
-    /// Fuses the reflectors of the workspace, all at the time of the one in the middle.
-    pub(super) fn fuse_reflectors_by_slam(&mut self) {
+    /// Fuses the reflectors of the workspace that came without a scan.
+    pub(super) fn fuse_lone_reflectors_by_slam(&mut self) {
         let sightings = &self.workspace.sightings;
         let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
         let (start, end) = (first.time, last.time);
-        let time = start.offset(0.5 * end.since(start));
         let Some(timeline) = self.timeline.begun() else { return };
         self.workspace.path.set(start, &self.parameters.laser, timeline.relative_path(start, end));
+        self.fuse_reflectors_by_slam(start);
+    }
+
+    /// Fuses the reflectors of the workspace, whose path begins at `start`, all at the time of the one in the middle.
+    pub(super) fn fuse_reflectors_by_slam(&mut self, start: Time) {
+        let sightings = &self.workspace.sightings;
+        let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
+        let end = last.time;
+        let time = first.time.offset(0.5 * end.since(first.time));
         if self.begin_slam(time, end) {
             self.fuse_by_slam(start);
             self.end_slam();

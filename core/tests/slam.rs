@@ -1,0 +1,158 @@
+//! Mapping while driving, in the localiser as a whole: a hall whose corners and reflectors are known to the test.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use agv_core::features::ReflectorDetection;
+use agv_core::filter::{augmented_states, packed_entries};
+use agv_core::geometry::{Point, Pose};
+use agv_core::landmarks::LandmarkKind;
+use agv_core::localizer::{Event, Localizer, Parameters, PoseFix};
+use agv_core::measurement::{PoseIncrement, Scan, Time};
+use agv_core::odometry::Vehicle;
+
+const BEAMS: usize = 1440;
+const KEYS: usize = 2;
+const PLACES: usize = 16;
+const STATES: usize = augmented_states(KEYS, PLACES);
+type Mapper = Localizer<BEAMS, 64, 64, 4, KEYS, PLACES, STATES, { packed_entries(STATES) }>;
+
+/// Seconds of a revolution, and samples of the odometry in it.
+const REVOLUTION: f64 = 0.125;
+const SAMPLES: u64 = 10;
+
+fn parameters() -> Parameters {
+    let mut parameters = Parameters::new(Vehicle::Increments, Pose::new(0.9, 0.0, 0.0));
+    parameters.maps.slam = true;
+    parameters
+}
+
+/// A vehicle that drives straight along the first axis from the origin, and has been told where it is.
+struct Drive {
+    localizer: Box<Mapper>,
+    speed: f64,
+    sample: u64,
+    way: f64,
+}
+
+impl Drive {
+    fn start(parameters: Parameters, speed: f64) -> Self {
+        let mut drive = Self { localizer: Box::new(Mapper::new(parameters)), speed, sample: 0, way: 0.0 };
+        drive.report(0.0);
+        drive.set_pose();
+        drive
+    }
+
+    fn time(&self) -> Time {
+        Time::from_micros(1_000_000).offset(self.sample as f64 * REVOLUTION / SAMPLES as f64)
+    }
+
+    fn set_pose(&mut self) {
+        let pose = Pose::new(self.way, 0.0, 0.0);
+        let fix = PoseFix { time: self.time(), pose, position_deviation: 0.01, heading_deviation: 1e-3 };
+        self.localizer.handle(&Event::SetPose(fix));
+    }
+
+    fn report(&mut self, way: f64) {
+        let displacement = Pose::new(way, 0.0, 0.0);
+        self.localizer.handle(&Event::Increment(PoseIncrement { time: self.time(), displacement }));
+    }
+
+    /// Drives for one revolution and gives when it began.
+    fn drive(&mut self) -> Time {
+        let start = self.time();
+        for _ in 0..SAMPLES {
+            let way = self.speed * REVOLUTION / SAMPLES as f64;
+            self.sample += 1;
+            self.way += way;
+            self.report(way);
+        }
+        start
+    }
+
+    /// True pose of S.
+    fn sensor(&self, time: Time) -> Pose {
+        let way = self.way - self.speed * self.time().since(time);
+        Pose::new(way, 0.0, 0.0).compose(&parameters().laser)
+    }
+}
+
+/// Corners of a hall and of four pillars in it, each a rectangle: lowest and highest x and y.
+const WALLS: [[f64; 4]; 5] = [
+    [-7.0, 9.0, -5.0, 6.0],
+    [2.0, 2.8, 2.0, 2.8],
+    [4.5, 5.3, -3.1, -2.3],
+    [-3.6, -2.8, 2.6, 3.4],
+    [-2.4, -1.6, -2.9, -2.1],
+];
+
+fn corners() -> impl Iterator<Item = Point> {
+    let of = |[left, right, low, high]: [f64; 4]| [(left, low), (left, high), (right, low), (right, high)];
+    WALLS.into_iter().flat_map(of).map(|(x, y)| Point::new(x, y))
+}
+
+/// Distance to the nearest wall.
+fn cast(origin: &Pose, bearing: f64) -> f64 {
+    let (sine, cosine) = (origin.theta + bearing).sin_cos();
+    let mut nearest = f64::INFINITY;
+    for [left, right, low, high] in WALLS {
+        for x in [left, right] {
+            let range = (x - origin.x) / cosine;
+            if range > 0.0 && (low..=high).contains(&(origin.y + range * sine)) {
+                nearest = nearest.min(range);
+            }
+        }
+        for y in [low, high] {
+            let range = (y - origin.y) / sine;
+            if range > 0.0 && (left..=right).contains(&(origin.x + range * cosine)) {
+                nearest = nearest.min(range);
+            }
+        }
+    }
+    nearest
+}
+
+#[test]
+fn features_are_seen_from_where_the_laser_was_with_and_without_reflectors_in_the_scan() {
+    let step = TAU / BEAMS as f64;
+    let reflector = Point::new(1.5, 6.0);
+    for detection in [None, Some(ReflectorDetection::default())] {
+        let mut parameters = parameters();
+        parameters.reflectors.detection = detection;
+        let mut drive = Drive::start(parameters, 3.0);
+        let (mut features, mut reflectors) = (0, 0);
+        for _ in 0..4 {
+            let start = drive.drive();
+            let beam_interval = REVOLUTION / BEAMS as f64;
+            let (ranges, intensities): (Vec<f32>, Vec<u16>) = (0..BEAMS)
+                .map(|beam| {
+                    let sensor = drive.sensor(start.offset(beam as f64 * beam_interval));
+                    let bearing = -FRAC_PI_2 + beam as f64 * step;
+                    let range = cast(&sensor, bearing);
+                    let (sine, cosine) = (sensor.theta + bearing).sin_cos();
+                    let hit = sensor.position() + range * Point::new(cosine, sine);
+                    (range as f32, u16::from((hit - reflector).norm() < 0.06))
+                })
+                .unzip();
+            let first_bearing = -FRAC_PI_2;
+            let scan = Scan {
+                start,
+                beam_interval,
+                first_bearing,
+                bearing_step: step,
+                ranges: &ranges,
+                intensities: &intensities,
+            };
+            let uses = drive.localizer.handle(&Event::Scan(scan)).uses.clone();
+            reflectors += uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector).count();
+            for seen in uses.iter().filter(|seen| seen.kind == LandmarkKind::Corner) {
+                let located = Point::from(seen.located);
+                let error = corners().map(|corner| (corner - located).norm()).fold(f64::INFINITY, f64::min);
+                assert!(error < 0.06, "{located} is {error} m from the nearest corner, {detection:?}");
+                features += 1;
+            }
+        }
+        assert!(features > 12, "{features}");
+        assert_eq!(reflectors, if detection.is_some() { 4 } else { 0 });
+    }
+}
