@@ -1,14 +1,14 @@
 //! Mapping while driving, in the localiser as a whole: a hall whose corners and reflectors are known to the test.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use agv_core::features::ReflectorDetection;
 use agv_core::filter::{augmented_states, packed_entries};
 use agv_core::geometry::{Point, Pose};
 use agv_core::landmarks::LandmarkKind;
-use agv_core::localizer::{Event, Localizer, Parameters, PoseFix};
-use agv_core::measurement::{PoseIncrement, Scan, Time};
+use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
+use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
 
 const BEAMS: usize = 1440;
@@ -31,13 +31,15 @@ fn parameters() -> Parameters {
 struct Drive {
     localizer: Box<Mapper>,
     speed: f64,
+    /// True way over the one that is reported, minus one.
+    scale: f64,
     sample: u64,
     way: f64,
 }
 
 impl Drive {
     fn start(parameters: Parameters, speed: f64) -> Self {
-        let mut drive = Self { localizer: Box::new(Mapper::new(parameters)), speed, sample: 0, way: 0.0 };
+        let mut drive = Self { localizer: Box::new(Mapper::new(parameters)), speed, scale: 0.0, sample: 0, way: 0.0 };
         drive.report(0.0);
         drive.set_pose();
         drive
@@ -65,7 +67,7 @@ impl Drive {
             let way = self.speed * REVOLUTION / SAMPLES as f64;
             self.sample += 1;
             self.way += way;
-            self.report(way);
+            self.report(way / (1.0 + self.scale));
         }
         start
     }
@@ -74,6 +76,31 @@ impl Drive {
     fn sensor(&self, time: Time) -> Pose {
         let way = self.way - self.speed * self.time().since(time);
         Pose::new(way, 0.0, 0.0).compose(&parameters().laser)
+    }
+
+    /// Takes what is seen of these points in the revolution that began at `start`.
+    fn see(&mut self, start: Time, points: &[Point]) -> PoseOutput {
+        let mut observations: Vec<_> = points
+            .iter()
+            .map(|point| {
+                let bearing_at = |time| {
+                    let seen = self.sensor(time).inverse_transform(point);
+                    (seen.norm(), seen.y.atan2(seen.x))
+                };
+                let share = (bearing_at(start.offset(0.5 * REVOLUTION)).1 + PI) / TAU;
+                let time = start.offset(share * REVOLUTION);
+                let (range, bearing) = bearing_at(time);
+                ReflectorObservation { time, range: range as f32, bearing: bearing as f32 }
+            })
+            .collect();
+        observations.sort_by_key(|seen| seen.time);
+        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations })).pose
+    }
+
+    /// How far the believed position is from the true one, m.
+    fn error(&self) -> f64 {
+        let output = self.localizer.outputs().pose;
+        (output.pose.x - self.way).hypot(output.pose.y)
     }
 }
 
@@ -155,4 +182,44 @@ fn features_are_seen_from_where_the_laser_was_with_and_without_reflectors_in_the
         assert!(features > 12, "{features}");
         assert_eq!(reflectors, if detection.is_some() { 4 } else { 0 });
     }
+}
+
+/// A number between 0 and 1 that looks random.
+fn noise(a: u64, b: u64) -> f64 {
+    let mixed = (a << 32 | b).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mixed = (mixed ^ mixed >> 29).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    ((mixed ^ mixed >> 32) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Reflectors of an aisle within sight of a vehicle.
+fn aisle(way: f64) -> Vec<Point> {
+    let all = (0..60).map(|index| {
+        let x = 2.7 * f64::from(index) + 0.4 * f64::from(index % 4) - 6.0;
+        Point::new(x, if index % 2 == 0 { 3.1 + 0.3 * f64::from(index % 3) } else { -2.8 })
+    });
+    all.filter(|point| (point.x - way).abs() < 8.0).collect()
+}
+
+#[test]
+fn false_reflectors_do_not_stay_in_a_map_of_reflectors_alone() {
+    let mut parameters = parameters();
+    parameters.maps.features = false;
+    let mut drive = Drive::start(parameters, 1.0);
+    for revolution in 0..400_u64 {
+        let start = drive.drive();
+        let mut points = aisle(drive.way);
+        let false_one = Point::new(12.0 * noise(revolution, 1) - 6.0, 2.4 * noise(revolution, 2) - 1.2);
+        points.push(drive.sensor(drive.time()).position() + false_one);
+        let output = drive.see(start, &points);
+        assert!(revolution < 4 || output.mode == Mode::Reflectors, "{revolution}: {:?}", output.reason);
+        let is_true = |place: &Point| aisle(place.x).iter().any(|point| (point - place).norm() < 0.3);
+        let (kept, wrong): (Vec<_>, Vec<_>) = drive.localizer.state_landmarks().partition(|(_, place)| is_true(place));
+        assert!(wrong.len() <= 6, "{revolution}: {} false ones, {} true ones", wrong.len(), kept.len());
+        let seen = points.len() - 1;
+        let known =
+            aisle(drive.way).iter().filter(|point| kept.iter().any(|(_, at)| (at - *point).norm() < 0.3)).count();
+        assert!(known + 1 >= seen, "{revolution}: {known} of {seen}");
+    }
+    // Fifty metres on landmarks that were found on the way.
+    assert!(drive.error() < 0.25, "{} m", drive.error());
 }

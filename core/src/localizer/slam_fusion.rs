@@ -35,6 +35,7 @@ impl<
         let time = first.time.offset(0.5 * end.since(first.time));
         if self.begin_slam(time, end) {
             self.fuse_by_slam(start);
+            self.slam.finish(true, &self.parameters.slam);
             self.end_slam();
         }
     }
@@ -51,7 +52,7 @@ impl<
         let place = self.workspace.path.place(self.slam.time().since(scan.start));
         self.slam.align(&self.workspace.points, &place, &self.parameters);
         self.fuse_by_slam(scan.start);
-        self.slam.finish(&self.parameters.slam);
+        self.slam.finish(false, &self.parameters.slam);
         self.slam.keep(&self.workspace.points, &place, &self.parameters);
         self.end_slam();
     }

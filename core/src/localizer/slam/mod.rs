@@ -206,10 +206,10 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         }
     }
 
-    /// Ends a scan: landmarks that nobody believes in go.
-    pub(super) fn finish(&mut self, parameters: &SlamParameters) {
+    /// Ends a scan of features, or one of reflectors: landmarks that nobody believes in go.
+    pub(super) fn finish(&mut self, are_reflectors: bool, parameters: &SlamParameters) {
         let filter = &mut self.filter;
-        self.book.finish(parameters, |place| filter.remove_landmark(place));
+        self.book.finish(are_reflectors, parameters, |place| filter.remove_landmark(place));
     }
 
     /// Aligns a scan to the key scans; S is at `place` in the frame of its points. May make it a key scan.
