@@ -191,11 +191,12 @@ fn noise(a: u64, b: u64) -> f64 {
     ((mixed ^ mixed >> 32) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Reflectors of an aisle within sight of a vehicle.
+/// Reflectors of an endless aisle within sight of a vehicle.
 fn aisle(way: f64) -> Vec<Point> {
-    let all = (0..60).map(|index| {
-        let x = 2.7 * f64::from(index) + 0.4 * f64::from(index % 4) - 6.0;
-        Point::new(x, if index % 2 == 0 { 3.1 + 0.3 * f64::from(index % 3) } else { -2.8 })
+    let middle = (way / 2.7) as i32;
+    let all = (middle - 5..middle + 6).map(|index| {
+        let x = 2.7 * f64::from(index) + 0.4 * f64::from(index.rem_euclid(4));
+        Point::new(x, if index % 2 == 0 { 3.1 + 0.3 * f64::from(index.rem_euclid(3)) } else { -2.8 })
     });
     all.filter(|point| (point.x - way).abs() < 8.0).collect()
 }
@@ -222,4 +223,40 @@ fn false_reflectors_do_not_stay_in_a_map_of_reflectors_alone() {
     }
     // Fifty metres on landmarks that were found on the way.
     assert!(drive.error() < 0.25, "{} m", drive.error());
+}
+
+/// How wrong the believed way is after ten metres without landmarks, m.
+fn blind_error(drive: &Drive) -> f64 {
+    let mut blind = Drive { localizer: drive.localizer.clone(), ..*drive };
+    let offset = |drive: &Drive| drive.localizer.outputs().pose.pose.x - drive.way;
+    let before = offset(&blind);
+    for _ in 0..80 {
+        blind.drive();
+    }
+    offset(&blind) - before
+}
+
+#[test]
+fn a_scale_that_changes_is_learnt_again_on_the_way_and_at_once_when_a_pose_is_given() {
+    let mut parameters = parameters();
+    parameters.maps.features = false;
+    let mut drive = Drive::start(parameters, 1.0);
+    let drive_for = |drive: &mut Drive, revolutions: usize| {
+        for _ in 0..revolutions {
+            let start = drive.drive();
+            drive.see(start, &aisle(drive.way));
+        }
+    };
+    drive.scale = 0.004;
+    drive_for(&mut drive, 3200);
+    assert!(blind_error(&drive).abs() < 0.005, "{} m", blind_error(&drive));
+    // The wheel is worn or loaded by as much as it was wrong before, to the other side.
+    drive.scale = -0.004;
+    let mut told = Drive { localizer: drive.localizer.clone(), ..drive };
+    assert!(blind_error(&drive) > 0.07);
+    drive_for(&mut drive, 4800);
+    assert!(blind_error(&drive).abs() < 0.015, "after 600 m: {} m", blind_error(&drive));
+    told.set_pose();
+    drive_for(&mut told, 200);
+    assert!(blind_error(&told).abs() < 0.01, "25 m after it was told: {} m", blind_error(&told));
 }

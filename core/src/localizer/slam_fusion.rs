@@ -63,7 +63,7 @@ impl<
         if self.slam.time() > latest {
             return false;
         }
-        self.slam.advance(time, timeline, self.parameters.vehicle.steering_lever());
+        self.slam.advance(time, timeline, &self.parameters);
         true
     }
 
