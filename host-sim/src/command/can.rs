@@ -317,7 +317,6 @@ fn pose_json(pose: &PublishedPose) -> serde_json::Value {
         "drive_fault": pose.health.drive,
         "steering_fault": pose.health.steering,
         "laser": format!("{:?}", pose.health.laser),
-        "layer": pose.health.layer,
         "counter": pose.counter,
         "time_ms": pose.time,
     })

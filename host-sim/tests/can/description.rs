@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use agv_core::localizer::{Mode, Reason};
 use agv_core::measurement::EncoderFault;
 use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::controller::{Content, Health, LaserHealth, StartSearch, WantedMode};
+use agv_core::wire::can::controller::{Content, Health, LaserHealth, StartSearch};
 use agv_core::wire::can::frame::{Frame, Id};
 use agv_host_sim::data;
 use serde_json::Value;
@@ -70,12 +70,8 @@ fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
     }
     for is_standstill in [false, true] {
         all.push((
-            Content::Command { mode: WantedMode::Mixed, layer: 513, is_standstill },
-            BTreeMap::from([
-                ("WantedMode", 3.0),
-                ("WantedLayer", 513.0),
-                ("Standstill", f64::from(u8::from(is_standstill))),
-            ]),
+            Content::Command { is_standstill },
+            BTreeMap::from([("Standstill", f64::from(u8::from(is_standstill)))]),
         ));
     }
     all
@@ -132,7 +128,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 reason,
                 acceptance: 0.5,
                 normalised_square: 2.0,
-                health: Health { drive, steering, laser, layer: 40_000, start_search },
+                health: Health { drive, steering, laser, start_search },
                 is_good: index % 2 == 0,
                 has_jumped: index % 3 == 0,
             };
@@ -142,7 +138,6 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 ("DriveFault", fault(drive)),
                 ("SteeringFault", fault(steering)),
                 ("Laser", format!("{laser:?}")),
-                ("Layer", "40000".to_owned()),
                 ("StartSearch", format!("{start_search:?}")),
                 ("PoseIsGood", u8::from(index % 2 == 0).to_string()),
                 ("Corrected", u8::from(index % 3 == 0).to_string()),
