@@ -192,6 +192,8 @@ fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> Pose
         drift,
         acceptance: 1.0,
         normalised_square,
+        resets: 0,
+        last_reset: 0.0,
     }
 }
 

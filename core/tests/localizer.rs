@@ -205,6 +205,35 @@ fn corrections_are_said_and_leave_no_step_in_the_smooth_pose() {
 }
 
 #[test]
+fn a_jump_is_told_to_who_asks_later() {
+    let mut drive = Drive::start();
+    let mut predictor: OutputPredictor = OutputPredictor::new(&parameters());
+    assert_eq!((drive.localizer.outputs().pose.resets, drive.localizer.outputs().pose.last_reset), (0, 0.0));
+    let given = drive.set_pose(Pose::new(0.04, -0.03, 0.008));
+    assert_eq!((given.resets, given.last_reset), (1, 0.0));
+    let before = drive.revolutions(1, |_| false);
+    assert_eq!(before.resets, 1);
+    let after = drive.look(|_| true);
+    let moved = (after.pose.x - before.pose.x).hypot(after.pose.y - before.pose.y);
+    // The encoders say something before anybody asks.
+    drive.revolutions(1, |_| false);
+    predictor.update(&drive.localizer.outputs().pose);
+    for told in [drive.localizer.outputs().pose, predictor.output().unwrap()] {
+        assert!(!told.has_jumped() && moved > PoseOutput::NOTABLE_CORRECTION);
+        assert_eq!((told.resets, told.last_reset), (2, moved as f32));
+    }
+    // Small corrections are none.
+    assert_eq!(drive.revolutions(20, |_| true).resets, 2);
+    let last = drive.localizer.outputs().pose;
+    let put = drive.set_pose(Pose { x: last.pose.x + 3.0, y: last.pose.y - 4.0, theta: 0.0 });
+    assert!(put.resets == 3 && (put.last_reset - 5.0).abs() < 1e-5, "{put:?}");
+    for _ in 0..256 {
+        drive.set_pose(Pose::default());
+    }
+    assert_eq!(drive.localizer.outputs().pose.resets, 3);
+}
+
+#[test]
 fn every_reflector_is_used_at_its_own_time() {
     // At 1 m/s the vehicle moves 12 cm within a revolution; noise-free observations leave millimetres only if each is
     // taken from where the vehicle was.

@@ -132,22 +132,27 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
         prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Degraded)];
     let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible), Just(Reason::SteeringEncoder)];
     let numbers = prop::array::uniform12(number());
-    (time(), [pose(), pose()], mode, reason, numbers).prop_map(|(time, [pose, smooth], mode, reason, numbers)| {
-        let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
-        PoseOutput {
-            time,
-            pose,
-            covariance: [a, b, c, d, e, f],
-            mode,
-            reason,
-            dead_reckoning_distance: g,
-            correction,
-            smooth,
-            drift: [drift, heading_drift],
-            acceptance: h,
-            normalised_square: i,
-        }
-    })
+    let counters = (any::<u8>(), single());
+    (time(), [pose(), pose()], mode, reason, numbers, counters).prop_map(
+        |(time, [pose, smooth], mode, reason, numbers, (resets, last_reset))| {
+            let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
+            PoseOutput {
+                time,
+                pose,
+                covariance: [a, b, c, d, e, f],
+                mode,
+                reason,
+                dead_reckoning_distance: g,
+                correction,
+                smooth,
+                drift: [drift, heading_drift],
+                acceptance: h,
+                normalised_square: i,
+                resets,
+                last_reset,
+            }
+        },
+    )
 }
 
 fn landmark_use() -> impl Strategy<Value = LandmarkUse> {
@@ -462,7 +467,7 @@ fn another_version_is_told_apart_from_damage() {
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 6, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 7, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }

@@ -8,7 +8,7 @@ use crate::landmarks::{LandmarkKind, Verdict};
 /// Where the vehicle is, and where it would be by odometry alone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
-    pose: Pose,
+    pub pose: Pose,
     smooth: Pose,
     is_sure: bool,
     /// Way since a landmark last corrected the pose, m.

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::evidence::DistanceSince;
-use super::integrity::Corrected;
+use super::integrity::{Corrected, Estimate};
 use super::maps::Maps;
 use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
@@ -85,6 +85,8 @@ impl<
             drift: [0.0; 2],
             acceptance: 1.0,
             normalised_square: 2.0,
+            resets: 0,
+            last_reset: 0.0,
         };
         Self {
             odometer: Odometer::new(
@@ -226,6 +228,15 @@ impl<
             self.blindness.map(|blindness| Blindness { coasting: Coasting::new(Motion::none(fix.time)), ..blindness });
         self.distance = DistanceSince { fix: 0.0, ..DistanceSince::NEVER };
         self.maps.dynamic.clear();
+        self.count_given_pose();
+    }
+
+    fn count_given_pose(&mut self) {
+        let Some(Estimate { pose, .. }) = self.estimate() else { return };
+        let last = &mut self.outputs.pose;
+        let is_first = last.mode == Mode::NotLocalised;
+        let distance = if is_first { 0.0 } else { libm::hypot(pose.x - last.pose.x, pose.y - last.pose.y) };
+        last.count_reset(distance);
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
@@ -358,7 +369,11 @@ impl<
             drift: self.drift_check.trend(),
             acceptance,
             normalised_square: self.consistency.mean_normalised_square(),
+            ..self.outputs.pose
         };
+        if self.outputs.pose.has_jumped() {
+            self.outputs.pose.count_reset(correction);
+        }
     }
 }
 

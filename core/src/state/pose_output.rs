@@ -31,6 +31,11 @@ pub struct PoseOutput {
     pub drift: [f64; 2],
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
+    /// How often the position has been reset, wrapping: by a pose that was given, or by a correction that
+    /// [has jumped](Self::has_jumped). Unlike the correction it stays, so that who listens now and then misses none.
+    pub resets: u8,
+    /// By how far the last reset has moved the position, m; 0 for the first pose.
+    pub last_reset: f32,
 }
 
 impl PoseOutput {
@@ -41,6 +46,12 @@ impl PoseOutput {
     #[must_use]
     pub fn has_jumped(&self) -> bool {
         self.correction > Self::NOTABLE_CORRECTION
+    }
+
+    /// Counts a reset of the position by so many metres.
+    pub(crate) fn count_reset(&mut self, distance: f64) {
+        self.resets = self.resets.wrapping_add(1);
+        self.last_reset = distance.min(f64::from(f32::MAX)) as f32;
     }
 
     /// A position that is no less sure than this in any direction, m, and a heading, rad, are good enough to leave the

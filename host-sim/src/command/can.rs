@@ -317,6 +317,8 @@ fn pose_json(pose: &PublishedPose) -> serde_json::Value {
         "drive_fault": pose.health.drive,
         "steering_fault": pose.health.steering,
         "laser": format!("{:?}", pose.health.laser),
+        "resets": pose.resets,
+        "last_reset_m": pose.last_reset,
         "counter": pose.counter,
         "time_ms": pose.time,
     })

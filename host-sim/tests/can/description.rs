@@ -131,6 +131,8 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 health: Health { drive, steering, laser, start_search },
                 is_good: index % 2 == 0,
                 has_jumped: index % 3 == 0,
+                resets: 250 + index as u8 % 6,
+                last_reset: 0.02 * index as f64,
             };
             let names = BTreeMap::from([
                 ("Mode", format!("{mode:?}")),
@@ -138,6 +140,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 ("DriveFault", fault(drive)),
                 ("SteeringFault", fault(steering)),
                 ("Laser", format!("{laser:?}")),
+                ("PoseResets", (250 + index % 6).to_string()),
                 ("StartSearch", format!("{start_search:?}")),
                 ("PoseIsGood", u8::from(index % 2 == 0).to_string()),
                 ("Corrected", u8::from(index % 3 == 0).to_string()),
@@ -218,6 +221,8 @@ fn cantools_decodes_what_we_say_and_encodes_what_we_hear() {
         for (name, value) in expected {
             assert_eq!(answer["names"][*name], **value, "{content:?}");
         }
+        let Content::Status { last_reset, .. } = content else { panic!("{content:?}") };
+        assert!((answer["signals"]["LastReset"].as_f64().unwrap() - last_reset).abs() < 1e-9);
         assert_eq!(
             (answer["signals"]["Acceptance"].as_f64(), answer["signals"]["NormalisedSquare"].as_f64()),
             (Some(0.5), Some(2.0))

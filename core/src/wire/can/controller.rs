@@ -9,7 +9,7 @@
 //! | position | 180h + node | x, y: 30 bits, 0.1 mm |
 //! | heading | 280h + node | heading: 24 bits, 1 urad; time: 16 bits, ms; dead-reckoning distance: 16 bits, 1 cm |
 //! | covariance | 380h + node | deviations: 13 bits, 0.25 mm and 0.1 mrad; correlations: 7 bits, 0.02 |
-//! | status | 480h + node | mode, reason, acceptance, innovations, faults, search |
+//! | status | 480h + node | mode, reason, acceptance, innovations, faults, resets, search |
 //! | initial position | 200h + node | x, y as above |
 //! | initial heading | 300h + node | heading as above; deviations: 16 bits, 1 mm and 0.1 mrad |
 //! | command | 400h + node | standstill |
@@ -115,6 +115,8 @@ const NORMALISED_SQUARE: Field = Field::unsigned(17, 10, 0.05);
 const DRIVE_FAULT: Field = Field::unsigned(27, 4, 1.0);
 const STEERING_FAULT: Field = Field::unsigned(31, 4, 1.0);
 const LASER: Field = Field::unsigned(35, 2, 1.0);
+const RESETS: Field = Field::unsigned(37, 8, 1.0);
+const LAST_RESET: Field = Field::unsigned(45, 8, 0.02);
 const START_SEARCH: Field = Field::unsigned(53, 3, 1.0);
 const POSE_IS_GOOD: Field = Field::unsigned(56, 1, 1.0);
 const CORRECTED: Field = Field::unsigned(57, 1, 1.0);
@@ -270,6 +272,10 @@ pub enum Content {
         is_good: bool,
         /// Whether landmarks have moved the position notably: [`PoseOutput::has_jumped`].
         has_jumped: bool,
+        /// How often the position was reset: [`PoseOutput::resets`].
+        resets: u8,
+        /// By how far the last time, m.
+        last_reset: f64,
     },
     /// Position where the vehicle shall believe to be.
     InitialPosition {
@@ -337,7 +343,17 @@ impl Content {
                 let payload = CORRELATION_X_HEADING.put(payload, x_heading);
                 CORRELATION_Y_HEADING.put(payload, y_heading)
             }
-            Self::Status { mode, reason, acceptance, normalised_square, health, is_good, has_jumped } => {
+            Self::Status {
+                mode,
+                reason,
+                acceptance,
+                normalised_square,
+                health,
+                is_good,
+                has_jumped,
+                resets,
+                last_reset,
+            } => {
                 let payload = MODE.put_raw(payload, number_of(&MODES, &mode, MODE));
                 let payload = REASON.put_raw(payload, number_of(&REASONS, &reason, REASON));
                 let payload = ACCEPTANCE.put(payload, acceptance);
@@ -349,6 +365,8 @@ impl Content {
                 let payload = DRIVE_FAULT.put_raw(payload, fault(health.drive, DRIVE_FAULT));
                 let payload = STEERING_FAULT.put_raw(payload, fault(health.steering, STEERING_FAULT));
                 let payload = LASER.put_raw(payload, number_of(&LASERS, &health.laser, LASER));
+                let payload = RESETS.put_raw(payload, u64::from(resets));
+                let payload = LAST_RESET.put_deviation(payload, last_reset);
                 let search = number_of(&START_SEARCHES, &health.start_search, START_SEARCH);
                 let payload = START_SEARCH.put_raw(payload, search);
                 let payload = POSE_IS_GOOD.put_raw(payload, u64::from(is_good));
@@ -401,6 +419,8 @@ impl Content {
                 },
                 is_good: POSE_IS_GOOD.take_raw(payload) == 1,
                 has_jumped: CORRECTED.take_raw(payload) == 1,
+                resets: RESETS.take_raw(payload) as u8,
+                last_reset: LAST_RESET.take(payload),
             },
             (None, Some(1)) => Self::InitialPosition { x: X.take(payload), y: Y.take(payload) },
             (None, Some(2)) => Self::InitialHeading {
@@ -478,6 +498,8 @@ pub fn contents(pose: &PoseOutput, health: &Health) -> [Content; 4] {
             health: *health,
             is_good: pose.is_good(),
             has_jumped: pose.has_jumped(),
+            resets: pose.resets,
+            last_reset: f64::from(pose.last_reset),
         },
     ]
 }
@@ -507,6 +529,10 @@ pub struct PublishedPose {
     pub is_good: bool,
     /// Whether landmarks have moved the position notably.
     pub has_jumped: bool,
+    /// How often the position was reset, wrapping.
+    pub resets: u8,
+    /// By how far the last time, m.
+    pub last_reset: f64,
 }
 
 /// Puts the four frames of a pose together.
@@ -543,7 +569,7 @@ impl PoseReceiver {
             Some(Content::Position { x, y }),
             Some(Content::Heading { heading, time, dead_reckoning_distance }),
             Some(Content::Covariance { deviations, correlations }),
-            Some(Content::Status { mode, reason, health, is_good, has_jumped, .. }),
+            Some(Content::Status { mode, reason, health, is_good, has_jumped, resets, last_reset, .. }),
         ] = self.contents
         else {
             return None;
@@ -562,6 +588,8 @@ impl PoseReceiver {
             health,
             is_good,
             has_jumped,
+            resets,
+            last_reset,
         })
     }
 }
