@@ -179,6 +179,23 @@ fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_fo
     }
 }
 
+#[test]
+fn the_heading_s_trend_holds_four_times_what_the_laser_looks_askew_by() {
+    let trend = |correction: Pose| {
+        let mut check = DriftCheck::new();
+        for _ in 0..200 {
+            check.add(&Pose::new(0.15, 0.0, 0.0), &correction);
+        }
+        check.trend()
+    };
+    // Eight revolutions' corrections, and four times the angle, though the heading itself was never corrected.
+    let [position, heading] = trend(Pose::new(0.0, 0.02 * 0.15, 0.0));
+    assert!((position - 8.0 * 0.02 * 0.15).abs() < 1e-9, "{position}");
+    assert!((heading - 4.0 * 0.02).abs() < 0.1 * 4.0 * 0.02, "{heading}");
+    let [position, heading] = trend(Pose::new(0.0, 0.0, -0.001));
+    assert!(position == 0.0 && (heading - 8.0 * 0.001).abs() < 1e-9, "{heading}");
+}
+
 fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
     PoseOutput {
         time: Time::default(),

@@ -27,7 +27,9 @@ pub struct PoseOutput {
     pub smooth: Pose,
     /// Share of the observations of fixed landmarks that were accepted lately, 0 to 1.
     pub acceptance: f64,
-    /// By how much landmarks have lately corrected position, m, and heading, rad, in one direction.
+    /// What the pose may lag behind by, for the [protection level](super::ProtectionLevel), which counts 30 per cent of it:
+    /// the sum of the position's corrections of about eight revolutions, m; that of the heading's plus four times what the
+    /// laser seems to look askew by, rad, as the pose is off by all of the latter.
     pub drift: [f64; 2],
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
