@@ -3,7 +3,9 @@
 
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
-use agv_core::localizer::{Event, LandmarkSource, LandmarkUse, Mode, Parameters, PoseFix, PoseOutput, Reason};
+use agv_core::localizer::{
+    Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
+};
 use agv_core::measurement::{
     EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample,
     Time,
@@ -461,6 +463,22 @@ fn another_version_is_told_apart_from_damage() {
     let (again, damages) = read_again(&frame, 1000);
     assert!(again.is_empty());
     assert_eq!(damages[0].reason, DamageReason::Version(9));
+}
+
+#[test]
+fn the_header_of_a_localiser_s_log_states_its_room() {
+    let parameters = Parameters::new(Vehicle::Increments, Pose::default());
+    let mut buffer = vec![0; MAX_FRAME];
+    let header = Localizer::<360, 64, 32, 8>::header("test", &parameters);
+    let length = encode(&Record::Header(header), 0, &mut buffer).unwrap();
+    let mut scratch = Box::new(Scratch::<1, 1>::new());
+    let (_, Step::Item(Item::Record { record: Record::Header(read), .. })) =
+        LogReader::new().step(&buffer[..length], true, &mut scratch)
+    else {
+        panic!("no header")
+    };
+    // The past does not depend on the maps.
+    assert_eq!(read.capacities, Capacities { landmarks: 96, beams: 360, history: 128 });
 }
 
 #[test]

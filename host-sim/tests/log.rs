@@ -217,6 +217,16 @@ fn appending_goes_on_behind_the_last_good_record() {
 }
 
 #[test]
+fn a_log_states_what_its_localiser_had_room_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive.agvlog");
+    Writer::begin(&path, &parameters(), &[]).unwrap().finish().unwrap();
+    let mut reader = Reader::open(&path).unwrap();
+    let Some(Item::Record { record: Record::Header(header), .. }) = reader.next().unwrap() else { panic!("no header") };
+    assert_eq!(header.capacities, Capacities { landmarks: 2000, beams: 1440, history: 128 });
+}
+
+#[test]
 fn what_is_flushed_is_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");

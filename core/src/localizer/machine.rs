@@ -14,6 +14,7 @@ use crate::geometry::{Point, Pose, wrap};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryError};
+use crate::record::{Capacities, Header};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -69,6 +70,16 @@ impl<
     const ENTRIES: usize,
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
+    /// How much it has room for, as the log of its vehicle states it.
+    pub const CAPACITIES: Capacities =
+        Capacities { landmarks: (REFLECTORS + FEATURES) as u32, beams: BEAMS as u32, history: PAST as u32 };
+
+    /// What the log of its vehicle begins with.
+    #[must_use]
+    pub const fn header<'a>(software: &'a str, parameters: &'a Parameters) -> Header<'a> {
+        Header { software, parameters, capacities: Self::CAPACITIES }
+    }
+
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
     #[inline(always)]

@@ -8,3 +8,4 @@ mod peer;
 mod round_trip;
 mod session;
 mod values;
+mod watch;
