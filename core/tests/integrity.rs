@@ -211,6 +211,7 @@ fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> Pose
         normalised_square,
         resets: 0,
         last_reset: 0.0,
+        overflows: 0,
     }
 }
 

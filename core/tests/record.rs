@@ -134,9 +134,9 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
         prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Degraded)];
     let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible), Just(Reason::SteeringEncoder)];
     let numbers = prop::array::uniform12(number());
-    let counters = (any::<u8>(), single());
+    let counters = (any::<u8>(), single(), any::<u8>());
     (time(), [pose(), pose()], mode, reason, numbers, counters).prop_map(
-        |(time, [pose, smooth], mode, reason, numbers, (resets, last_reset))| {
+        |(time, [pose, smooth], mode, reason, numbers, (resets, last_reset, overflows))| {
             let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
             PoseOutput {
                 time,
@@ -152,6 +152,7 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
                 normalised_square: i,
                 resets,
                 last_reset,
+                overflows,
             }
         },
     )

@@ -1,6 +1,9 @@
 //! Mapping while driving, in the localiser as a whole: a hall whose corners and reflectors are known to the test.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+#[path = "support/hall.rs"]
+mod hall;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use agv_core::features::ReflectorDetection;
@@ -10,6 +13,7 @@ use agv_core::landmarks::LandmarkKind;
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
 use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
+use hall::{cast, corners};
 
 const BEAMS: usize = 1440;
 const KEYS: usize = 2;
@@ -104,83 +108,66 @@ impl Drive {
     }
 }
 
-/// Corners of a hall and of four pillars in it, each a rectangle: lowest and highest x and y.
-const WALLS: [[f64; 4]; 5] = [
-    [-7.0, 9.0, -5.0, 6.0],
-    [2.0, 2.8, 2.0, 2.8],
-    [4.5, 5.3, -3.1, -2.3],
-    [-3.6, -2.8, 2.6, 3.4],
-    [-2.4, -1.6, -2.9, -2.1],
-];
-
-fn corners() -> impl Iterator<Item = Point> {
-    let of = |[left, right, low, high]: [f64; 4]| [(left, low), (left, high), (right, low), (right, high)];
-    WALLS.into_iter().flat_map(of).map(|(x, y)| Point::new(x, y))
-}
-
-/// Distance to the nearest wall.
-fn cast(origin: &Pose, bearing: f64) -> f64 {
-    let (sine, cosine) = (origin.theta + bearing).sin_cos();
-    let mut nearest = f64::INFINITY;
-    for [left, right, low, high] in WALLS {
-        for x in [left, right] {
-            let range = (x - origin.x) / cosine;
-            if range > 0.0 && (low..=high).contains(&(origin.y + range * sine)) {
-                nearest = nearest.min(range);
-            }
-        }
-        for y in [low, high] {
-            let range = (y - origin.y) / sine;
-            if range > 0.0 && (left..=right).contains(&(origin.x + range * cosine)) {
-                nearest = nearest.min(range);
-            }
+/// Drives past the hall at 3 m/s with so many beams a revolution, holds every feature against the true corners, and gives how
+/// many scans were too large.
+fn features_are_at_corners(beams: usize, detection: Option<ReflectorDetection>) -> u8 {
+    let step = TAU / beams as f64;
+    let reflector = Point::new(1.5, 6.0);
+    let mut parameters = parameters();
+    parameters.reflectors.detection = detection;
+    let mut drive = Drive::start(parameters, 3.0);
+    let (mut features, mut reflectors) = (0, 0);
+    let mut directions = [false; 4];
+    for _ in 0..4 {
+        let start = drive.drive();
+        let beam_interval = REVOLUTION / beams as f64;
+        let (ranges, intensities): (Vec<f32>, Vec<u16>) = (0..beams)
+            .map(|beam| {
+                let sensor = drive.sensor(start.offset(beam as f64 * beam_interval));
+                let bearing = -FRAC_PI_2 + beam as f64 * step;
+                let range = cast(&sensor, bearing);
+                let (sine, cosine) = (sensor.theta + bearing).sin_cos();
+                let hit = sensor.position() + range * Point::new(cosine, sine);
+                (range as f32, u16::from((hit - reflector).norm() < 0.06))
+            })
+            .unzip();
+        let first_bearing = -FRAC_PI_2;
+        let scan = Scan {
+            start,
+            beam_interval,
+            first_bearing,
+            bearing_step: step,
+            ranges: &ranges,
+            intensities: &intensities,
+        };
+        let uses = drive.localizer.handle(&Event::Scan(scan)).uses.clone();
+        reflectors += uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector).count();
+        for seen in uses.iter().filter(|seen| seen.kind == LandmarkKind::Corner) {
+            let located = Point::from(seen.located);
+            let error = corners().map(|corner| (corner - located).norm()).fold(f64::INFINITY, f64::min);
+            assert!(error < 0.06, "{located} is {error} m from the nearest corner, {detection:?}");
+            features += 1;
+            let [x, y] = seen.position;
+            directions[usize::from(x > 0.0) + 2 * usize::from(y > 0.0)] = true;
         }
     }
-    nearest
+    assert!(features > 12, "{features}");
+    assert_eq!(reflectors, if detection.is_some() { 4 } else { 0 });
+    assert!(directions.iter().all(|seen| *seen), "no features in a quarter: {directions:?}");
+    drive.localizer.outputs().pose.overflows
 }
 
 #[test]
 fn features_are_seen_from_where_the_laser_was_with_and_without_reflectors_in_the_scan() {
-    let step = TAU / BEAMS as f64;
-    let reflector = Point::new(1.5, 6.0);
     for detection in [None, Some(ReflectorDetection::default())] {
-        let mut parameters = parameters();
-        parameters.reflectors.detection = detection;
-        let mut drive = Drive::start(parameters, 3.0);
-        let (mut features, mut reflectors) = (0, 0);
-        for _ in 0..4 {
-            let start = drive.drive();
-            let beam_interval = REVOLUTION / BEAMS as f64;
-            let (ranges, intensities): (Vec<f32>, Vec<u16>) = (0..BEAMS)
-                .map(|beam| {
-                    let sensor = drive.sensor(start.offset(beam as f64 * beam_interval));
-                    let bearing = -FRAC_PI_2 + beam as f64 * step;
-                    let range = cast(&sensor, bearing);
-                    let (sine, cosine) = (sensor.theta + bearing).sin_cos();
-                    let hit = sensor.position() + range * Point::new(cosine, sine);
-                    (range as f32, u16::from((hit - reflector).norm() < 0.06))
-                })
-                .unzip();
-            let first_bearing = -FRAC_PI_2;
-            let scan = Scan {
-                start,
-                beam_interval,
-                first_bearing,
-                bearing_step: step,
-                ranges: &ranges,
-                intensities: &intensities,
-            };
-            let uses = drive.localizer.handle(&Event::Scan(scan)).uses.clone();
-            reflectors += uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector).count();
-            for seen in uses.iter().filter(|seen| seen.kind == LandmarkKind::Corner) {
-                let located = Point::from(seen.located);
-                let error = corners().map(|corner| (corner - located).norm()).fold(f64::INFINITY, f64::min);
-                assert!(error < 0.06, "{located} is {error} m from the nearest corner, {detection:?}");
-                features += 1;
-            }
-        }
-        assert!(features > 12, "{features}");
-        assert_eq!(reflectors, if detection.is_some() { 4 } else { 0 });
+        assert_eq!(features_are_at_corners(BEAMS, detection), 0);
+    }
+}
+
+#[test]
+fn a_scan_with_too_many_beams_is_thinned_and_counted() {
+    for beams in [BEAMS + 1, 2880, 4320] {
+        assert_eq!(features_are_at_corners(beams, Some(ReflectorDetection::default())), 4, "{beams} beams");
     }
 }
 

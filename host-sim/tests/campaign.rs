@@ -24,6 +24,7 @@ fn output(time: Time, x: f64, mode: Mode) -> PoseOutput {
         normalised_square: 2.0,
         resets: 0,
         last_reset: 0.0,
+        overflows: 0,
     }
 }
 

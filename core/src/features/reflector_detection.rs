@@ -4,6 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::measurement::{ReflectorObservation, Scan};
+use crate::order::Evenly;
 
 /// What counts as a reflector.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,13 +55,35 @@ impl Group {
 }
 
 /// Finds groups of strong returns and gives the mean direction and range of each, in order of time. A group may have
-/// single weak or missing beams inside. What exceeds the capacity of `found` is left out.
+/// single weak or missing beams inside. Of more than there is room for in `found` as many are kept, from all around. Returns
+/// how many are left out.
 pub fn detect_reflectors<const REFLECTORS: usize>(
     scan: &Scan,
     parameters: &ReflectorDetection,
     found: &mut Vec<ReflectorObservation, REFLECTORS>,
-) {
+) -> usize {
+    let count = detect(scan, parameters, Evenly::all(), found);
+    if count > REFLECTORS {
+        detect(scan, parameters, Evenly::new(REFLECTORS, count), found);
+    }
+    count.saturating_sub(REFLECTORS)
+}
+
+/// Finds all reflectors, keeps those that `choice` takes, and returns how many there are.
+fn detect<const REFLECTORS: usize>(
+    scan: &Scan,
+    parameters: &ReflectorDetection,
+    mut choice: Evenly,
+    found: &mut Vec<ReflectorObservation, REFLECTORS>,
+) -> usize {
     found.clear();
+    let mut count = 0;
+    let mut keep = |observation: ReflectorObservation| {
+        count += 1;
+        if choice.takes() {
+            let _ = found.push(observation);
+        }
+    };
     let mut group: Option<Group> = None;
     for (index, (&range, &intensity)) in scan.ranges.iter().zip(scan.intensities).enumerate() {
         let is_strong = intensity >= parameters.least_intensity && range > 0.0 && range <= parameters.farthest;
@@ -78,7 +101,7 @@ pub fn detect_reflectors<const REFLECTORS: usize>(
                 continue;
             }
             if let Some(observation) = open.observation(scan, parameters) {
-                let _ = found.push(observation);
+                keep(observation);
             }
         }
         group = Some(Group {
@@ -91,6 +114,7 @@ pub fn detect_reflectors<const REFLECTORS: usize>(
         });
     }
     if let Some(observation) = group.and_then(|open| open.observation(scan, parameters)) {
-        let _ = found.push(observation);
+        keep(observation);
     }
+    count
 }

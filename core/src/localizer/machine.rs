@@ -98,6 +98,7 @@ impl<
             normalised_square: 2.0,
             resets: 0,
             last_reset: 0.0,
+            overflows: 0,
         };
         Self {
             odometer: Odometer::new(
@@ -128,7 +129,7 @@ impl<
                 reflectors: Vec::new(),
                 sightings: Vec::new(),
             },
-            outputs: Outputs { pose, uses: Vec::new() },
+            outputs: Outputs { pose, uses: Vec::new(), has_cut: false },
             parameters,
         }
     }
@@ -188,6 +189,7 @@ impl<
     /// by as much as the filter remembers, about 0.4 s.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
+        self.outputs.has_cut = false;
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
         match event {
@@ -206,7 +208,8 @@ impl<
             }
             Event::Reflectors(reflectors) if self.parameters.maps.reflectors => {
                 self.workspace.sightings.clear();
-                see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
+                self.outputs.has_cut |=
+                    see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
                 if self.parameters.maps.slam {
                     self.fuse_lone_reflectors_by_slam();
                 } else {
@@ -317,7 +320,7 @@ impl<
             && maps.reflectors
             && !scan.intensities.is_empty()
         {
-            detect_reflectors(scan, detection, &mut workspace.reflectors);
+            self.outputs.has_cut |= detect_reflectors(scan, detection, &mut workspace.reflectors) > 0;
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
             if maps.slam {
@@ -329,7 +332,7 @@ impl<
         if maps.slam {
             self.fuse_scan_by_slam(scan);
         } else if maps.features || maps.dynamic {
-            self.workspace.see_features(&self.parameters, scan);
+            self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
             self.fuse();
             self.update_dynamic_map();
         }
@@ -385,6 +388,7 @@ impl<
         if self.outputs.pose.has_jumped() {
             self.outputs.pose.count_reset(correction);
         }
+        self.outputs.pose.overflows = self.outputs.pose.overflows.wrapping_add(u8::from(self.outputs.has_cut));
     }
 }
 

@@ -42,7 +42,7 @@ impl<
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
     pub(super) fn fuse_scan_by_slam(&mut self, scan: &Scan) {
-        self.workspace.see_features(&self.parameters, scan);
+        self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }

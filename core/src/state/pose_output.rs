@@ -38,6 +38,9 @@ pub struct PoseOutput {
     pub resets: u8,
     /// By how far the last reset has moved the position, m; 0 for the first pose.
     pub last_reset: f32,
+    /// How many scans and revolutions had more beams, features or reflectors than there was room for, wrapping. What is
+    /// left out is spread over all directions, or is what is known worst.
+    pub overflows: u8,
 }
 
 impl PoseOutput {

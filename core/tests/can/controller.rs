@@ -32,6 +32,7 @@ fn pose() -> PoseOutput {
         normalised_square: 2.15,
         resets: 0xA7,
         last_reset: 0.125,
+        overflows: 6,
     }
 }
 
@@ -56,8 +57,8 @@ fn literal_frames() {
     let payload = 40 | 80 << 13 | 10 << 26 | 8 << 39 | 10 << 46 | (-10i64 as u64 & 0x7F) << 53 | 5 << 60;
     assert_eq!(covariance, Frame::of(standard_id(0x390), u64::to_le_bytes(payload)));
     // Mode 3, reason 0, 87 %, 43 steps, steering frozen (3), laser sound (1), the 167th reset of 125 mm (7 steps, rounded
-    // up), too few reflectors (3).
-    let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 0xA7 << 37 | 7 << 45 | 3 << 53 | 5u64 << 60;
+    // up), too few reflectors (3), six scans that were too large (6 modulo 4).
+    let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 0xA7 << 37 | 7 << 45 | 3 << 53 | 2 << 58 | 5u64 << 60;
     assert_eq!(status, Frame::of(standard_id(0x490), payload.to_le_bytes()));
     // Sure to 5 mm and 0.03 deg, and corrected by 2 cm: one bit each.
     let sure = PoseOutput { covariance: [2e-5, 0.0, 1e-5, 0.0, 0.0, 2e-7], correction: 0.02, ..pose() };
@@ -141,7 +142,9 @@ fn poses_come_every_10_ms_and_are_put_together_again() {
                 assert_eq!((received.mode, received.reason, received.health), (Mode::Mixed, Reason::None, health()));
                 assert!((received.pose.x - 12.3456).abs() < 1e-9 && (received.pose.theta + 1.234_567).abs() < 1e-9);
                 assert!((received.deviations[1] - 0.02).abs() < 1e-9 && received.time == 4587);
-                assert!(received.resets == 0xA7 && (received.last_reset - 0.14).abs() < 1e-9);
+                assert!(
+                    (received.resets, received.overflows) == (0xA7, 2) && (received.last_reset - 0.14).abs() < 1e-9
+                );
             }
         }
     }

@@ -5,6 +5,7 @@ mod clock;
 mod framing;
 mod literal;
 mod peer;
+mod revolution;
 mod round_trip;
 mod session;
 mod values;

@@ -319,6 +319,7 @@ fn pose_json(pose: &PublishedPose) -> serde_json::Value {
         "laser": format!("{:?}", pose.health.laser),
         "resets": pose.resets,
         "last_reset_m": pose.last_reset,
+        "overflows": pose.overflows,
         "counter": pose.counter,
         "time_ms": pose.time,
     })

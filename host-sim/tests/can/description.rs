@@ -133,6 +133,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 has_jumped: index % 3 == 0,
                 resets: 250 + index as u8 % 6,
                 last_reset: 0.02 * index as f64,
+                overflows: index as u8 % 4,
             };
             let names = BTreeMap::from([
                 ("Mode", format!("{mode:?}")),
@@ -141,6 +142,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 ("SteeringFault", fault(steering)),
                 ("Laser", format!("{laser:?}")),
                 ("PoseResets", (250 + index % 6).to_string()),
+                ("Overflows", (index % 4).to_string()),
                 ("StartSearch", format!("{start_search:?}")),
                 ("PoseIsGood", u8::from(index % 2 == 0).to_string()),
                 ("Corrected", u8::from(index % 3 == 0).to_string()),

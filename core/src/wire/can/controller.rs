@@ -120,6 +120,7 @@ const LAST_RESET: Field = Field::unsigned(45, 8, 0.02);
 const START_SEARCH: Field = Field::unsigned(53, 3, 1.0);
 const POSE_IS_GOOD: Field = Field::unsigned(56, 1, 1.0);
 const CORRECTED: Field = Field::unsigned(57, 1, 1.0);
+const OVERFLOWS: Field = Field::unsigned(58, 2, 1.0);
 const INITIAL_POSITION_DEVIATION: Field = Field::unsigned(24, 16, 1e-3);
 const INITIAL_HEADING_DEVIATION: Field = Field::unsigned(40, 16, 1e-4);
 const STANDSTILL: Field = Field::unsigned(20, 1, 1.0);
@@ -276,6 +277,8 @@ pub enum Content {
         resets: u8,
         /// By how far the last time, m.
         last_reset: f64,
+        /// How often there was not room for all that was seen, modulo 4: [`PoseOutput::overflows`].
+        overflows: u8,
     },
     /// Position where the vehicle shall believe to be.
     InitialPosition {
@@ -353,6 +356,7 @@ impl Content {
                 has_jumped,
                 resets,
                 last_reset,
+                overflows,
             } => {
                 let payload = MODE.put_raw(payload, number_of(&MODES, &mode, MODE));
                 let payload = REASON.put_raw(payload, number_of(&REASONS, &reason, REASON));
@@ -370,6 +374,7 @@ impl Content {
                 let search = number_of(&START_SEARCHES, &health.start_search, START_SEARCH);
                 let payload = START_SEARCH.put_raw(payload, search);
                 let payload = POSE_IS_GOOD.put_raw(payload, u64::from(is_good));
+                let payload = OVERFLOWS.put_raw(payload, u64::from(overflows));
                 CORRECTED.put_raw(payload, u64::from(has_jumped))
             }
             Self::InitialHeading { heading, position_deviation, heading_deviation } => {
@@ -421,6 +426,7 @@ impl Content {
                 has_jumped: CORRECTED.take_raw(payload) == 1,
                 resets: RESETS.take_raw(payload) as u8,
                 last_reset: LAST_RESET.take(payload),
+                overflows: OVERFLOWS.take_raw(payload) as u8,
             },
             (None, Some(1)) => Self::InitialPosition { x: X.take(payload), y: Y.take(payload) },
             (None, Some(2)) => Self::InitialHeading {
@@ -500,6 +506,7 @@ pub fn contents(pose: &PoseOutput, health: &Health) -> [Content; 4] {
             has_jumped: pose.has_jumped(),
             resets: pose.resets,
             last_reset: f64::from(pose.last_reset),
+            overflows: pose.overflows,
         },
     ]
 }
@@ -533,6 +540,8 @@ pub struct PublishedPose {
     pub resets: u8,
     /// By how far the last time, m.
     pub last_reset: f64,
+    /// How often there was not room for all that was seen, modulo 4.
+    pub overflows: u8,
 }
 
 /// Puts the four frames of a pose together.
@@ -569,7 +578,7 @@ impl PoseReceiver {
             Some(Content::Position { x, y }),
             Some(Content::Heading { heading, time, dead_reckoning_distance }),
             Some(Content::Covariance { deviations, correlations }),
-            Some(Content::Status { mode, reason, health, is_good, has_jumped, resets, last_reset, .. }),
+            Some(Content::Status { mode, reason, health, is_good, has_jumped, resets, last_reset, overflows, .. }),
         ] = self.contents
         else {
             return None;
@@ -590,6 +599,7 @@ impl PoseReceiver {
             has_jumped,
             resets,
             last_reset,
+            overflows,
         })
     }
 }
