@@ -1,7 +1,9 @@
 //! The augmented filter against a dense one, and its consistency.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_core::filter::{Augmented, BiasDeviations, Cartesian, Ekf, RelativePose, augmented_states, packed_entries};
+use agv_core::filter::{
+    Augmented, BiasDeviations, BiasWalk, Cartesian, Ekf, RelativePose, augmented_states, packed_entries,
+};
 use agv_core::geometry::{Point, Pose, wrap};
 use agv_core::measurement::Time;
 use agv_core::odometry::{Motion, OdometryBias};
@@ -29,9 +31,12 @@ fn deviations() -> BiasDeviations {
     BiasDeviations { scale: 0.01, steering: 0.005, laser_yaw: 0.002 }
 }
 
+const WALK: BiasWalk = BiasWalk { scale: 1e-3, steering: 7e-4, laser_yaw: 4e-4 };
+
 fn motion(x: f64, y: f64, theta: f64) -> Motion {
     Motion {
         displacement: Pose::new(x, y, theta),
+        distance: x.hypot(y),
         covariance: Matrix3::from_diagonal(&Vector3::new(1e-6, 2e-6, 1e-7)),
         ..Motion::none(Time::from_micros(0))
     }
@@ -109,6 +114,9 @@ impl Dense {
         let mut noise = Square::zeros();
         let turn = pose.compose_jacobian_second();
         noise.fixed_view_mut::<3, 3>(0, 0).copy_from(&(turn * motion.covariance * turn.transpose()));
+        for (state, deviation) in [(3, WALK.scale), (4, WALK.steering), (YAW, WALK.laser_yaw)] {
+            noise[(state, state)] = f64::from(deviation).powi(2) * motion.distance;
+        }
         self.covariance = transition * self.covariance * transition.transpose() + noise;
         for (state, value) in [ahead.x, ahead.y, ahead.theta].into_iter().enumerate() {
             self.mean[state] = value;
@@ -237,7 +245,7 @@ proptest! {
         for step in steps {
             match step {
                 Step::Move(x, y, theta) => {
-                    filter.predict(&motion(x, y, theta), LEVER);
+                    filter.predict(&motion(x, y, theta), LEVER, &WALK);
                     dense.predict(&motion(x, y, theta));
                 }
                 Step::Add(slot, x, y) => {
@@ -340,7 +348,7 @@ fn wander(run: u64, turns: usize, speed: f64, turn: f64, start_deviation: f64, m
         let noise = [deviation.x, deviation.y, deviation.z].map(|deviation| deviation * random.next());
         let moved = reported.corrected(&bias, LEVER).displacement;
         truth = truth.compose(&Pose::new(moved.x + noise[0], moved.y + noise[1], moved.theta + noise[2]));
-        filter.predict(&believed, LEVER);
+        filter.predict(&believed, LEVER, &BiasWalk::NONE);
         let sensor = truth.compose(&Pose { theta: LASER.theta + yaw, ..LASER });
         for (slot, point) in landmarks.iter().enumerate() {
             let exact = sensor.inverse_transform(point);

@@ -151,6 +151,51 @@ fn a_suspicion_of_the_laser_lasts_until_the_vehicle_has_driven_and_turned() {
     assert_eq!(check.suspect(), None);
 }
 
+#[test]
+fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_found() {
+    let step = 0.15;
+    for radius in [0.5, 1.0, 1.5, 2.5, 4.0, 5.0, 6.0] {
+        let motion = Pose::new(step, 0.0, step / radius);
+        // 1.2 m, 26 degrees, and 0.3 rad in a memory that fades by 1/e in 2.5 m and in 1.5 rad.
+        let remaining = libm::exp(-step / 2.5 - motion.theta / 1.5);
+        let in_memory = libm::log(1.0 - 0.3 * (1.0 - remaining) / motion.theta) / libm::log(remaining);
+        let expected = (1.2 / step).max(0.45 / motion.theta).max(in_memory);
+        let mut check = DriftCheck::new();
+        check.suspect_laser();
+        let ended = (1..100).find(|_| {
+            check.add(&motion, &Pose::default());
+            check.suspect().is_none()
+        });
+        assert!(
+            ended.is_some_and(|ended| (f64::from(ended) - expected).abs() <= 2.0),
+            "{radius}: {ended:?}, {expected}"
+        );
+        // Not while the laser stands elsewhere by twice what is found.
+        check.suspect_laser();
+        for _ in 0..100 {
+            check.add(&motion, &Pose::new(0.0, 0.2 * motion.theta, 0.0));
+        }
+        assert_eq!(check.suspect(), Some(Suspect::Laser), "{radius} m");
+    }
+}
+
+#[test]
+fn the_heading_s_trend_holds_four_times_what_the_laser_looks_askew_by() {
+    let trend = |correction: Pose| {
+        let mut check = DriftCheck::new();
+        for _ in 0..200 {
+            check.add(&Pose::new(0.15, 0.0, 0.0), &correction);
+        }
+        check.trend()
+    };
+    // Eight revolutions' corrections, and four times the angle, though the heading itself was never corrected.
+    let [position, heading] = trend(Pose::new(0.0, 0.02 * 0.15, 0.0));
+    assert!((position - 8.0 * 0.02 * 0.15).abs() < 1e-9, "{position}");
+    assert!((heading - 4.0 * 0.02).abs() < 0.1 * 4.0 * 0.02, "{heading}");
+    let [position, heading] = trend(Pose::new(0.0, 0.0, -0.001));
+    assert!(position == 0.0 && (heading - 8.0 * 0.001).abs() < 1e-9, "{heading}");
+}
+
 fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
     PoseOutput {
         time: Time::default(),
@@ -164,6 +209,9 @@ fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> Pose
         drift,
         acceptance: 1.0,
         normalised_square,
+        resets: 0,
+        last_reset: 0.0,
+        overflows: 0,
     }
 }
 

@@ -49,13 +49,15 @@ struct Drive {
     offset: f64,
     /// Encoder samples for which the vehicle has stood, before it drove.
     stood: u64,
+    /// Where the laser really is in R.
+    laser: Pose,
 }
 
 impl Drive {
     fn start() -> Self {
         let mut localizer = Box::new(Small::new(parameters()));
         localizer.add_landmarks(&reflectors()).unwrap();
-        Self { localizer, step: 0, offset: 0.0, stood: 0 }
+        Self { localizer, step: 0, offset: 0.0, stood: 0, laser: parameters().laser }
     }
 
     fn time(&self) -> Time {
@@ -132,7 +134,7 @@ impl Drive {
     fn observe(&self, start: Time, reflector: &Landmark) -> Option<ReflectorObservation> {
         // One look from the middle of the revolution gives the direction, and so the time, well enough.
         let bearing_at = |time: Time| {
-            let laser = self.truth(time).compose(&parameters().laser);
+            let laser = self.truth(time).compose(&self.laser);
             let seen = laser.inverse_transform(&nalgebra::Vector2::new(reflector.x, reflector.y));
             (seen.norm(), seen.y.atan2(seen.x))
         };
@@ -207,6 +209,35 @@ fn corrections_are_said_and_leave_no_step_in_the_smooth_pose() {
     let output = drive.localizer.outputs().pose;
     let together = output.smooth_offset().compose(&output.smooth);
     assert!((together.x - output.pose.x).hypot(together.y - output.pose.y) < 1e-9);
+}
+
+#[test]
+fn a_jump_is_told_to_who_asks_later() {
+    let mut drive = Drive::start();
+    let mut predictor: OutputPredictor = OutputPredictor::new(&parameters());
+    assert_eq!((drive.localizer.outputs().pose.resets, drive.localizer.outputs().pose.last_reset), (0, 0.0));
+    let given = drive.set_pose(Pose::new(0.04, -0.03, 0.008));
+    assert_eq!((given.resets, given.last_reset), (1, 0.0));
+    let before = drive.revolutions(1, |_| false);
+    assert_eq!(before.resets, 1);
+    let after = drive.look(|_| true);
+    let moved = (after.pose.x - before.pose.x).hypot(after.pose.y - before.pose.y);
+    // The encoders say something before anybody asks.
+    drive.revolutions(1, |_| false);
+    predictor.update(&drive.localizer.outputs().pose);
+    for told in [drive.localizer.outputs().pose, predictor.output().unwrap()] {
+        assert!(!told.has_jumped() && moved > PoseOutput::NOTABLE_CORRECTION);
+        assert_eq!((told.resets, told.last_reset), (2, moved as f32));
+    }
+    // Small corrections are none.
+    assert_eq!(drive.revolutions(20, |_| true).resets, 2);
+    let last = drive.localizer.outputs().pose;
+    let put = drive.set_pose(Pose { x: last.pose.x + 3.0, y: last.pose.y - 4.0, theta: 0.0 });
+    assert!(put.resets == 3 && (put.last_reset - 5.0).abs() < 1e-5, "{put:?}");
+    for _ in 0..256 {
+        drive.set_pose(Pose::default());
+    }
+    assert_eq!(drive.localizer.outputs().pose.resets, 3);
 }
 
 #[test]
@@ -322,6 +353,85 @@ fn a_vehicle_that_was_carried_away_is_lost_where_its_reflectors_are_found_in_sca
     drive.offset = 0.6;
     let told = (0..6).map(|_| revolution(&mut drive)).find(|output| output.mode == Mode::Lost);
     assert_eq!(told.map(|output| output.reason), Some(Reason::MotionDisagrees));
+}
+
+#[test]
+fn a_start_that_is_unsure_is_no_reason_to_doubt_the_laser() {
+    // One reflector in sight, so that the way has to show where the vehicle is; beside a well of offsets that the
+    // stated deviations allow.
+    for step in 0..24_u32 {
+        let angle = f64::from(step) * 0.9;
+        let (deviation, heading_deviation) = (0.3, 0.05);
+        let mut drive = Drive::start();
+        let pose =
+            Pose::new(1.2 * deviation * angle.cos(), deviation * angle.sin(), heading_deviation * (3.0 * angle).cos());
+        let fix = PoseFix { time: drive.time(), pose, position_deviation: deviation, heading_deviation };
+        drive.localizer.handle(&Event::SetPose(fix));
+        for revolution in 0..80_u16 {
+            let seen = 2 + revolution / 20;
+            let output = drive.revolutions(1, |id| id == seen);
+            assert_ne!(output.reason, Reason::LaserMoved, "{step}, {revolution}");
+        }
+        let output = drive.localizer.outputs().pose;
+        let truth = drive.truth(output.time);
+        let error = (output.pose.x - truth.x).hypot(output.pose.y - truth.y);
+        assert!(
+            output.mode == Mode::Reflectors && error < 0.1,
+            "{step}: {error} m, {:?} {:?}",
+            output.mode,
+            output.reason
+        );
+    }
+}
+
+#[test]
+fn after_a_jump_to_the_side_the_laser_is_doubted_if_the_jump_is_sure() {
+    for (position_deviation, reason) in [(0.02, Reason::LaserMoved), (0.3, Reason::None)] {
+        let mut drive = Drive::start();
+        drive.set_pose(Pose::default());
+        drive.revolutions(8, |_| true);
+        drive.offset = 0.6;
+        drive.revolutions(6, |_| true);
+        assert_eq!(drive.localizer.outputs().pose.reason, Reason::MotionDisagrees);
+        let pose = drive.truth(drive.time());
+        let fix = PoseFix { time: drive.time(), pose, position_deviation, heading_deviation: 0.005 };
+        drive.localizer.handle(&Event::SetPose(fix));
+        assert_eq!(drive.revolutions(4, |_| true).reason, reason);
+    }
+}
+
+#[test]
+fn a_laser_that_looks_askew_is_doubted() {
+    for degrees in [-1.0_f64, 1.0] {
+        let mut drive = Drive::start();
+        drive.laser.theta = degrees.to_radians();
+        // By what it sees, the vehicle stands askew.
+        drive.set_pose(Pose::new(0.0, 0.0, degrees.to_radians()));
+        let is_doubted = (0..40).any(|_| drive.revolutions(1, |_| true).reason == Reason::LaserMoved);
+        assert!(is_doubted, "{degrees}: {:?}", drive.localizer.outputs().pose);
+    }
+}
+
+#[test]
+fn what_a_long_way_out_and_back_adds_up_to_is_no_knock() {
+    let mut drive = Drive::start();
+    drive.set_pose(Pose::default());
+    drive.revolutions(8, |_| true);
+    // Twelve metres on and twelve back, with nothing to see: it ends where it began, but for what the wheels slid.
+    for step in 0..2400 {
+        drive.step += 1;
+        if step >= 1200 {
+            drive.stood += 2;
+        }
+        let ticks = ((drive.step as f64 - drive.stood as f64) * 0.01 / TICK).round() as u32;
+        let sample = EncoderSample { time: drive.time(), drive: ticks, steering: 0 };
+        drive.localizer.handle(&Event::Encoders(sample));
+    }
+    drive.offset = 0.1;
+    for _ in 0..10 {
+        let output = drive.revolutions(1, |_| true);
+        assert_eq!((output.mode, output.reason), (Mode::Reflectors, Reason::None));
+    }
 }
 
 #[test]

@@ -3,7 +3,9 @@
 
 use agv_core::geometry::Pose;
 use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
-use agv_core::localizer::{Event, LandmarkSource, LandmarkUse, Mode, Parameters, PoseFix, PoseOutput, Reason};
+use agv_core::localizer::{
+    Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
+};
 use agv_core::measurement::{
     EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample,
     Time,
@@ -132,22 +134,28 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
         prop_oneof![Just(Mode::NotLocalised), Just(Mode::Mixed), Just(Mode::WithoutOdometry), Just(Mode::Degraded)];
     let reason = prop_oneof![Just(Reason::None), Just(Reason::OdometryImplausible), Just(Reason::SteeringEncoder)];
     let numbers = prop::array::uniform12(number());
-    (time(), [pose(), pose()], mode, reason, numbers).prop_map(|(time, [pose, smooth], mode, reason, numbers)| {
-        let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
-        PoseOutput {
-            time,
-            pose,
-            covariance: [a, b, c, d, e, f],
-            mode,
-            reason,
-            dead_reckoning_distance: g,
-            correction,
-            smooth,
-            drift: [drift, heading_drift],
-            acceptance: h,
-            normalised_square: i,
-        }
-    })
+    let counters = (any::<u8>(), single(), any::<u8>());
+    (time(), [pose(), pose()], mode, reason, numbers, counters).prop_map(
+        |(time, [pose, smooth], mode, reason, numbers, (resets, last_reset, overflows))| {
+            let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
+            PoseOutput {
+                time,
+                pose,
+                covariance: [a, b, c, d, e, f],
+                mode,
+                reason,
+                dead_reckoning_distance: g,
+                correction,
+                smooth,
+                drift: [drift, heading_drift],
+                acceptance: h,
+                normalised_square: i,
+                resets,
+                last_reset,
+                overflows,
+            }
+        },
+    )
 }
 
 fn landmark_use() -> impl Strategy<Value = LandmarkUse> {
@@ -459,10 +467,26 @@ fn another_version_is_told_apart_from_damage() {
 }
 
 #[test]
+fn the_header_of_a_localiser_s_log_states_its_room() {
+    let parameters = Parameters::new(Vehicle::Increments, Pose::default());
+    let mut buffer = vec![0; MAX_FRAME];
+    let header = Localizer::<360, 64, 32, 8>::header("test", &parameters);
+    let length = encode(&Record::Header(header), 0, &mut buffer).unwrap();
+    let mut scratch = Box::new(Scratch::<1, 1>::new());
+    let (_, Step::Item(Item::Record { record: Record::Header(read), .. })) =
+        LogReader::new().step(&buffer[..length], true, &mut scratch)
+    else {
+        panic!("no header")
+    };
+    // The past does not depend on the maps.
+    assert_eq!(read.capacities, Capacities { landmarks: 96, beams: 360, history: 128 });
+}
+
+#[test]
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 6, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 7, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }

@@ -22,6 +22,9 @@ fn output(time: Time, x: f64, mode: Mode) -> PoseOutput {
         drift: [0.0; 2],
         acceptance: 1.0,
         normalised_square: 2.0,
+        resets: 0,
+        last_reset: 0.0,
+        overflows: 0,
     }
 }
 

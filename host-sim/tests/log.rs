@@ -217,6 +217,16 @@ fn appending_goes_on_behind_the_last_good_record() {
 }
 
 #[test]
+fn a_log_states_what_its_localiser_had_room_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive.agvlog");
+    Writer::begin(&path, &parameters(), &[]).unwrap().finish().unwrap();
+    let mut reader = Reader::open(&path).unwrap();
+    let Some(Item::Record { record: Record::Header(header), .. }) = reader.next().unwrap() else { panic!("no header") };
+    assert_eq!(header.capacities, Capacities { landmarks: 2000, beams: 1440, history: 128 });
+}
+
+#[test]
 fn what_is_flushed_is_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");
@@ -284,5 +294,5 @@ fn a_log_of_another_version_is_refused() {
     let path = folder.path().join("drive.agvlog");
     std::fs::write(&path, [&body[..], &checksum.to_le_bytes()].concat()).unwrap();
     let message = log::read(&path).unwrap_err().to_string();
-    assert!(message.ends_with(": the log has format version 1, this program reads 6"), "{message}");
+    assert!(message.ends_with(": the log has format version 1, this program reads 7"), "{message}");
 }

@@ -136,7 +136,7 @@ pub fn laser_pose(
     if segments.len() < 2 {
         return Err(Unobservable::TooFewSegments);
     }
-    if !segments.iter().all(Segment::is_finite) || !(wheelbase.is_finite() && wheelbase > 0.0) {
+    if !(segments.iter().all(Segment::is_finite) && wheelbase.is_finite() && wheelbase > 0.0) {
         return Err(Unobservable::NotFinite);
     }
     let sums = Sums::of(segments, intrinsic, wheelbase);

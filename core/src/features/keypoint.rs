@@ -1,5 +1,9 @@
 //! A distinctive point of a scan.
 
+use core::cmp::Ordering;
+
+use heapless::Vec;
+
 use crate::geometry::ScanPoint;
 
 /// What kind of shape a keypoint marks; only keypoints of one kind are compared.
@@ -29,4 +33,25 @@ pub struct Keypoint {
     /// What the detector held against it; smaller is better. Cornerness (K 3.10), or the largest variance of the position,
     /// m^2, of corners that a gate has passed; zero for ends of faces.
     pub score: f32,
+}
+
+impl Keypoint {
+    /// Compares how badly the positions are known, and where they are known alike, what the detector held against them.
+    fn weakness(&self, other: &Self) -> Ordering {
+        let variance = |keypoint: &Self| {
+            let [xx, _, yy] = keypoint.covariance;
+            xx + yy
+        };
+        variance(self).total_cmp(&variance(other)).then(self.score.total_cmp(&other.score))
+    }
+}
+
+/// Keeps a keypoint, if there is no more room in place of the one whose position is known worst. True if one is left out.
+pub(super) fn keep_best<const N: usize>(keypoints: &mut Vec<Keypoint, N>, keypoint: Keypoint) -> bool {
+    let Err(keypoint) = keypoints.push(keypoint) else { return false };
+    let worst = keypoints.iter_mut().max_by(|a, b| a.weakness(b));
+    if let Some(worst) = worst.filter(|worst| keypoint.weakness(worst).is_lt()) {
+        *worst = keypoint;
+    }
+    true
 }

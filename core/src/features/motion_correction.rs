@@ -105,9 +105,10 @@ impl SensorPath {
     /// Moves all points of a scan into the frame of its first beam.
     pub fn correct<const BEAMS: usize>(&self, scan: &Scan, points: &mut PointScan<BEAMS>) {
         let mut segment = 0;
+        let interval = scan.beam_interval * PointScan::<BEAMS>::stride(scan) as f64;
         for (beam, (point, range)) in points.points.iter_mut().zip(&points.ranges).enumerate() {
             if *range > 0.0 {
-                let transform = self.transform(beam as f64 * scan.beam_interval, &mut segment);
+                let transform = self.transform(beam as f64 * interval, &mut segment);
                 *point = transform.apply_single(point);
             }
         }

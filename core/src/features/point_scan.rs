@@ -36,18 +36,28 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
         }
     }
 
+    /// How many beams of the scan there are for each one that is kept: 1 if there is room for all of them.
+    #[must_use]
+    pub fn stride(scan: &Scan) -> usize {
+        scan.ranges.len().div_ceil(if BEAMS > 0 { BEAMS } else { 1 }).max(1)
+    }
+
     /// Replaces the content by the points of `scan` in S, as if all beams were simultaneous. Ranges that are not
-    /// finite or lie outside `nearest..=farthest` (m) count as absent; beams beyond the capacity are left out.
+    /// finite or lie outside `nearest..=farthest` (m) count as absent. Of a scan with more beams than there is room for, each
+    /// [`stride`](Self::stride)th is kept.
     pub fn set(&mut self, scan: &Scan, nearest: f32, farthest: f32) {
         self.points.clear();
         self.ranges.clear();
         self.first_bearing = scan.first_bearing as f32;
-        self.bearing_step = libm::fabs(scan.bearing_step) as f32;
+        let stride = Self::stride(scan);
+        let step = scan.bearing_step * stride as f64;
+        self.bearing_step = libm::fabs(step) as f32;
         self.is_clockwise = scan.bearing_step < 0.0;
-        self.is_full_circle = scan.is_full_circle() && scan.ranges.len() <= BEAMS;
-        let (step_sine, step_cosine) = libm::sincos(scan.bearing_step);
+        self.is_full_circle = scan.is_full_circle();
+        let (step_sine, step_cosine) = libm::sincos(step);
         let (mut sine, mut cosine) = libm::sincos(scan.first_bearing);
-        for &range in scan.ranges.iter().take(BEAMS) {
+        for beam in 0..BEAMS {
+            let Some(&range) = scan.ranges.get(beam * stride) else { break };
             let range = if range >= nearest && range <= farthest && range > 0.0 { range } else { 0.0 };
             let point = ScanPoint::new(range * cosine as f32, range * sine as f32);
             // The loop takes no more beams than there is room for.

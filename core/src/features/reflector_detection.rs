@@ -4,6 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::measurement::{ReflectorObservation, Scan};
+use crate::order::Evenly;
 
 /// What counts as a reflector.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,15 +126,38 @@ impl Mean {
 }
 
 /// Finds groups of strong returns and gives the mean direction and range of each, in order of time. A group may have
-/// single weak or missing beams inside, and goes on across the seam of a full circle. What exceeds the capacity of
-/// `found` is left out.
+/// single weak or missing beams inside, and goes on across the seam of a full circle. Of more than there is room for in
+/// `found` as many are kept, from all around. Returns how many are left out.
 pub fn detect_reflectors<const REFLECTORS: usize>(
     scan: &Scan,
     parameters: &ReflectorDetection,
     found: &mut Vec<ReflectorObservation, REFLECTORS>,
-) {
+) -> usize {
+    let count = detect(scan, parameters, Evenly::all(), found);
+    if count > REFLECTORS {
+        detect(scan, parameters, Evenly::new(REFLECTORS, count), found);
+    }
+    count.saturating_sub(REFLECTORS)
+}
+
+/// Finds all reflectors, keeps those that `choice` takes, and returns how many there are.
+fn detect<const REFLECTORS: usize>(
+    scan: &Scan,
+    parameters: &ReflectorDetection,
+    mut choice: Evenly,
+    found: &mut Vec<ReflectorObservation, REFLECTORS>,
+) -> usize {
     found.clear();
+    let mut count = 0;
+    let mut keep = |observation: Option<ReflectorObservation>| {
+        let Some(observation) = observation else { return };
+        count += 1;
+        if choice.takes() {
+            let _ = found.push(observation);
+        }
+    };
     let mut group: Option<Group> = None;
+    // The group that begins the scan is told last, as the one that ends it may be of the same reflector.
     let mut head: Option<Group> = None;
     for (index, (&range, &intensity)) in scan.ranges.iter().zip(scan.intensities).enumerate() {
         let is_strong = intensity >= parameters.least_intensity && range > 0.0 && range <= parameters.farthest;
@@ -143,33 +167,28 @@ pub fn detect_reflectors<const REFLECTORS: usize>(
         match &mut group {
             Some(open) if open.goes_on(index - open.last, range, parameters) => open.add(index, range),
             _ => {
-                if let Some(closed) = group.replace(Group::new(index, range)) {
-                    head.get_or_insert(closed);
-                    push(closed.observation(scan, parameters), found);
+                let closed = group.replace(Group::new(index, range));
+                if head.is_none() {
+                    head = closed;
+                } else if let Some(closed) = closed {
+                    keep(closed.observation(scan, parameters));
                 }
             }
         }
     }
-    let Some(tail) = group else { return };
-    match head.filter(|head| scan.is_full_circle() && tail.meets(head, scan, parameters)) {
-        None => push(tail.observation(scan, parameters), found),
-        Some(head) => {
-            // What is too wide is not there, and with the rest of it is wider still.
-            let mut is_there = head.observation(scan, parameters).is_some();
-            found.retain(|_| !core::mem::take(&mut is_there));
-            push(tail.observation_with(&head, scan, parameters), found);
-            sort_last(found);
+    if let Some(tail) = group {
+        match head {
+            Some(head) if scan.is_full_circle() && tail.meets(&head, scan, parameters) => {
+                keep(tail.observation_with(&head, scan, parameters));
+            }
+            _ => {
+                keep(tail.observation(scan, parameters));
+                keep(head.and_then(|head| head.observation(scan, parameters)));
+            }
         }
+        sort_last(found);
     }
-}
-
-fn push<const REFLECTORS: usize>(
-    observation: Option<ReflectorObservation>,
-    found: &mut Vec<ReflectorObservation, REFLECTORS>,
-) {
-    if let Some(observation) = observation {
-        let _ = found.push(observation);
-    }
+    count
 }
 
 /// Moves the last observation to its place among the others, which are in order of time.

@@ -45,6 +45,32 @@ impl Default for BiasDeviations {
     }
 }
 
+/// How fast a calibration changes, by load, wear and what is mounted anew: random walks, standard deviations for a square
+/// root of a metre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BiasWalk {
+    /// Of the drive's scale, as a share.
+    pub scale: f32,
+    /// Of the steering angle, rad; of a vehicle without a steered wheel, rad/m.
+    pub steering: f32,
+    /// Of the laser's yaw, rad.
+    pub laser_yaw: f32,
+}
+
+impl BiasWalk {
+    /// Biases that never change.
+    pub const NONE: Self = Self { scale: 0.0, steering: 0.0, laser_yaw: 0.0 };
+}
+
+impl Default for BiasWalk {
+    /// After one kilometre two thousandths of the scale, as tyres yield to loads, and 0.02 deg of the steering and of the laser,
+    /// as bolts and bearings do to wear: what was learnt counts for some hundred metres, and ten metres hardly feel it.
+    fn default() -> Self {
+        Self { scale: 6e-5, steering: 1e-5, laser_yaw: 1e-5 }
+    }
+}
+
 /// A pose that was copied when it was the present one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PastPose {
@@ -152,9 +178,9 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         &self.covariance
     }
 
-    /// Prediction by a motion from which the bias has been taken already. Only the pose's rows change. `lever` as in
-    /// [`BiasJacobian::of`].
-    pub fn predict(&mut self, motion: &Motion, lever: f64) {
+    /// Prediction by a motion from which the bias has been taken already. Only the pose's rows and the biases' variances
+    /// change. `lever` as in [`BiasJacobian::of`].
+    pub fn predict(&mut self, motion: &Motion, lever: f64, walk: &BiasWalk) {
         let (sine, cosine) = libm::sincos(self.pose.theta);
         let turn = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
         let step = &motion.displacement;
@@ -207,6 +233,10 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
                 let value = 0.5 * (entry(&own, row, column) + entry(&own, column, row));
                 self.covariance.set(POSE + row, POSE + column, value);
             }
+        }
+        for (state, deviation) in [(SCALE, walk.scale), (STEERING, walk.steering), (YAW, walk.laser_yaw)] {
+            let variance = f64::from(deviation) * f64::from(deviation) * motion.distance;
+            self.covariance.set(state, state, self.covariance.get(state, state) + variance);
         }
         self.pose = pose;
         self.anchor = pose.position();

@@ -6,7 +6,7 @@
 //! linear in the way and the turn between two of them, tell which is wrong:
 //! side = askew way + lever turn, along = scale way + lever turn, heading = bend way + gain turn.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 
 use crate::geometry::Pose;
 
@@ -16,8 +16,9 @@ const MEMORY: (f64, f64) = (2.5, 1.5);
 const TREND: f64 = 8.0;
 /// Way, m, and turn, rad, within the memory that the first verdict against the laser or the odometry needs.
 const LEAST: (f64, f64) = (0.3, 0.3);
-/// The same for a verdict that the laser is as it is believed.
-const HEALING: (f64, f64) = (1.2, 0.45);
+/// Way, m, and turn, rad, without a contradiction after which the laser is as it is believed again, however fast the memory
+/// fades on them.
+const HEALING: (f32, f32) = (1.2, 0.45);
 /// What noise adds up to over any way and turn: it must not be taken for a drift of a short one. m to the side and along,
 /// rad.
 const NOISE: (f64, f64) = (0.012, 0.01);
@@ -47,7 +48,8 @@ pub enum Suspect {
 /// Sums over the corrections, with exponential forgetting.
 #[derive(Clone, Debug)]
 pub struct DriftCheck {
-    information: Matrix2<f64>,
+    /// Of the way, of both, of the turn.
+    information: [f64; 3],
     along: Vector2<f64>,
     side: Vector2<f64>,
     heading: Vector2<f64>,
@@ -58,6 +60,8 @@ pub struct DriftCheck {
     /// By how much the laser seems to look askew, rad.
     askew: f64,
     suspect: Option<Suspect>,
+    /// Way, m, and turn, rad, since the laser was last contradicted.
+    sound: (f32, f32),
 }
 
 /// What each metre and each radian add to a correction; none of what was not driven enough.
@@ -80,7 +84,7 @@ impl DriftCheck {
     #[must_use]
     pub fn new() -> Self {
         Self {
-            information: Matrix2::zeros(),
+            information: [0.0; 3],
             along: Vector2::zeros(),
             side: Vector2::zeros(),
             heading: Vector2::zeros(),
@@ -90,6 +94,7 @@ impl DriftCheck {
             heading_trend: 0.0,
             askew: 0.0,
             suspect: None,
+            sound: (0.0, 0.0),
         }
     }
 
@@ -102,6 +107,7 @@ impl DriftCheck {
     /// The laser has moved: it is to be suspected until the vehicle has driven and turned without a contradiction.
     pub fn suspect_laser(&mut self) {
         self.suspect = Some(Suspect::Laser);
+        self.sound = (0.0, 0.0);
     }
 
     /// Takes one revolution: the motion since the last one by odometry, and the correction in R after it.
@@ -109,12 +115,15 @@ impl DriftCheck {
         let (way, turn) = (motion.x, motion.theta);
         let remaining = libm::exp(-libm::fabs(way) / MEMORY.0 - libm::fabs(turn) / MEMORY.1);
         let input = Vector2::new(way, turn);
-        self.information = self.information * remaining + input * input.transpose();
+        let [of_way, of_both, of_turn] = self.information.map(|information| information * remaining);
+        self.information = [of_way + way * way, of_both + way * turn, of_turn + turn * turn];
         self.along = self.along * remaining + input * correction.x;
         self.side = self.side * remaining + input * correction.y;
         self.heading = self.heading * remaining + input * correction.theta;
         self.way = self.way * remaining + libm::fabs(way);
         self.turn = self.turn * remaining + libm::fabs(turn);
+        self.sound.0 += libm::fabs(way) as f32;
+        self.sound.1 += libm::fabs(turn) as f32;
         self.trend = self.trend * (1.0 - 1.0 / TREND) + Vector2::new(correction.x, correction.y);
         self.heading_trend = self.heading_trend * (1.0 - 1.0 / TREND) + correction.theta;
         self.suspect = self.judge();
@@ -139,7 +148,8 @@ impl DriftCheck {
             return self.suspect;
         }
         // What has not been driven is held at zero by a little information of its own.
-        let (m11, m12, m22) = (self.information.m11 + FLOOR.0, self.information.m12, self.information.m22 + FLOOR.1);
+        let [of_way, m12, of_turn] = self.information;
+        let (m11, m22) = (of_way + FLOOR.0, of_turn + FLOOR.1);
         let share = 1.0 / (m11 * m22 - m12 * m12);
         let rates = |sum: &Vector2<f64>| Rates {
             way: has_way.then(|| (m22 * sum.x - m12 * sum.y) * share),
@@ -153,10 +163,13 @@ impl DriftCheck {
         let (way_noise, turn_noise) = (NOISE.0 / self.way.max(LEAST.0), NOISE.0 / self.turn.max(LEAST.1));
         let elsewhere = ELSEWHERE + turn_noise;
         let laser = [(askew, ASKEW + way_noise), (side.turn, elsewhere), (along.turn, elsewhere)];
-        let is_suspected = self.suspect == Some(Suspect::Laser);
-        let has_driven = self.way >= HEALING.0 && self.turn >= HEALING.1;
-        let is_healed = has_driven && laser.iter().all(|(rate, limit)| is_below(*rate, *limit));
-        if laser.iter().any(|(rate, limit)| is_beyond(*rate, *limit)) || (is_suspected && !is_healed) {
+        // What was not driven enough within the memory contradicts nothing, and shows nothing.
+        if !laser.iter().all(|(rate, limit)| rate.is_none() || is_below(*rate, *limit)) {
+            self.sound = (0.0, 0.0);
+        }
+        let has_driven = has_way && has_turn && self.sound.0 >= HEALING.0 && self.sound.1 >= HEALING.1;
+        let is_healed = has_driven || self.suspect != Some(Suspect::Laser);
+        if laser.iter().any(|(rate, limit)| is_beyond(*rate, *limit)) || !is_healed {
             return Some(Suspect::Laser);
         }
         let bend_noise = NOISE.1 / self.way.max(LEAST.0);

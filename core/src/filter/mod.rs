@@ -14,7 +14,7 @@ mod range_bearing;
 mod sparse_linearisation;
 mod timeline;
 
-pub use augmented::{Augmented, BiasDeviations, augmented_states};
+pub use augmented::{Augmented, BiasDeviations, BiasWalk, augmented_states};
 pub use augmented_observation::RelativePose;
 pub use cartesian::Cartesian;
 pub use consistency::{Consistency, ConsistencyParameters};

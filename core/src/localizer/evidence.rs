@@ -84,7 +84,7 @@ impl<'a> Evidence<'a> {
         }
         let position = sighting.observation.position();
         let innovation = fate.landmark.map(|(_, _, innovation)| innovation);
-        let _ = self.outputs.uses.push(LandmarkUse {
+        let is_told = self.outputs.uses.push(LandmarkUse {
             time: sighting.time,
             kind: sighting.kind,
             landmark: fate.landmark.map(|(source, id, _)| (source, id)),
@@ -97,6 +97,7 @@ impl<'a> Evidence<'a> {
             }),
             test_ratio: innovation.map_or(0.0, |innovation| innovation.normalised_square / self.gate),
         });
+        self.outputs.has_cut |= is_told.is_err();
     }
 
     /// Adds the event to the evidence of those before, and says why the vehicle is lost if they are against the pose.

@@ -1,6 +1,7 @@
 //! Whether the motion that the laser sees fits the odometry, and whether the laser is where it is believed to be.
 
 use super::{Localizer, PoseFix, Reason};
+use crate::filter::Ekf;
 use crate::geometry::Pose;
 use crate::landmarks::{LandmarkKind, Verdict};
 use crate::measurement::Time;
@@ -8,8 +9,20 @@ use crate::measurement::Time;
 /// Where the vehicle is, and where it would be by odometry alone.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
-    pose: Pose,
+    pub pose: Pose,
     smooth: Pose,
+    is_sure: bool,
+    /// Way since a landmark last corrected the pose, m.
+    way: f64,
+}
+
+/// The last revolution that has corrected the pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corrected {
+    /// Pose by odometry.
+    smooth: Pose,
+    /// Whether the pose was known so well that what corrects it later says something of the way since.
+    is_sure: bool,
 }
 
 /// A vehicle whose wheel has spun or slid is off by no more than this to the side, m, and in its heading, rad.
@@ -18,11 +31,29 @@ const LARGEST_SLIP: (f64, f64) = (0.05, 0.026);
 /// What is added to both for each metre of the way.
 const LARGEST_DRIFT: f64 = 0.03;
 
-/// Whether the laser may have been knocked, if the vehicle seems to have jumped by so much in R on a way of so many metres.
-/// Who carries a vehicle may knock its laser, too.
-fn is_knock(jump: &Pose, way: f64) -> bool {
-    let (side, turn) = (LARGEST_SLIP.0 + LARGEST_DRIFT * way, LARGEST_SLIP.1 + LARGEST_DRIFT * way);
-    libm::fabs(jump.y) > side || libm::fabs(jump.theta) > turn
+/// What was not known of a pose may be this many deviations.
+const UNSURE: f64 = 3.0;
+
+/// Whether the laser may have been knocked, if the vehicle seems to have jumped by so much in R on a way of so many metres
+/// from a pose, or to one, whose position and heading have these deviations, m and rad. Who carries a vehicle may knock its
+/// laser, too.
+fn is_knock(jump: &Pose, way: f64, deviations: (f64, f64)) -> bool {
+    let drift = LARGEST_DRIFT * way;
+    libm::fabs(jump.y) > LARGEST_SLIP.0 + drift + UNSURE * deviations.0
+        || libm::fabs(jump.theta) > LARGEST_SLIP.1 + drift + UNSURE * deviations.1
+}
+
+/// Whether what is not known of a pose is less than a slip.
+fn is_sure(state: &Ekf) -> bool {
+    const LIMITS: (f64, f64) = (LARGEST_SLIP.0 / UNSURE, LARGEST_SLIP.1 / UNSURE);
+    let covariance = &state.covariance;
+    covariance.m11 + covariance.m22 <= LIMITS.0 * LIMITS.0 && covariance.m33 <= LIMITS.1 * LIMITS.1
+}
+
+/// Whether a way, m, leads on by about its length, or is short: corrections after one that winds are none of the distance
+/// between its ends.
+fn leads_on(motion: &Pose, way: f64) -> bool {
+    way <= 1.0 || motion.position().norm() >= 0.8 * way
 }
 
 impl<
@@ -39,7 +70,13 @@ impl<
     /// The pose for now, and that by odometry alone.
     pub(super) fn estimate(&mut self) -> Option<Estimate> {
         let timeline = self.timeline.begun_mut()?;
-        Some(Estimate { pose: timeline.state().pose, smooth: *timeline.odometry_pose() })
+        let state = timeline.state();
+        Some(Estimate {
+            pose: state.pose,
+            smooth: *timeline.odometry_pose(),
+            is_sure: is_sure(&state),
+            way: self.distance.any(),
+        })
     }
 
     /// The pose at `time`, or that for now if there is none for then.
@@ -58,7 +95,11 @@ impl<
         if is_contradicted
             && self.corrected_at.is_some()
             && let Some(before) = self.pose_at(fix.time)
-            && is_knock(&before.between(&fix.pose), 0.0)
+            && is_knock(
+                &before.between(&fix.pose),
+                self.distance.any(),
+                (fix.position_deviation, fix.heading_deviation),
+            )
         {
             self.drift_check.suspect_laser();
         }
@@ -83,14 +124,20 @@ impl<
             let is_same = before.smooth == after.smooth;
             let expected =
                 if is_same { before.pose } else { before.pose.compose(&before.smooth.between(&after.smooth)) };
-            let (motion, correction) = (last.between(&after.smooth), expected.between(&after.pose));
-            self.drift_check.add(&motion, &correction);
-            // What the gate let pass may still be more than the odometry can be wrong by.
-            if is_knock(&correction, motion.position().norm()) {
-                self.drift_check.suspect_laser();
+            let correction = expected.between(&after.pose);
+            // What was not known of the pose before is nothing that the way since has shown.
+            if last.is_sure {
+                let motion = last.smooth.between(&after.smooth);
+                if leads_on(&motion, before.way) {
+                    self.drift_check.add(&motion, &correction);
+                }
+                // What the gate let pass may still be more than the odometry can be wrong by.
+                if is_knock(&correction, before.way, (0.0, 0.0)) {
+                    self.drift_check.suspect_laser();
+                }
             }
         }
-        self.corrected_at = Some(after.smooth);
+        self.corrected_at = Some(Corrected { smooth: after.smooth, is_sure: after.is_sure });
     }
 
     /// Whether the reflectors of a revolution are where those before have been, as the odometry says.

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use super::evidence::DistanceSince;
+use super::integrity::{Corrected, Estimate};
 use super::maps::Maps;
 use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
@@ -13,6 +14,7 @@ use crate::geometry::{Point, Pose, wrap};
 use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
+use crate::record::{Capacities, Header};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -42,8 +44,7 @@ pub struct Localizer<
     pub(super) consistency: Consistency,
     pub(super) motion_check: MotionCheck,
     pub(super) drift_check: DriftCheck,
-    /// Pose by odometry at the last revolution that has corrected the pose.
-    pub(super) corrected_at: Option<Pose>,
+    pub(super) corrected_at: Option<Corrected>,
     pub(super) lost: Option<Reason>,
     blindness: Option<Blindness>,
     /// Samples of the odometry in a row that were not later than the one before.
@@ -77,6 +78,16 @@ impl<
     const ENTRIES: usize,
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
+    /// How much it has room for, as the log of its vehicle states it.
+    pub const CAPACITIES: Capacities =
+        Capacities { landmarks: (REFLECTORS + FEATURES) as u32, beams: BEAMS as u32, history: PAST as u32 };
+
+    /// What the log of its vehicle begins with.
+    #[must_use]
+    pub const fn header<'a>(software: &'a str, parameters: &'a Parameters) -> Header<'a> {
+        Header { software, parameters, capacities: Self::CAPACITIES }
+    }
+
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
     #[inline(always)]
@@ -93,6 +104,9 @@ impl<
             drift: [0.0; 2],
             acceptance: 1.0,
             normalised_square: 2.0,
+            resets: 0,
+            last_reset: 0.0,
+            overflows: 0,
         };
         Self {
             odometer: Odometer::new(
@@ -125,7 +139,7 @@ impl<
                 reflectors: Vec::new(),
                 sightings: Vec::new(),
             },
-            outputs: Outputs { pose, uses: Vec::new() },
+            outputs: Outputs { pose, uses: Vec::new(), has_cut: false },
             parameters,
         }
     }
@@ -192,6 +206,7 @@ impl<
     /// further behind is silent.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
+        self.outputs.has_cut = false;
         if let Some(time) = event.seen_until() {
             self.bridge(time);
         }
@@ -214,9 +229,10 @@ impl<
             }
             Event::Reflectors(reflectors) if self.parameters.maps.reflectors => {
                 self.workspace.sightings.clear();
-                see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
+                self.outputs.has_cut |=
+                    see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
                 if self.parameters.maps.slam {
-                    self.fuse_reflectors_by_slam();
+                    self.fuse_lone_reflectors_by_slam();
                 } else {
                     self.fuse();
                 }
@@ -264,6 +280,15 @@ impl<
         let since = self.timeline.motions(fix.time, self.timeline.now()).fold(0.0, |way, motion| way + motion.distance);
         self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
         self.maps.dynamic.clear();
+        self.count_given_pose();
+    }
+
+    fn count_given_pose(&mut self) {
+        let Some(Estimate { pose, .. }) = self.estimate() else { return };
+        let last = &mut self.outputs.pose;
+        let is_first = last.mode == Mode::NotLocalised;
+        let distance = if is_first { 0.0 } else { libm::hypot(pose.x - last.pose.x, pose.y - last.pose.y) };
+        last.count_reset(distance);
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
@@ -342,7 +367,7 @@ impl<
             && let Some(time) = self.timeline.oldest_after_next()
             && time > self.slam.time()
         {
-            self.slam.advance(time, &self.timeline, self.parameters.vehicle.steering_lever());
+            self.slam.advance(time, &self.timeline, &self.parameters);
         }
     }
 
@@ -380,11 +405,11 @@ impl<
             workspace.path.set(scan.start, &self.parameters.laser, timeline.relative_path(scan.start, scan.end()));
         }
         if let Some(detection) = self.parameters.detection_in(scan) {
-            detect_reflectors(scan, detection, &mut workspace.reflectors);
+            self.outputs.has_cut |= detect_reflectors(scan, detection, &mut workspace.reflectors) > 0;
             workspace.sightings.clear();
             see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
             if maps.slam {
-                self.fuse_reflectors_by_slam();
+                self.fuse_reflectors_by_slam(scan.start);
             } else {
                 self.fuse();
             }
@@ -392,7 +417,7 @@ impl<
         if maps.slam {
             self.fuse_scan_by_slam(scan);
         } else if maps.features || maps.dynamic {
-            self.workspace.see_features(&self.parameters, scan);
+            self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
             self.fuse();
             self.update_dynamic_map();
         }
@@ -443,7 +468,12 @@ impl<
             drift: self.drift_check.trend(),
             acceptance,
             normalised_square: self.consistency.mean_normalised_square(),
+            ..self.outputs.pose
         };
+        if self.outputs.pose.has_jumped() {
+            self.outputs.pose.count_reset(correction);
+        }
+        self.outputs.pose.overflows = self.outputs.pose.overflows.wrapping_add(u8::from(self.outputs.has_cut));
     }
 }
 

@@ -17,7 +17,7 @@ mod start_search;
 
 pub use event::Event;
 pub use machine::Localizer;
-pub use output::{LandmarkSource, LandmarkUse, Outputs};
+pub use output::{LandmarkSource, LandmarkUse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
 

@@ -41,7 +41,7 @@ pub struct LandmarkUse {
 }
 
 /// Observations of one event at the most.
-pub(super) const OBSERVATIONS: usize = 128;
+pub const OBSERVATIONS: usize = 128;
 
 /// Everything that one event gave.
 #[derive(Clone, Debug)]
@@ -50,4 +50,6 @@ pub struct Outputs {
     pub pose: PoseOutput,
     /// What became of the event's observations, in order of time.
     pub uses: Vec<LandmarkUse, OBSERVATIONS>,
+    /// Whether something of the event found no room.
+    pub(super) has_cut: bool,
 }

@@ -10,7 +10,7 @@ use crate::filter::{Cartesian, Observation, RangeBearing};
 use crate::geometry::{Point, difference};
 use crate::landmarks::{LandmarkKind, Verdict};
 use crate::measurement::{ReflectorObservation, Scan, Time};
-use crate::order::insertion_sort_by;
+use crate::order::{Evenly, insertion_sort_by};
 
 /// Memory that is used within one event only.
 #[derive(Clone, Debug)]
@@ -38,19 +38,21 @@ pub(super) struct Sighting {
 
 impl<const BEAMS: usize> Workspace<BEAMS> {
     /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
-    /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two.
-    pub fn see_features(&mut self, parameters: &Parameters, scan: &Scan) {
+    /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two. True if there
+    /// was not room for all beams and features.
+    pub fn see_features(&mut self, parameters: &Parameters, scan: &Scan) -> bool {
         let features = &parameters.features;
         self.points.set(scan, features.nearest, features.farthest);
         if features.motion_correction {
             self.path.correct(scan, &mut self.points);
         }
-        self.detector.detect(&self.points, &mut self.keypoints);
+        let stride = PointScan::<BEAMS>::stride(scan);
+        let left_out = self.detector.detect(&self.points, &mut self.keypoints);
         insertion_sort_by(&mut self.keypoints, |a, b| a.beam.cmp(&b.beam));
         self.sightings.clear();
         let added = features.added_deviation * features.added_deviation;
         for keypoint in &self.keypoints {
-            let beam = usize::from(keypoint.beam);
+            let beam = usize::from(keypoint.beam) * stride;
             let position = Point::new(f64::from(keypoint.position.x), f64::from(keypoint.position.y));
             let position = if features.motion_correction {
                 self.path.from_start(beam as f64 * scan.beam_interval, &position)
@@ -73,17 +75,20 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
                 verdict: Verdict::Unknown,
             });
         }
+        stride > 1 || left_out > 0
     }
 }
 
-/// Observations of reflectors as the filter takes them.
+/// Observations of reflectors as the filter takes them. Of more than there is room for as many are kept, from all around; true
+/// if some are left out.
 pub(super) fn see_reflectors(
     parameters: &Parameters,
     observations: &[ReflectorObservation],
     sightings: &mut Vec<Sighting, OBSERVATIONS>,
-) {
+) -> bool {
+    let mut choice = Evenly::new(OBSERVATIONS, observations.len());
     let reflectors = &parameters.reflectors;
-    for observation in observations {
+    for observation in observations.iter().filter(|_| choice.takes()) {
         if !(observation.range.is_finite() && observation.bearing.is_finite()) {
             continue;
         }
@@ -93,7 +98,6 @@ pub(super) fn see_reflectors(
             range_variance: reflectors.range_deviation * reflectors.range_deviation,
             bearing_variance: reflectors.bearing_deviation * reflectors.bearing_deviation,
         });
-        // A revolution with more reflectors than there is room for keeps the first ones.
         let _ = sightings.push(Sighting {
             time: observation.time,
             kind: LandmarkKind::Reflector,
@@ -103,4 +107,5 @@ pub(super) fn see_reflectors(
             verdict: Verdict::Unknown,
         });
     }
+    choice.has_cut()
 }

@@ -18,23 +18,32 @@ impl<
     const ENTRIES: usize,
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
-    /// Fuses the reflectors of the workspace, all at the time of the one in the middle.
-    pub(super) fn fuse_reflectors_by_slam(&mut self) {
+    /// Fuses the reflectors of the workspace that came without a scan.
+    pub(super) fn fuse_lone_reflectors_by_slam(&mut self) {
         let sightings = &self.workspace.sightings;
         let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
         let (start, end) = (first.time, last.time);
-        let time = start.offset(0.5 * end.since(start));
         let Some(timeline) = self.timeline.begun() else { return };
         self.workspace.path.set(start, &self.parameters.laser, timeline.relative_path(start, end));
+        self.fuse_reflectors_by_slam(start);
+    }
+
+    /// Fuses the reflectors of the workspace, whose path begins at `start`, all at the time of the one in the middle.
+    pub(super) fn fuse_reflectors_by_slam(&mut self, start: Time) {
+        let sightings = &self.workspace.sightings;
+        let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
+        let end = last.time;
+        let time = first.time.offset(0.5 * end.since(first.time));
         if self.begin_slam(time, end) {
             self.fuse_by_slam(start);
+            self.slam.finish(true, &self.parameters.slam);
             self.end_slam();
         }
     }
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
     pub(super) fn fuse_scan_by_slam(&mut self, scan: &Scan) {
-        self.workspace.see_features(&self.parameters, scan);
+        self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }
@@ -44,7 +53,7 @@ impl<
         let place = self.workspace.path.place(self.slam.time().since(scan.start));
         self.slam.align(&self.workspace.points, &place, &self.parameters);
         self.fuse_by_slam(scan.start);
-        self.slam.finish(&self.parameters.slam);
+        self.slam.finish(false, &self.parameters.slam);
         self.slam.keep(&self.workspace.points, &place, &self.parameters);
         self.end_slam();
     }
@@ -57,7 +66,7 @@ impl<
             self.refuse_sightings();
             return false;
         }
-        self.slam.advance(time, timeline, self.parameters.vehicle.steering_lever());
+        self.slam.advance(time, timeline, &self.parameters);
         true
     }
 

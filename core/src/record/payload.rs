@@ -15,11 +15,11 @@ pub const LANDMARKS_A_RECORD: usize = 50;
 /// How much the localiser that wrote a log had room for. Another size may answer differently.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Capacities {
-    /// Landmarks of the map.
+    /// Landmarks of the fixed maps, reflectors and features together.
     pub landmarks: u32,
     /// Beams of a scan.
     pub beams: u32,
-    /// Increments of the history.
+    /// Motions and corrections of the filter's past.
     pub history: u32,
 }
 

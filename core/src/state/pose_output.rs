@@ -27,10 +27,20 @@ pub struct PoseOutput {
     pub smooth: Pose,
     /// Share of the observations of fixed landmarks that were accepted lately, 0 to 1.
     pub acceptance: f64,
-    /// By how much landmarks have lately corrected position, m, and heading, rad, in one direction.
+    /// What the pose may lag behind by, for the [protection level](super::ProtectionLevel), which counts 30 per cent of it:
+    /// the sum of the position's corrections of about eight revolutions, m; that of the heading's plus four times what the
+    /// laser seems to look askew by, rad, as the pose is off by all of the latter.
     pub drift: [f64; 2],
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
+    /// How often the position has been reset, wrapping: by a pose that was given, or by a correction that
+    /// [has jumped](Self::has_jumped). Unlike the correction it stays, so that who listens now and then misses none.
+    pub resets: u8,
+    /// By how far the last reset has moved the position, m; 0 for the first pose.
+    pub last_reset: f32,
+    /// How many scans and revolutions had more beams, features or reflectors than there was room for, wrapping. What is
+    /// left out is spread over all directions, or is what is known worst.
+    pub overflows: u8,
 }
 
 impl PoseOutput {
@@ -41,6 +51,12 @@ impl PoseOutput {
     #[must_use]
     pub fn has_jumped(&self) -> bool {
         self.correction > Self::NOTABLE_CORRECTION
+    }
+
+    /// Counts a reset of the position by so many metres.
+    pub(crate) fn count_reset(&mut self, distance: f64) {
+        self.resets = self.resets.wrapping_add(1);
+        self.last_reset = distance.min(f64::from(f32::MAX)) as f32;
     }
 
     /// A position that is no less sure than this in any direction, m, and a heading, rad, are good enough to leave the

@@ -6,8 +6,7 @@ use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
 use agv_core::wire::can::canopen::NodeId;
 use agv_core::wire::can::controller::{
-    Content, ControllerError, Health, LaserHealth, Order, OrderReceiver, PosePublisher, PoseReceiver, StartSearch,
-    WantedMode, contents,
+    Content, ControllerError, Health, LaserHealth, OrderReceiver, PosePublisher, PoseReceiver, StartSearch, contents,
 };
 use agv_core::wire::can::frame::{Frame, standard_id};
 use proptest::prelude::*;
@@ -31,6 +30,9 @@ fn pose() -> PoseOutput {
         drift: [0.001, 0.0002],
         acceptance: 0.87,
         normalised_square: 2.15,
+        resets: 0xA7,
+        last_reset: 0.125,
+        overflows: 6,
     }
 }
 
@@ -39,7 +41,6 @@ fn health() -> Health {
         drive: None,
         steering: Some(EncoderFault::Frozen),
         laser: LaserHealth::Sound,
-        layer: 3,
         start_search: StartSearch::TooFew,
     }
 }
@@ -55,8 +56,9 @@ fn literal_frames() {
     // 10 mm is 40 steps, 20 mm 80, 1 mrad 10; correlations 0.15, 0.2, -0.2 are 8, 10, -10.
     let payload = 40 | 80 << 13 | 10 << 26 | 8 << 39 | 10 << 46 | (-10i64 as u64 & 0x7F) << 53 | 5 << 60;
     assert_eq!(covariance, Frame::of(standard_id(0x390), u64::to_le_bytes(payload)));
-    // Mode 3, reason 0, 87 %, 43 steps, steering frozen (3), laser sound (1), layer 3, too few reflectors (3).
-    let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 3 << 37 | 3 << 53 | 5u64 << 60;
+    // Mode 3, reason 0, 87 %, 43 steps, steering frozen (3), laser sound (1), the 167th reset of 125 mm (7 steps, rounded
+    // up), too few reflectors (3), six scans that were too large (6 modulo 4).
+    let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 0xA7 << 37 | 7 << 45 | 3 << 53 | 2 << 58 | 5u64 << 60;
     assert_eq!(status, Frame::of(standard_id(0x490), payload.to_le_bytes()));
     // Sure to 5 mm and 0.03 deg, and corrected by 2 cm: one bit each.
     let sure = PoseOutput { covariance: [2e-5, 0.0, 1e-5, 0.0, 0.0, 2e-7], correction: 0.02, ..pose() };
@@ -140,6 +142,9 @@ fn poses_come_every_10_ms_and_are_put_together_again() {
                 assert_eq!((received.mode, received.reason, received.health), (Mode::Mixed, Reason::None, health()));
                 assert!((received.pose.x - 12.3456).abs() < 1e-9 && (received.pose.theta + 1.234_567).abs() < 1e-9);
                 assert!((received.deviations[1] - 0.02).abs() < 1e-9 && received.time == 4587);
+                assert!(
+                    (received.resets, received.overflows) == (0xA7, 2) && (received.last_reset - 0.14).abs() < 1e-9
+                );
             }
         }
     }
@@ -154,16 +159,15 @@ fn an_initial_pose_needs_both_halves() {
     let heading = Content::InitialHeading { heading: 0.5, position_deviation: 0.1, heading_deviation: 0.02 };
     let expected = |time| {
         let pose = Pose { x: 1.5, y: -2.0, theta: 0.5 };
-        Order::InitialPose(PoseFix { time, pose, position_deviation: 0.1, heading_deviation: 0.02 })
+        PoseFix { time, pose, position_deviation: 0.1, heading_deviation: 0.02 }
     };
-    let close = |order: Option<Order>, expected: Order| match (order, expected) {
-        (Some(Order::InitialPose(found)), Order::InitialPose(expected)) => {
+    let close = |order: Option<PoseFix>, expected: PoseFix| {
+        order.is_some_and(|found| {
             found.time == expected.time
                 && (found.pose.x - expected.pose.x).abs() < 1e-9
                 && (found.pose.theta - expected.pose.theta).abs() < 1e-9
                 && (found.position_deviation - expected.position_deviation).abs() < 1e-9
-        }
-        _ => false,
+        })
     };
     let mut receiver = OrderReceiver::new(node());
     assert_eq!(receiver.handle(&position.encode(node(), 1), at(1.0)), None);
@@ -185,12 +189,23 @@ fn an_initial_pose_needs_both_halves() {
 #[test]
 fn standstill_must_be_repeated() {
     let at = Time::from_seconds;
-    let command = |is_standstill| Content::Command { mode: WantedMode::Features, layer: u16::MAX, is_standstill };
+    let command = |is_standstill| Content::Command { is_standstill };
     let mut receiver = OrderReceiver::new(node());
-    let order = receiver.handle(&command(true).encode(node(), 0), at(1.0));
-    assert_eq!(order, Some(Order::Localise { mode: WantedMode::Features, layer: None }));
+    assert_eq!(receiver.handle(&command(true).encode(node(), 0), at(1.0)), None);
     assert!(receiver.is_standstill(at(1.2)) && !receiver.is_standstill(at(1.21)));
     receiver.handle(&command(true).encode(node(), 1), at(2.0));
     receiver.handle(&command(false).encode(node(), 2), at(2.1));
     assert!(!receiver.is_standstill(at(2.11)));
+}
+
+#[test]
+fn nothing_but_standstill_is_heard_in_a_command() {
+    // Every bit but the one of standstill and the counter.
+    for others in [0u64, 0x0000_0000_0000_0009, 0x0FFF_FFFF_FFEF_FFFF] {
+        for is_standstill in [false, true] {
+            let payload = others | u64::from(is_standstill) << 20;
+            let frame = Frame::of(standard_id(0x410), payload.to_le_bytes());
+            assert_eq!(Content::decode(&frame, node()), Ok((Content::Command { is_standstill }, 0)), "{payload:x}");
+        }
+    }
 }

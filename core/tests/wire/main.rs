@@ -5,6 +5,8 @@ mod clock;
 mod framing;
 mod literal;
 mod peer;
+mod revolution;
 mod round_trip;
 mod session;
 mod values;
+mod watch;

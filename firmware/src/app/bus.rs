@@ -5,7 +5,7 @@
 
 use agv_core::measurement::EncoderFaults;
 use agv_core::wire::can::canopen::Message;
-use agv_core::wire::can::controller::{Health, Order, OrderReceiver, PosePublisher};
+use agv_core::wire::can::controller::{Health, OrderReceiver, PosePublisher};
 use agv_core::wire::can::controller_node::ControllerNode;
 use agv_core::wire::can::emcy::Emergency;
 use agv_core::wire::can::encoder_pair::EncoderPair;
@@ -44,7 +44,7 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
             if let Some(answer) = node.handle(frame) {
                 port.send(&answer);
             }
-            if let Some(Order::InitialPose(fix)) = orders.handle(frame, time) {
+            if let Some(fix) = orders.handle(frame, time) {
                 exchange::pass_on(BusEvent::SetPose(fix));
             }
         }
@@ -73,7 +73,7 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
         let (output, laser) = exchange::output();
         let Some(output) = output else { continue };
         let start_search = exchange::start_search();
-        let health = Health { drive: faults.drive, steering: faults.steering, laser, layer: 0, start_search };
+        let health = Health { drive: faults.drive, steering: faults.steering, laser, start_search };
         if let Some(frames) = publisher.poll(time, &output, &health) {
             for frame in &frames {
                 port.send(frame);

@@ -7,7 +7,7 @@ use agv_core::measurement::{EncoderFaults, EncoderSample, Time};
 use agv_core::odometry::OdometryBias;
 use agv_core::state::PoseOutput;
 use agv_core::wire::can::controller::{LaserHealth, StartSearch};
-use agv_core::wire::nav350::Revolution;
+use agv_core::wire::nav350::{LostReason, Report, Revolution, SensorWatch};
 use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
@@ -38,9 +38,7 @@ pub type RevolutionReceiver = zerocopy_channel::Receiver<'static, CriticalSectio
 /// What the bus publishes, and what others want to know of it.
 struct Published {
     predictor: Option<OutputPredictor<MOTIONS>>,
-    /// When a revolution was complete, unless the connection was lost since.
-    last_revolution: Option<Time>,
-    has_laser_failed: bool,
+    laser: SensorWatch,
     /// The first sample at about this place of the driving wheel, and the last one.
     stand: Option<(EncoderSample, Time)>,
     /// Events that the localiser was too slow for.
@@ -52,8 +50,7 @@ struct Published {
 
 static PUBLISHED: Mutex<RefCell<Published>> = Mutex::new(RefCell::new(Published {
     predictor: None,
-    last_revolution: None,
-    has_laser_failed: false,
+    laser: SensorWatch::new(),
     stand: None,
     lost_events: 0,
     are_settings_sound: true,
@@ -64,8 +61,6 @@ static PUBLISHED: Mutex<RefCell<Published>> = Mutex::new(RefCell::new(Published 
 /// Motions that the localiser may be behind: more than a scan takes. All of them are redone while no interrupt comes,
 /// which with 16 of them is 0.1 ms at 480 MHz; the bus's queue holds three frames, 0.3 ms.
 const MOTIONS: usize = 16;
-/// A laser that has said nothing for so long is silent, s: a revolution and a little.
-const SILENCE: f64 = 0.2;
 /// A vehicle whose wheel has not moved for so long stands, s.
 const STANDSTILL: f64 = 1.0;
 /// By how much the counter of a wheel that stands may be off, ticks.
@@ -142,10 +137,7 @@ pub fn update(output: &PoseOutput, bias: &OdometryBias) {
 
 /// The laser has measured a revolution.
 pub fn laser_has_measured() {
-    with(|published| {
-        published.last_revolution = Some(now());
-        published.has_laser_failed = false;
-    });
+    with(|published| published.laser.measured(now()));
 }
 
 /// How far the search for a pose has come.
@@ -160,8 +152,18 @@ pub fn start_search() -> StartSearch {
 }
 
 /// The laser cannot be reached.
-pub fn laser_has_failed() {
-    with(|published| published.has_laser_failed = true);
+pub fn laser_is_unreachable() {
+    with(|published| published.laser.unreachable());
+}
+
+/// The session has given the connection to the laser up.
+pub fn laser_was_lost(reason: LostReason) {
+    with(|published| published.laser.lost(reason));
+}
+
+/// The session with the laser has reported something.
+pub fn laser_has_reported(report: Report) {
+    with(|published| published.laser.reported(report));
 }
 
 /// Whether everything that was set was found in flash.
@@ -184,15 +186,7 @@ pub fn lost_events() -> u32 {
 /// The pose for now, and the laser's health.
 #[must_use]
 pub fn output() -> (Option<PoseOutput>, LaserHealth) {
-    with(|published| {
-        let laser = match (published.has_laser_failed, published.last_revolution) {
-            (true, _) => LaserHealth::Silent,
-            (false, None) => LaserHealth::Unknown,
-            (false, Some(time)) if now().since(time) <= SILENCE => LaserHealth::Sound,
-            (false, Some(_)) => LaserHealth::Silent,
-        };
-        (published.predictor.as_ref().and_then(OutputPredictor::output), laser)
-    })
+    with(|published| (published.predictor.as_ref().and_then(OutputPredictor::output), published.laser.health(now())))
 }
 
 /// The time of the firmware.

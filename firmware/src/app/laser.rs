@@ -82,14 +82,14 @@ async fn next(
                 if *is_open {
                     session.connected(now());
                 } else {
-                    exchange::laser_has_failed();
+                    exchange::laser_is_unreachable();
                     session.closed();
                 }
             }
             Step::Disconnect(reason) => {
                 *is_open = false;
                 socket.abort();
-                exchange::laser_has_failed();
+                exchange::laser_was_lost(reason);
                 defmt::warn!("nav350: {}", defmt::Display2Format(&reason));
             }
             Step::Send(bytes) => {
@@ -103,11 +103,14 @@ async fn next(
                 }
                 if !is_sent {
                     *is_open = false;
-                    exchange::laser_has_failed();
+                    exchange::laser_is_unreachable();
                     session.closed();
                 }
             }
-            Step::Report(report) => defmt::info!("nav350: {}", defmt::Display2Format(&report)),
+            Step::Report(report) => {
+                exchange::laser_has_reported(report);
+                defmt::info!("nav350: {}", defmt::Display2Format(&report));
+            }
             Step::Wait(until) => {
                 let alarm = Timer::at(Instant::from_micros(until.micros()));
                 if !*is_open {
@@ -126,7 +129,7 @@ async fn next(
                     }
                     Either::First(_) => {
                         *is_open = false;
-                        exchange::laser_has_failed();
+                        exchange::laser_is_unreachable();
                         session.closed();
                     }
                     Either::Second(()) => {}

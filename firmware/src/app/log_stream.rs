@@ -5,13 +5,15 @@
 
 use agv_core::landmarks::Landmark;
 use agv_core::localizer::Parameters;
-use agv_core::record::{Capacities, Header, LANDMARKS_A_RECORD, Record, encode};
+use agv_core::record::{LANDMARKS_A_RECORD, Record, encode};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
+
+use super::room::Localizer;
 
 /// Bytes that wait for the network.
 const QUEUE: usize = 14 * 1024;
@@ -140,7 +142,7 @@ async fn greet(
     parameters: &Parameters,
     landmarks: &[Landmark],
 ) -> Result<(), Gone> {
-    let header = Header { software: SOFTWARE, parameters, capacities: Capacities::default() };
+    let header = Localizer::header(SOFTWARE, parameters);
     let mut sequence = 0;
     let first = encode(&Record::Header(header), sequence, frame).map_err(|_| Gone)?;
     send(socket, frame.get(..first).unwrap_or_default()).await?;

@@ -317,7 +317,9 @@ fn pose_json(pose: &PublishedPose) -> serde_json::Value {
         "drive_fault": pose.health.drive,
         "steering_fault": pose.health.steering,
         "laser": format!("{:?}", pose.health.laser),
-        "layer": pose.health.layer,
+        "resets": pose.resets,
+        "last_reset_m": pose.last_reset,
+        "overflows": pose.overflows,
         "counter": pose.counter,
         "time_ms": pose.time,
     })

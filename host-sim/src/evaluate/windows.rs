@@ -4,7 +4,7 @@
 //! the distance from the corrected pose at the end. The corrected poses are those of others, made from the whole drive.
 
 use agv_core::features::falko;
-use agv_core::filter::BiasDeviations;
+use agv_core::filter::{BiasDeviations, BiasWalk};
 use agv_core::geometry::{Pose, difference};
 use agv_core::localizer::{KeyScanParameters, MapUse, Mode, Parameters, PoseFix};
 use agv_core::measurement::PoseIncrement;
@@ -70,6 +70,7 @@ impl Candidate {
         // at the 95 % mark, which hides any bias.
         parameters.odometry_noise = OdometryNoise { slip: 0.1, side_slip: 0.1, yaw: 0.1, ..OdometryNoise::default() };
         parameters.slam.biases = BiasDeviations { scale: 1e-6, steering: 1e-6, laser_yaw: 1e-6 };
+        parameters.slam.bias_walk = BiasWalk::NONE;
         // An increment is all that lies between two scans, however long that took.
         parameters.limits.longest_extrapolation = 1e6;
         // Nothing tells the vehicle where it is, so it may grow uncertain.

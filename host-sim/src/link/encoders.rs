@@ -4,7 +4,7 @@ use agv_core::localizer::{Event, Parameters};
 use agv_core::measurement::Time;
 use agv_core::odometry::Vehicle;
 use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::controller::{Order, OrderReceiver};
+use agv_core::wire::can::controller::OrderReceiver;
 use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
 use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_core::wire::can::frame::Frame;
@@ -89,7 +89,7 @@ impl EncoderLink {
         mut take: impl FnMut(Outcome) -> Result<(), E>,
     ) -> Result<(), E> {
         if let Some(frame) = frame {
-            if let Some(Order::InitialPose(fix)) = self.orders.handle(frame, now) {
+            if let Some(fix) = self.orders.handle(frame, now) {
                 take(Outcome::Event(Event::SetPose(fix)))?;
             }
             if let Some(sample) = self.pair.handle(frame, now) {

@@ -7,7 +7,7 @@ use std::process::Stdio;
 use agv_core::localizer::{Mode, Reason};
 use agv_core::measurement::EncoderFault;
 use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::controller::{Content, Health, LaserHealth, StartSearch, WantedMode};
+use agv_core::wire::can::controller::{Content, Health, LaserHealth, StartSearch};
 use agv_core::wire::can::frame::{Frame, Id};
 use agv_tests::{python, repository};
 use serde_json::Value;
@@ -57,12 +57,8 @@ fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
     }
     for is_standstill in [false, true] {
         all.push((
-            Content::Command { mode: WantedMode::Mixed, layer: 513, is_standstill },
-            BTreeMap::from([
-                ("WantedMode", 3.0),
-                ("WantedLayer", 513.0),
-                ("Standstill", f64::from(u8::from(is_standstill))),
-            ]),
+            Content::Command { is_standstill },
+            BTreeMap::from([("Standstill", f64::from(u8::from(is_standstill)))]),
         ));
     }
     all
@@ -121,9 +117,12 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 reason,
                 acceptance: 0.5,
                 normalised_square: 2.0,
-                health: Health { drive, steering, laser, layer: 40_000, start_search },
+                health: Health { drive, steering, laser, start_search },
                 is_good: index % 2 == 0,
                 has_jumped: index % 3 == 0,
+                resets: 250 + index as u8 % 6,
+                last_reset: 0.02 * index as f64,
+                overflows: index as u8 % 4,
             };
             let names = BTreeMap::from([
                 ("Mode", format!("{mode:?}")),
@@ -131,7 +130,8 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
                 ("DriveFault", fault(drive)),
                 ("SteeringFault", fault(steering)),
                 ("Laser", format!("{laser:?}")),
-                ("Layer", "40000".to_owned()),
+                ("PoseResets", (250 + index % 6).to_string()),
+                ("Overflows", (index % 4).to_string()),
                 ("StartSearch", format!("{start_search:?}")),
                 ("PoseIsGood", u8::from(index % 2 == 0).to_string()),
                 ("Corrected", u8::from(index % 3 == 0).to_string()),
@@ -206,6 +206,8 @@ fn cantools_decodes_what_we_say_and_encodes_what_we_hear() {
         for (name, value) in expected {
             assert_eq!(answer["names"][*name], **value, "{content:?}");
         }
+        let Content::Status { last_reset, .. } = content else { panic!("{content:?}") };
+        assert!((answer["signals"]["LastReset"].as_f64().unwrap() - last_reset).abs() < 1e-9);
         assert_eq!(
             (answer["signals"]["Acceptance"].as_f64(), answer["signals"]["NormalisedSquare"].as_f64()),
             (Some(0.5), Some(2.0))

@@ -8,6 +8,7 @@ use super::parameters::{Parameters, SuppressionRule};
 use super::runs::Runs;
 use super::score::{SectorCounts, Sectors};
 use super::suppression::{Cost, is_best_within, walk};
+use crate::features::keypoint::keep_best;
 use crate::features::line::Moments;
 use crate::features::neighbourhood::{Disc, Reach, Side, beams_within};
 use crate::features::{Keypoint, KeypointKind, PointScan};
@@ -51,7 +52,8 @@ impl<const BEAMS: usize> Detector<BEAMS> {
     }
 
     /// Replaces `keypoints` by those of `scan`, in the frame of its points: corners in order of beams, then ends of
-    /// faces in order of beams. Returns how many did not fit.
+    /// faces in order of beams. If there are more than fit, those are kept, in any order, whose positions are known best.
+    /// Returns how many did not fit.
     pub fn detect<const KEYPOINTS: usize>(
         &mut self,
         scan: &PointScan<BEAMS>,
@@ -59,7 +61,7 @@ impl<const BEAMS: usize> Detector<BEAMS> {
     ) -> usize {
         keypoints.clear();
         let mut left_out = 0;
-        let mut keep = |keypoint: Keypoint| left_out += usize::from(keypoints.push(keypoint).is_err());
+        let mut keep = |keypoint: Keypoint| left_out += usize::from(keep_best(keypoints, keypoint));
         let count = scan.ranges.len().min(scan.points.len());
         if count < 3 || scan.bearing_step.is_nan() || scan.bearing_step <= 0.0 {
             return 0;

@@ -78,11 +78,18 @@ impl<const LANDMARKS: usize> LandmarkBook<LANDMARKS> {
         }
     }
 
-    /// Ends a scan; `remove` is called with the places of landmarks that go.
-    pub(super) fn finish(&mut self, parameters: &SlamParameters, mut remove: impl FnMut(usize)) {
+    /// Ends a scan of features, or one of reflectors, which may come apart; `remove` is called with the places of landmarks
+    /// that go.
+    pub(super) fn finish(&mut self, are_reflectors: bool, parameters: &SlamParameters, mut remove: impl FnMut(usize)) {
         for (place, slot) in self.entries.iter_mut().enumerate() {
             let Some(entry) = slot else { continue };
-            if entry.unseen > parameters.patience && entry.hits < parameters.confirmed_hits {
+            if (entry.kind == LandmarkKind::Reflector) != are_reflectors {
+                continue;
+            }
+            // A reflector that was given needs nobody to confirm it.
+            let is_believed =
+                entry.hits >= parameters.confirmed_hits || (are_reflectors && entry.source == LandmarkSource::Fixed);
+            if entry.unseen > parameters.patience && !is_believed {
                 remove(place);
                 *slot = None;
             } else {

@@ -18,7 +18,7 @@ use crate::geometry::{Point, Pose, difference};
 use crate::landmarks::{LandmarkKind, NearestNeighbour, Verdict};
 use crate::localizer::{LandmarkSource, Parameters};
 use crate::measurement::Time;
-use crate::odometry::{Motion, OdometryBias};
+use crate::odometry::OdometryBias;
 
 use super::evidence::Fate;
 use super::maps::Maps;
@@ -34,7 +34,6 @@ pub const SLAM_ENTRIES: usize = packed_entries(SLAM_STATES);
 #[derive(Clone, Debug)]
 pub(super) struct Slam<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize> {
     filter: Augmented<KEYS, LANDMARKS, STATES, ENTRIES>,
-    has_biases: bool,
     book: LandmarkBook<LANDMARKS>,
     key_scans: KeyScans<KEYS>,
     /// Time at which the filter stands.
@@ -66,7 +65,6 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     pub(super) fn new() -> Self {
         Self {
             filter: Augmented::new(),
-            has_biases: false,
             book: LandmarkBook::new(),
             key_scans: KeyScans::new(),
             time: Time::default(),
@@ -74,13 +72,10 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         }
     }
 
-    /// Begins at a pose that is true at `time`. The biases belong to the vehicle and are kept.
+    /// Begins at a pose that is true at `time`. The biases begin anew with their priors: who gives a pose may have loaded the
+    /// vehicle or mounted its laser anew, and to learn them again takes some metres only.
     pub(super) fn begin(&mut self, time: Time, state: &Ekf, parameters: &SlamParameters) {
-        // Not when it is made: a filter that is changed before it is in its place would be on the stack.
-        if !self.has_biases {
-            self.filter.begin_biases(&parameters.biases);
-            self.has_biases = true;
-        }
+        self.filter.begin_biases(&parameters.biases);
         self.filter.begin(state);
         self.book.clear();
         self.key_scans.clear();
@@ -104,11 +99,17 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// Goes on to `time`, by the motions of the timeline.
-    pub(super) fn advance<const PAST: usize>(&mut self, time: Time, timeline: &Timeline<PAST>, lever: f64) {
+    pub(super) fn advance<const PAST: usize>(
+        &mut self,
+        time: Time,
+        timeline: &Timeline<PAST>,
+        parameters: &Parameters,
+    ) {
+        let lever = parameters.vehicle.steering_lever();
         // Motions of about a millisecond would cost as much as those of ten.
         for motion in timeline.motions(self.time, time) {
             if motion.end > self.time {
-                self.predict(&motion, lever);
+                self.filter.predict(&motion, lever, &parameters.slam.bias_walk);
             }
         }
         self.time = time.max(self.time);
@@ -117,10 +118,6 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     /// The landmarks in the state.
     pub(super) fn landmarks(&self) -> impl Iterator<Item = (LandmarkKind, Point)> + '_ {
         self.book.entries().filter_map(|(place, entry)| Some((entry.kind, self.filter.landmark(place)?)))
-    }
-
-    fn predict(&mut self, motion: &Motion, lever: f64) {
-        self.filter.predict(motion, lever);
     }
 
     /// Whether a scan at the present pose tells something new: the vehicle has moved, or few scans have been used here.
@@ -206,10 +203,10 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         }
     }
 
-    /// Ends a scan: landmarks that nobody believes in go.
-    pub(super) fn finish(&mut self, parameters: &SlamParameters) {
+    /// Ends a scan of features, or one of reflectors: landmarks that nobody believes in go.
+    pub(super) fn finish(&mut self, are_reflectors: bool, parameters: &SlamParameters) {
         let filter = &mut self.filter;
-        self.book.finish(parameters, |place| filter.remove_landmark(place));
+        self.book.finish(are_reflectors, parameters, |place| filter.remove_landmark(place));
     }
 
     /// Aligns a scan to the key scans; S is at `place` in the frame of its points. May make it a key scan.

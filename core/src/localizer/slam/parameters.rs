@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::filter::BiasDeviations;
+use crate::filter::{BiasDeviations, BiasWalk};
 use crate::places::{SurfaceAlignmentParameters, SurfaceParameters};
 
 /// How the pose, the calibration and the landmarks that are found while driving are estimated together.
@@ -11,6 +11,8 @@ use crate::places::{SurfaceAlignmentParameters, SurfaceParameters};
 pub struct SlamParameters {
     /// How wrong the calibration may be.
     pub biases: BiasDeviations,
+    /// How fast it changes.
+    pub bias_walk: BiasWalk,
     /// Largest angle between the orientations of a landmark and of what is taken for it, rad.
     pub orientation_tolerance: f32,
     /// A feature nearer than this to a landmark of its kind, m, is no new landmark.
@@ -33,6 +35,7 @@ impl Default for SlamParameters {
     fn default() -> Self {
         Self {
             biases: BiasDeviations::default(),
+            bias_walk: BiasWalk::default(),
             orientation_tolerance: 0.6,
             least_distance: 0.08,
             confirmed_hits: 3,

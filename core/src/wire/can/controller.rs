@@ -9,10 +9,10 @@
 //! | position | 180h + node | x, y: 30 bits, 0.1 mm |
 //! | heading | 280h + node | heading: 24 bits, 1 urad; time: 16 bits, ms; dead-reckoning distance: 16 bits, 1 cm |
 //! | covariance | 380h + node | deviations: 13 bits, 0.25 mm and 0.1 mrad; correlations: 7 bits, 0.02 |
-//! | status | 480h + node | mode, reason, acceptance, innovations, faults, layer, search |
+//! | status | 480h + node | mode, reason, acceptance, innovations, faults, resets, search |
 //! | initial position | 200h + node | x, y as above |
 //! | initial heading | 300h + node | heading as above; deviations: 16 bits, 1 mm and 0.1 mrad |
-//! | command | 400h + node | mode, layer, standstill |
+//! | command | 400h + node | standstill |
 //!
 //! A number that is unknown, not finite or too large is sent as the lowest value of a signed field and the highest of an
 //! unsigned one. Deviations are rounded up and end at the second highest value.
@@ -115,14 +115,14 @@ const NORMALISED_SQUARE: Field = Field::unsigned(17, 10, 0.05);
 const DRIVE_FAULT: Field = Field::unsigned(27, 4, 1.0);
 const STEERING_FAULT: Field = Field::unsigned(31, 4, 1.0);
 const LASER: Field = Field::unsigned(35, 2, 1.0);
-const LAYER: Field = Field::unsigned(37, 16, 1.0);
+const RESETS: Field = Field::unsigned(37, 8, 1.0);
+const LAST_RESET: Field = Field::unsigned(45, 8, 0.02);
 const START_SEARCH: Field = Field::unsigned(53, 3, 1.0);
 const POSE_IS_GOOD: Field = Field::unsigned(56, 1, 1.0);
 const CORRECTED: Field = Field::unsigned(57, 1, 1.0);
+const OVERFLOWS: Field = Field::unsigned(58, 2, 1.0);
 const INITIAL_POSITION_DEVIATION: Field = Field::unsigned(24, 16, 1e-3);
 const INITIAL_HEADING_DEVIATION: Field = Field::unsigned(40, 16, 1e-4);
-const WANTED_MODE: Field = Field::unsigned(0, 4, 1.0);
-const WANTED_LAYER: Field = Field::unsigned(4, 16, 1.0);
 const STANDSTILL: Field = Field::unsigned(20, 1, 1.0);
 
 /// Numbers of the modes on the bus.
@@ -207,29 +207,6 @@ const START_SEARCHES: [(u64, StartSearch); 5] = [
     (4, StartSearch::Unknown),
 ];
 
-/// What the controller is told to localise by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WantedMode {
-    /// Whatever there is.
-    Automatic,
-    /// Reflectors only.
-    Reflectors,
-    /// Natural features only.
-    Features,
-    /// Both at once.
-    Mixed,
-    /// Odometry only.
-    DeadReckoning,
-}
-
-const WANTED_MODES: [(u64, WantedMode); 5] = [
-    (0, WantedMode::Automatic),
-    (1, WantedMode::Reflectors),
-    (2, WantedMode::Features),
-    (3, WantedMode::Mixed),
-    (4, WantedMode::DeadReckoning),
-];
-
 /// The number of a value; the unknown one of the field if it has none.
 fn number_of<T: PartialEq>(table: &[(u64, T)], value: &T, field: Field) -> u64 {
     table.iter().find(|(_, known)| known == value).map_or(field.unknown(), |(number, _)| *number)
@@ -252,8 +229,6 @@ pub struct Health {
     pub steering: Option<EncoderFault>,
     /// The laser.
     pub laser: LaserHealth,
-    /// Number of the map layer in use; 65535 if there is none.
-    pub layer: u16,
     /// The search for a pose.
     pub start_search: StartSearch,
 }
@@ -300,6 +275,12 @@ pub enum Content {
         is_good: bool,
         /// Whether landmarks have moved the position notably: [`PoseOutput::has_jumped`].
         has_jumped: bool,
+        /// How often the position was reset: [`PoseOutput::resets`].
+        resets: u8,
+        /// By how far the last time, m.
+        last_reset: f64,
+        /// How often there was not room for all that was seen, modulo 4: [`PoseOutput::overflows`].
+        overflows: u8,
     },
     /// Position where the vehicle shall believe to be.
     InitialPosition {
@@ -317,12 +298,8 @@ pub enum Content {
         /// Standard deviation of the heading, rad.
         heading_deviation: f64,
     },
-    /// What the vehicle's other controller wants and knows.
+    /// What the vehicle's other controller knows.
     Command {
-        /// What to localise by.
-        mode: WantedMode,
-        /// Map layer to use; 65535 keeps the present one.
-        layer: u16,
         /// Whether the vehicle stands still, by the brakes or by order.
         is_standstill: bool,
     },
@@ -371,7 +348,18 @@ impl Content {
                 let payload = CORRELATION_X_HEADING.put(payload, x_heading);
                 CORRELATION_Y_HEADING.put(payload, y_heading)
             }
-            Self::Status { mode, reason, acceptance, normalised_square, health, is_good, has_jumped } => {
+            Self::Status {
+                mode,
+                reason,
+                acceptance,
+                normalised_square,
+                health,
+                is_good,
+                has_jumped,
+                resets,
+                last_reset,
+                overflows,
+            } => {
                 let payload = MODE.put_raw(payload, number_of(&MODES, &mode, MODE));
                 let payload = REASON.put_raw(payload, number_of(&REASONS, &reason, REASON));
                 let payload = ACCEPTANCE.put(payload, acceptance);
@@ -383,10 +371,12 @@ impl Content {
                 let payload = DRIVE_FAULT.put_raw(payload, fault(health.drive, DRIVE_FAULT));
                 let payload = STEERING_FAULT.put_raw(payload, fault(health.steering, STEERING_FAULT));
                 let payload = LASER.put_raw(payload, number_of(&LASERS, &health.laser, LASER));
-                let payload = LAYER.put_raw(payload, u64::from(health.layer));
+                let payload = RESETS.put_raw(payload, u64::from(resets));
+                let payload = LAST_RESET.put_deviation(payload, last_reset);
                 let search = number_of(&START_SEARCHES, &health.start_search, START_SEARCH);
                 let payload = START_SEARCH.put_raw(payload, search);
                 let payload = POSE_IS_GOOD.put_raw(payload, u64::from(is_good));
+                let payload = OVERFLOWS.put_raw(payload, u64::from(overflows));
                 CORRECTED.put_raw(payload, u64::from(has_jumped))
             }
             Self::InitialHeading { heading, position_deviation, heading_deviation } => {
@@ -394,11 +384,7 @@ impl Content {
                 let payload = INITIAL_POSITION_DEVIATION.put_deviation(payload, position_deviation);
                 INITIAL_HEADING_DEVIATION.put_deviation(payload, heading_deviation)
             }
-            Self::Command { mode, layer, is_standstill } => {
-                let payload = WANTED_MODE.put_raw(payload, number_of(&WANTED_MODES, &mode, WANTED_MODE));
-                let payload = WANTED_LAYER.put_raw(payload, u64::from(layer));
-                STANDSTILL.put_raw(payload, u64::from(is_standstill))
-            }
+            Self::Command { is_standstill } => STANDSTILL.put_raw(payload, u64::from(is_standstill)),
         };
         Frame::of(self.id(node), payload.to_le_bytes())
     }
@@ -436,11 +422,13 @@ impl Content {
                     drive: fault_of(DRIVE_FAULT.take_raw(payload))?,
                     steering: fault_of(STEERING_FAULT.take_raw(payload))?,
                     laser: value_of(&LASERS, LASER.take_raw(payload))?,
-                    layer: LAYER.take_raw(payload) as u16,
                     start_search: value_of(&START_SEARCHES, START_SEARCH.take_raw(payload))?,
                 },
                 is_good: POSE_IS_GOOD.take_raw(payload) == 1,
                 has_jumped: CORRECTED.take_raw(payload) == 1,
+                resets: RESETS.take_raw(payload) as u8,
+                last_reset: LAST_RESET.take(payload),
+                overflows: OVERFLOWS.take_raw(payload) as u8,
             },
             (None, Some(1)) => Self::InitialPosition { x: X.take(payload), y: Y.take(payload) },
             (None, Some(2)) => Self::InitialHeading {
@@ -448,11 +436,7 @@ impl Content {
                 position_deviation: INITIAL_POSITION_DEVIATION.take(payload),
                 heading_deviation: INITIAL_HEADING_DEVIATION.take(payload),
             },
-            (None, _) => Self::Command {
-                mode: value_of(&WANTED_MODES, WANTED_MODE.take_raw(payload))?,
-                layer: WANTED_LAYER.take_raw(payload) as u16,
-                is_standstill: STANDSTILL.take_raw(payload) == 1,
-            },
+            (None, _) => Self::Command { is_standstill: STANDSTILL.take_raw(payload) == 1 },
         };
         Ok((content, COUNTER.take_raw(payload) as u8))
     }
@@ -522,6 +506,9 @@ pub fn contents(pose: &PoseOutput, health: &Health) -> [Content; 4] {
             health: *health,
             is_good: pose.is_good(),
             has_jumped: pose.has_jumped(),
+            resets: pose.resets,
+            last_reset: f64::from(pose.last_reset),
+            overflows: pose.overflows,
         },
     ]
 }
@@ -551,6 +538,12 @@ pub struct PublishedPose {
     pub is_good: bool,
     /// Whether landmarks have moved the position notably.
     pub has_jumped: bool,
+    /// How often the position was reset, wrapping.
+    pub resets: u8,
+    /// By how far the last time, m.
+    pub last_reset: f64,
+    /// How often there was not room for all that was seen, modulo 4.
+    pub overflows: u8,
 }
 
 /// Puts the four frames of a pose together.
@@ -587,7 +580,7 @@ impl PoseReceiver {
             Some(Content::Position { x, y }),
             Some(Content::Heading { heading, time, dead_reckoning_distance }),
             Some(Content::Covariance { deviations, correlations }),
-            Some(Content::Status { mode, reason, health, is_good, has_jumped, .. }),
+            Some(Content::Status { mode, reason, health, is_good, has_jumped, resets, last_reset, overflows, .. }),
         ] = self.contents
         else {
             return None;
@@ -606,22 +599,11 @@ impl PoseReceiver {
             health,
             is_good,
             has_jumped,
+            resets,
+            last_reset,
+            overflows,
         })
     }
-}
-
-/// What the controller is told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
-    /// Believe to be here.
-    InitialPose(PoseFix),
-    /// Localise by this, on this layer if one is named.
-    Localise {
-        /// By what.
-        mode: WantedMode,
-        /// On which layer; none keeps the present one.
-        layer: Option<u16>,
-    },
 }
 
 /// The two frames of an initial pose must come within this time, s.
@@ -654,20 +636,20 @@ impl OrderReceiver {
         self.standstill.is_some_and(|since| now.since(since) <= STANDSTILL_TIME)
     }
 
-    /// Takes a frame that was received at `time`; gives the order that it completes.
-    pub fn handle(&mut self, frame: &Frame, time: Time) -> Option<Order> {
+    /// Takes a frame that was received at `time`; gives the pose to believe that it completes.
+    pub fn handle(&mut self, frame: &Frame, time: Time) -> Option<PoseFix> {
         match Content::decode(frame, self.node).ok()? {
             (Content::InitialPosition { x, y }, counter) => self.position = Some((time, counter, x, y)),
             (Content::InitialHeading { heading, position_deviation, heading_deviation }, counter) => {
                 self.heading = Some((time, counter, [heading, position_deviation, heading_deviation]));
             }
-            (Content::Command { mode, layer, is_standstill }, _) => {
+            (Content::Command { is_standstill }, _) => {
                 self.standstill = is_standstill.then_some(time);
-                return Some(Order::Localise { mode, layer: (layer != u16::MAX).then_some(layer) });
+                return None;
             }
             _ => return None,
         }
-        self.initial_pose(time).map(Order::InitialPose)
+        self.initial_pose(time)
     }
 
     fn initial_pose(&mut self, time: Time) -> Option<PoseFix> {

@@ -22,6 +22,7 @@ mod setting;
 mod speed;
 mod units;
 mod variable;
+mod watch;
 
 pub use answer::{Answer, LandmarkData, MethodResult, NavigationData, PoseAnswer, Value};
 pub use channel::{Channel, ChannelName};
@@ -42,3 +43,4 @@ pub use setting::{
 pub use speed::{SensorSpeed, SpeedReport};
 pub use units::{Angle, Coordinate, DeviceTime, Distance, Milliangle, RotationSpeed, Size, Velocity};
 pub use variable::Variable;
+pub use watch::SensorWatch;

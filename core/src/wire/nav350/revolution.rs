@@ -7,8 +7,9 @@ use super::{
     SensorClock, SensorFrame,
 };
 use crate::geometry::{Pose, wrap};
+use crate::localizer::OBSERVATIONS;
 use crate::measurement::{ReflectorObservation, Reflectors, Scan, Time};
-use crate::order::insertion_sort_by;
+use crate::order::{Evenly, insertion_sort_by};
 
 /// Why an answer did not become a revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,8 +18,6 @@ pub enum RevolutionError {
     Clock,
     /// More beams than there is room for.
     Beams,
-    /// More reflectors than there is room for.
-    Reflectors,
 }
 
 /// The pose that the sensor itself has found.
@@ -44,9 +43,10 @@ struct ScanHead {
 }
 
 /// Scan, reflectors and pose of one answer, in metres, radians, the frame S and the vehicle's clock, with room for
-/// `BEAMS` beams and `REFLECTORS` reflectors.
+/// `BEAMS` beams and `REFLECTORS` reflectors. Of more reflectors as many are kept, from all around; by itself it has room for
+/// one more than a localiser, which so knows of it and says so.
 #[derive(Clone, Debug)]
-pub struct Revolution<const BEAMS: usize = 1440, const REFLECTORS: usize = 128> {
+pub struct Revolution<const BEAMS: usize = 1440, const REFLECTORS: usize = { OBSERVATIONS + 1 }> {
     ranges: [f32; BEAMS],
     intensities: [u16; BEAMS],
     scan: Option<ScanHead>,
@@ -203,11 +203,12 @@ fn take_reflectors<const N: usize>(
     if !clock.is_known() {
         return Err(RevolutionError::Clock);
     }
+    let usable = || list.reflectors.iter().filter_map(|reflector| observation(&reflector, scan, clock, frame));
+    let mut choice = Evenly::new(N, usable().count());
     let mut observations = Vec::new();
-    for reflector in list.reflectors.iter() {
-        if let Some(observation) = observation(&reflector, scan, clock, frame) {
-            observations.push(observation).map_err(|_| RevolutionError::Reflectors)?;
-        }
+    for observation in usable().filter(|_| choice.takes()) {
+        // No more are taken than there is room for.
+        let _ = observations.push(observation);
     }
     insertion_sort_by(&mut observations, |a: &ReflectorObservation, b| a.time.cmp(&b.time));
     Ok(observations)

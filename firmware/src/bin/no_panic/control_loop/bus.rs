@@ -78,7 +78,6 @@ impl Bus {
             drive: faults.drive,
             steering: faults.steering,
             laser: any(LaserHealth::Unknown),
-            layer: any(0),
             start_search: any(StartSearch::Idle),
         };
         if let Some(output) = self.predictor.output() {
