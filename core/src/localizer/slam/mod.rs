@@ -104,7 +104,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// Goes on to `time`, by the motions of the timeline.
-    pub(super) fn advance<const PAST: usize>(&mut self, time: Time, timeline: &Timeline<PAST>, lever: f64) {
+    pub(super) fn advance<const PAST: usize>(&mut self, time: Time, timeline: &Timeline<PAST>, lever: Option<f64>) {
         // Motions of about a millisecond would cost as much as those of ten.
         for motion in timeline.motions(self.time, time) {
             if motion.end > self.time {
@@ -119,7 +119,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         self.book.entries().filter_map(|(place, entry)| Some((entry.kind, self.filter.landmark(place)?)))
     }
 
-    fn predict(&mut self, motion: &Motion, lever: f64) {
+    fn predict(&mut self, motion: &Motion, lever: Option<f64>) {
         self.filter.predict(motion, lever);
     }
 
