@@ -16,7 +16,7 @@ const STATES: usize = augmented_states(KEYS, LANDMARKS);
 type Filter = Augmented<KEYS, LANDMARKS, STATES, { packed_entries(STATES) }>;
 
 const LASER: Pose = Pose { x: 0.9, y: -0.1, theta: 0.2 };
-const LEVER: f64 = 1.5;
+const LEVER: Option<f64> = Some(1.5);
 const YAW: usize = 5;
 
 fn key(slot: usize) -> usize {

@@ -7,10 +7,11 @@
 )]
 
 use agv_core::filter::Ekf;
-use agv_core::geometry::{Pose, difference};
+use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
-    Ackermann, Control, CounterRange, Integration, Motion, Odometer, OdometryError, OdometryNoise, Tricycle, Vehicle,
+    Ackermann, Control, CounterRange, Integration, Motion, Odometer, OdometryBias, OdometryError, OdometryNoise,
+    Tricycle, Vehicle,
 };
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -242,6 +243,30 @@ fn a_car_turns_about_the_point_that_its_wheels_agree_on() {
     let turned: f64 = 0.2 * turn_rate;
     let expected = Pose::new(radius * turned.sin(), radius * (1.0 - turned.cos()), turned);
     assert!(same(&motion.displacement, &expected, 1e-12));
+}
+
+/// A motion that the vehicle has integrated itself.
+fn increment(displacement: Pose) -> Motion {
+    let distance = displacement.position().norm();
+    Motion { displacement, distance, ..Motion::none(Time::default()) }
+}
+
+#[test]
+fn a_turn_that_is_not_reported_moves_no_vehicle_that_turns_in_place() {
+    let bias = OdometryBias { scale: 0.0, steering: 4e-3 };
+    let lever = Vehicle::Increments.steering_lever();
+    let turn = increment(Pose::new(0.0, 0.0, std::f64::consts::TAU / 100.0));
+    let mut pose = Pose::default();
+    for _ in 0..100 {
+        pose = pose.compose(&turn.corrected(&bias, lever).displacement);
+        assert!(pose.position().norm() < 1e-12, "{} m from its place", pose.position().norm());
+    }
+    // On its way it turns by that much a metre more, forward and back.
+    for (way, turn) in [(0.1, 0.0), (-0.1, 0.0), (0.02, 0.01), (-0.02, 0.01)] {
+        let arc = |theta: f64| Pose::exp(&Twist { x: way, y: 0.0, theta });
+        let corrected = increment(arc(turn)).corrected(&bias, lever).displacement;
+        assert!(same(&corrected, &arc(turn + 4e-3 * way), 1e-6), "{corrected:?} for {way} m and {turn} rad");
+    }
 }
 
 #[test]

@@ -180,7 +180,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
 
     /// Prediction by a motion from which the bias has been taken already. Only the pose's rows and the biases' variances
     /// change. `lever` as in [`BiasJacobian::of`].
-    pub fn predict(&mut self, motion: &Motion, lever: f64, walk: &BiasWalk) {
+    pub fn predict(&mut self, motion: &Motion, lever: Option<f64>, walk: &BiasWalk) {
         let (sine, cosine) = libm::sincos(self.pose.theta);
         let turn = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
         let step = &motion.displacement;

@@ -17,8 +17,8 @@ use crate::geometry::{Point, Pose};
 use crate::measurement::Time;
 use crate::odometry::Motion;
 
-/// Motions become one up to this time, s; one that takes more than half of it stays as it is.
-const LONGEST_JOINED: f64 = 0.014;
+/// Motions become one up to this time, us; one that takes more than half of it stays as it is.
+const LONGEST_JOINED: u64 = 14_000;
 
 /// An observation that was taken for one landmark.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -395,8 +395,9 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     fn joinable(&mut self, motion: &Motion) -> Option<&mut Entry> {
         let is_first = self.entries.len() < 2;
         let last = self.entries.back_mut()?;
-        let is_short = 2.0 * motion.end.since(motion.start) <= LONGEST_JOINED
-            && motion.end.since(last.motion.start) <= LONGEST_JOINED
+        let duration = |start: Time| motion.end.micros().saturating_sub(start.micros());
+        let is_short = duration(motion.start) <= LONGEST_JOINED / 2
+            && duration(last.motion.start) <= LONGEST_JOINED
             && motion.start == last.motion.end;
         (is_short && !is_first && matches!(last.fusion, Fusion::Nothing)).then_some(last)
     }

@@ -24,6 +24,7 @@ pub enum Event<'a> {
 
 impl Event<'_> {
     /// When the last thing in it was seen.
+    #[inline]
     pub(super) fn seen_until(&self) -> Option<Time> {
         match self {
             Self::Reflectors(reflectors) => reflectors.observations.last().map(|last| last.time),

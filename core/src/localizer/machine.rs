@@ -207,7 +207,7 @@ impl<
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
         self.outputs.has_cut = false;
-        if let Some(time) = event.seen_until() {
+        if let Some(time) = event.seen_until().filter(|time| *time > self.timeline.now()) {
             self.bridge(time);
         }
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
@@ -299,7 +299,11 @@ impl<
             // A pose may be given for a time between two samples; only what follows it counts.
             Ok(motion) if motion.end > start => {
                 let motion = if motion.start < start { motion.split(start).1 } else { motion };
-                let motion = motion.corrected(&self.odometry_bias(), self.parameters.vehicle.steering_lever());
+                let motion = if self.parameters.maps.slam {
+                    motion.corrected(&self.slam.bias(), self.parameters.vehicle.steering_lever())
+                } else {
+                    motion
+                };
                 self.blindness = None;
                 self.repeated = 0;
                 self.go_on(&motion);

@@ -26,25 +26,29 @@ pub struct BiasJacobian {
 }
 
 impl BiasJacobian {
-    /// That of a displacement which is short against its radius; a steered wheel stands `lever` (m) before the axle.
+    /// That of a displacement which is short against its radius; a steered wheel stands `lever` (m) before the axle, if
+    /// there is one. It goes less far along the more it is turned; a turn that is not reported changes no way.
     #[must_use]
-    pub fn of(displacement: &Pose, lever: f64) -> Self {
-        let turn = displacement.x / lever;
+    pub fn of(displacement: &Pose, lever: Option<f64>) -> Self {
+        let (turn, along) = match lever {
+            Some(lever) => (displacement.x / lever, -lever * displacement.theta),
+            None => (displacement.x, 0.0),
+        };
         Self {
             scale: [displacement.x, 2.0 * displacement.y, displacement.theta],
-            steering: [-lever * displacement.theta, 0.5 * displacement.x * turn, turn],
+            steering: [along, 0.5 * displacement.x * turn, turn],
         }
     }
 }
 
 impl Vehicle {
-    /// Distance by which [`OdometryBias::steering`] acts, m.
+    /// Distance from the axle to the wheel of which [`OdometryBias::steering`] is the angle, m; none without such a wheel.
     #[must_use]
-    pub fn steering_lever(&self) -> f64 {
+    pub fn steering_lever(&self) -> Option<f64> {
         match self {
-            Self::Tricycle(tricycle) => tricycle.wheelbase,
-            Self::Ackermann(car) => car.wheelbase,
-            Self::Increments => 1.0,
+            Self::Tricycle(tricycle) => Some(tricycle.wheelbase),
+            Self::Ackermann(car) => Some(car.wheelbase),
+            Self::Increments => None,
         }
     }
 }
@@ -52,7 +56,7 @@ impl Vehicle {
 impl Motion {
     /// The motion without a bias; `lever` as in [`BiasJacobian::of`].
     #[must_use]
-    pub fn corrected(&self, bias: &OdometryBias, lever: f64) -> Motion {
+    pub fn corrected(&self, bias: &OdometryBias, lever: Option<f64>) -> Motion {
         if *bias == OdometryBias::default() {
             return *self;
         }

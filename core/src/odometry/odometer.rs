@@ -64,6 +64,14 @@ impl Odometer {
         fastest: f64,
         longest_interval: f64,
     ) -> Self {
+        let longest_interval = match &vehicle {
+            // At its fastest the vehicle may go half of the counter's range; beyond, it may seem to go the other way.
+            Vehicle::Tricycle(tricycle) => {
+                let half = 0.5 * tricycle.drive_range.values() as f64 * libm::fabs(tricycle.drive_scale);
+                longest_interval.min(half / fastest)
+            }
+            Vehicle::Ackermann(_) | Vehicle::Increments => longest_interval,
+        };
         Self { vehicle, noise, integration, fastest, longest_interval, last: None }
     }
 
@@ -95,11 +103,6 @@ impl Odometer {
         }
         let (control, backward) = tricycle.control(&last, sample, backward);
         self.last = Some(Sample::Encoders { sample: *sample, backward });
-        // At its fastest the vehicle may go half of the counter's range; beyond, it may seem to go the other way.
-        let half = 0.5 * tricycle.drive_range.values() as f64 * libm::fabs(tricycle.drive_scale);
-        if sample.time.since(last.time) * self.fastest > half {
-            return Err(OdometryError::Pause);
-        }
         self.motion(last.time, sample.time, &control, tricycle.wheelbase)
     }
 
