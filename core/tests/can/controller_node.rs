@@ -83,6 +83,13 @@ fn every_object_of_the_description_is_read_as_described() {
 }
 
 #[test]
+fn who_reads_the_revision_knows_which_content_comes() {
+    let mut controller = ControllerNode::new(node(), at(0));
+    let object = Object::new(0x1018, 3);
+    assert_eq!(ask(&mut controller, Request::Read(object)), Response::Read(object, Value::from(2u32)));
+}
+
+#[test]
 fn the_node_boots_beats_and_obeys() {
     let mut controller = ControllerNode::new(node(), at(0));
     assert!(!controller.is_operational());

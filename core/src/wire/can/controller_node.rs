@@ -22,6 +22,9 @@ const BY_EVENT: u8 = 254;
 /// The first object that a PDO holds; 64 bits each, as they follow each other.
 const FIRST_CONTENT: u16 = 0x2001;
 
+/// Revision of what is said and heard: it goes up where a signal changes its meaning.
+const REVISION: u32 = 2;
+
 /// The controller as a node.
 #[derive(Clone, Copy, Debug)]
 pub struct ControllerNode {
@@ -133,7 +136,7 @@ impl ControllerNode {
             (0x1001, 0) => Ok(Value::from(0u8)),
             (0x1017, 0) => Ok(Value::from(HEARTBEAT_TIME)),
             (0x1018, 0) => Ok(Value::from(4u8)),
-            (0x1018, 3) => Ok(Value::from(1u32)),
+            (0x1018, 3) => Ok(Value::from(REVISION)),
             (0x1018, 1 | 2 | 4) => Ok(Value::from(0u32)),
             // Longer than an expedited transfer; they are heard and sent as PDOs.
             (0x2001..=0x2007, 0) => Err(AbortCode::UnsupportedAccess),
