@@ -183,7 +183,7 @@ pub static LEAVES: [Leaf; 60] = [
     whole!(300, "can.controller_node", "", 1.0, 127.0, nodes.controller),
     whole!(301, "can.drive_node", "", 1.0, 127.0, nodes.drive),
     whole!(302, "can.steering_node", "", 1.0, 127.0, nodes.steering),
-    whole!(303, "can.encoder_period", "ms", 1.0, 100.0, encoder_period),
+    whole!(303, "can.encoder_period", "ms", 1.0, 50.0, encoder_period),
     address!(320, "network.address", network.address),
     whole!(321, "network.prefix", "", 0.0, 32.0, network.prefix),
     address!(322, "network.gateway", network.gateway),

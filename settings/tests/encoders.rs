@@ -3,6 +3,21 @@
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_settings::Settings;
 use agv_settings::encoders::channels;
+use agv_settings::leaf::{Leaf, LeafError, Value};
+
+#[test]
+fn rates_at_which_the_filter_forgets_too_early_are_refused() {
+    let leaf = Leaf::named("can.encoder_period").unwrap();
+    let mut settings = Settings::default();
+    // 1000 and 20 times a second.
+    for period in [1, 50] {
+        assert_eq!(leaf.set(&mut settings, Value::Whole(period)), Ok(()));
+    }
+    for period in [0, 51, 100] {
+        assert_eq!(leaf.set(&mut settings, Value::Whole(period)), Err(LeafError::Bounds));
+    }
+    assert_eq!(settings.encoder_period, 50);
+}
 
 #[test]
 fn the_encoders_are_held_to_the_ranges_that_the_odometry_wraps_by() {

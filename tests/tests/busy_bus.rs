@@ -4,7 +4,7 @@
 //! code that runs in the firmware. A second test has the firmware itself, in emulation, among the same frames.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};

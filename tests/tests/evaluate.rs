@@ -1,6 +1,6 @@
 //! The experiments, held to what they must show.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{MapUse, Mode, PoseOutput};

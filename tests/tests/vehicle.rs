@@ -18,7 +18,7 @@ use agv_host_sim::link::service::{Client, ServiceError};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
-use agv_host_sim::{data, log, replay};
+use agv_host_sim::{log, replay};
 use agv_settings::leaf::Value;
 use agv_settings::service::Refusal;
 

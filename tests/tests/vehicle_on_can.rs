@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -30,7 +30,7 @@ const NAME: &str = "the_board_is_a_node_of_a_real_bus";
 /// Where `candump` writes, in the folder that this names.
 const FOLDER: &str = "AGV_BOARD_FOLDER";
 /// Frames of that kernel come late, so encoders are heard every so many ms.
-const ENCODER_PERIOD: u16 = 100;
+const ENCODER_PERIOD: u16 = 50;
 const START: Pose = Pose { x: 12.5, y: -3.25, theta: 0.5 };
 
 fn controller() -> NodeId {

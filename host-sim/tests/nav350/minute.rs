@@ -4,10 +4,10 @@ use std::path::Path;
 use std::process::Command;
 
 use agv_core::wire::nav350::SensorFrame;
+use agv_host_sim::log;
 use agv_host_sim::serve::nav350::Drive;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
-use agv_host_sim::{data, log};
 
 use crate::commands::Server;
 use crate::live::{check_events, localises};
