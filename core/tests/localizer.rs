@@ -212,6 +212,21 @@ fn corrections_are_said_and_leave_no_step_in_the_smooth_pose() {
 }
 
 #[test]
+fn a_pose_of_a_clock_that_is_ahead_is_given_up_when_the_odometry_speaks() {
+    let mut drive = Drive::start();
+    drive.revolutions(4, |_| true);
+    let last = drive.localizer.outputs().pose;
+    let fix =
+        PoseFix { time: last.time.offset(5.0), pose: last.pose, position_deviation: 0.01, heading_deviation: 0.003 };
+    drive.localizer.handle(&Event::SetPose(fix));
+    let said = drive.revolutions(1, |_| false);
+    assert_eq!((said.mode, said.reason), (Mode::Lost, Reason::NoPose));
+    // One of now is taken.
+    let said = drive.set_pose(last.pose);
+    assert!(said.time < fix.time && said.mode != Mode::Lost, "{said:?}");
+}
+
+#[test]
 fn a_jump_is_told_to_who_asks_later() {
     let mut drive = Drive::start();
     let mut predictor: OutputPredictor = OutputPredictor::new(&parameters());

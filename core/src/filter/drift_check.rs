@@ -19,6 +19,9 @@ const LEAST: (f64, f64) = (0.3, 0.3);
 /// Way, m, and turn, rad, without a contradiction after which the laser is as it is believed again, however fast the memory
 /// fades on them.
 const HEALING: (f32, f32) = (1.2, 0.45);
+/// Turn, rad, without a contradiction after which it does not matter that a wide bend leaves less than that in the memory:
+/// what would contradict has come through the lag of the filter by then.
+const SETTLED: f32 = 1.35;
 /// What noise adds up to over any way and turn: it must not be taken for a drift of a short one. m to the side and along,
 /// rad.
 const NOISE: (f64, f64) = (0.012, 0.01);
@@ -167,7 +170,8 @@ impl DriftCheck {
         if !laser.iter().all(|(rate, limit)| rate.is_none() || is_below(*rate, *limit)) {
             self.sound = (0.0, 0.0);
         }
-        let has_driven = has_way && has_turn && self.sound.0 >= HEALING.0 && self.sound.1 >= HEALING.1;
+        let has_turned = self.turn >= f64::from(HEALING.1) || self.sound.1 >= SETTLED;
+        let has_driven = has_way && has_turn && has_turned && self.sound.0 >= HEALING.0 && self.sound.1 >= HEALING.1;
         let is_healed = has_driven || self.suspect != Some(Suspect::Laser);
         if laser.iter().any(|(rate, limit)| is_beyond(*rate, *limit)) || !is_healed {
             return Some(Suspect::Laser);

@@ -23,12 +23,14 @@ pub enum Event<'a> {
 }
 
 impl Event<'_> {
-    /// When the last thing in it was seen.
+    /// When the first thing in it was seen, and the last one.
     #[inline]
-    pub(super) fn seen_until(&self) -> Option<Time> {
+    pub(super) fn seen(&self) -> Option<(Time, Time)> {
         match self {
-            Self::Reflectors(reflectors) => reflectors.observations.last().map(|last| last.time),
-            Self::Scan(scan) => Some(scan.end()),
+            Self::Reflectors(reflectors) => {
+                reflectors.observations.first().zip(reflectors.observations.last()).map(|(a, b)| (a.time, b.time))
+            }
+            Self::Scan(scan) => Some((scan.start, scan.end())),
             _ => None,
         }
     }

@@ -38,9 +38,10 @@ const UNSURE: f64 = 3.0;
 /// from a pose, or to one, whose position and heading have these deviations, m and rad. Who carries a vehicle may knock its
 /// laser, too.
 fn is_knock(jump: &Pose, way: f64, deviations: (f64, f64)) -> bool {
+    // A slip as large as one can be and a pose as wrong as it can be seldom come together.
     let drift = LARGEST_DRIFT * way;
-    libm::fabs(jump.y) > LARGEST_SLIP.0 + drift + UNSURE * deviations.0
-        || libm::fabs(jump.theta) > LARGEST_SLIP.1 + drift + UNSURE * deviations.1
+    libm::fabs(jump.y) > (LARGEST_SLIP.0 + drift).max(UNSURE * deviations.0)
+        || libm::fabs(jump.theta) > (LARGEST_SLIP.1 + drift).max(UNSURE * deviations.1)
 }
 
 /// Whether what is not known of a pose is less than a slip.

@@ -59,10 +59,15 @@ pub struct Localizer<
 struct Blindness {
     reason: Reason,
     coasting: Coasting,
+    /// What was seen until this time raised the doubt; nothing that was seen, if it is the beginning of time.
+    since: Time,
 }
 
 /// An odometry that says so often in a row what is not later than before has a clock that stands.
 const MOST_REPEATED: u8 = 10;
+
+/// A pose that was given for a time further ahead of the odometry than this, s, is of another clock.
+const LONGEST_LEAD: f64 = 0.5;
 
 /// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
 const LONGEST_BRIDGE: f64 = 1.0;
@@ -207,8 +212,8 @@ impl<
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
         self.outputs.has_cut = false;
-        if let Some(time) = event.seen_until().filter(|time| *time > self.timeline.now()) {
-            self.bridge(time);
+        if let Some((from, until)) = event.seen().filter(|(_, until)| *until > self.timeline.now()) {
+            self.bridge(from, until);
         }
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
@@ -263,7 +268,8 @@ impl<
             return;
         }
         let is_past = self.timeline.begun().is_some_and(|timeline| fix.time < timeline.now());
-        if is_past && self.timeline.reaches(fix.time).is_err() {
+        // A pose of a time that has not come yet is no reason to refuse one of now.
+        if is_past && self.lost != Some(Reason::NoPose) && self.timeline.reaches(fix.time).is_err() {
             return;
         }
         let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
@@ -317,29 +323,38 @@ impl<
                 }
             }
             // What the odometry should say does not come.
-            Err(OdometryError::WrongVehicle) => self.bridge(time),
+            Err(OdometryError::WrongVehicle) => self.bridge(time, time),
             // Once it is a frame that was sent twice.
             Err(OdometryError::OutOfOrder) => {
                 self.repeated = self.repeated.saturating_add(1);
                 if self.repeated >= MOST_REPEATED {
-                    self.doubt_odometry(Reason::OdometryImplausible);
+                    self.doubt_odometry(Reason::OdometryImplausible, Time::default());
                 }
             }
+            // Whoever gave that pose has a clock that is ahead: the vehicle has not been there yet.
+            Ok(motion) if start.since(motion.end) > LONGEST_LEAD => self.lost = Some(Reason::NoPose),
             Ok(_) => {}
         }
     }
 
     /// Goes on to `time`, at which something was seen, if that is too far ahead of an odometry that is silent. What the
     /// odometry says later of the same time counts instead.
-    fn bridge(&mut self, time: Time) {
+    fn bridge(&mut self, from: Time, time: Time) {
         let limit = self.parameters.limits.longest_extrapolation;
         let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_motion().end) > limit)
         else {
             return;
         };
         let now = timeline.now();
-        let mut coasting =
-            self.doubt_odometry(self.blindness.map_or(Reason::OdometrySilent, |blindness| blindness.reason));
+        let Some(Blindness { reason, since, .. }) = self.blindness else {
+            self.doubt_odometry(Reason::OdometrySilent, time);
+            return;
+        };
+        // A laser whose clock has jumped looks the same, until the odometry speaks before the next revolution.
+        if from <= since {
+            return;
+        }
+        let mut coasting = self.doubt_odometry(reason, since);
         // What was extrapolated has been assumed already.
         let _ = coasting.to(now, &self.parameters.odometry_noise);
         if time.since(now) <= LONGEST_BRIDGE
@@ -351,10 +366,10 @@ impl<
     }
 
     /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
-    fn doubt_odometry(&mut self, reason: Reason) -> Coasting {
+    fn doubt_odometry(&mut self, reason: Reason, since: Time) -> Coasting {
         let last = self.timeline.last_motion();
         let coasting = self.blindness.map_or_else(|| Coasting::new(*last), |blindness| blindness.coasting);
-        self.blindness = Some(Blindness { reason, coasting });
+        self.blindness = Some(Blindness { reason, coasting, since });
         coasting
     }
 
@@ -392,11 +407,11 @@ impl<
         if self.timeline.begun().is_none() {
             return;
         }
-        let mut coasting = self.doubt_odometry(reason);
+        let mut coasting = self.doubt_odometry(reason, Time::default());
         if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
             self.go_on(&motion);
         }
-        self.blindness = Some(Blindness { reason, coasting });
+        self.blindness = Some(Blindness { reason, coasting, since: Time::default() });
     }
 
     fn scan(&mut self, scan: &Scan) {

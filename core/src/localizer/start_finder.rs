@@ -56,6 +56,8 @@ pub struct StartFinder<const SEEN: usize = 64> {
     /// Motion since the search began; none if no search is under way.
     since: Option<Pose>,
     way: f64,
+    /// Whether the odometry has said something since the last revolution.
+    has_spoken: bool,
     found: Vec<ReflectorObservation, OBSERVATIONS>,
 }
 
@@ -77,6 +79,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             relocalizer: ReflectorRelocalizer::new(search),
             since: None,
             way: 0.0,
+            has_spoken: false,
             found: Vec::new(),
             parameters,
         }
@@ -119,6 +122,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     /// Forgets what was seen and how the vehicle moved; a search that is under way is given up.
     pub fn forget(&mut self) {
         self.odometer.restart();
+        self.has_spoken = false;
         self.stand(Time::default());
     }
 
@@ -131,6 +135,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     }
 
     fn travel(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
+        self.has_spoken = true;
         match motion {
             Ok(motion) => {
                 let covariance = &motion.covariance;
@@ -157,9 +162,14 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         if let Some(first) = observations.first()
             && first.time.since(self.last_motion.end) > LONGEST_SILENCE
         {
+            // An odometry that speaks tells the time; the clock of the laser does not.
+            if core::mem::take(&mut self.has_spoken) {
+                return;
+            }
             self.odometer.restart();
             self.stand(first.time);
         }
+        self.has_spoken = false;
         self.see(observations);
         if self.since.is_none() {
             self.relocalizer.begin(&self.snapshot, reflectors);

@@ -125,6 +125,8 @@ pub struct Drive<'a> {
     pub latency: u64,
     pub is_odometry_silent: bool,
     pub is_laser_silent: bool,
+    /// By how much the laser's clock is ahead, s.
+    pub laser_ahead: f64,
     /// Time since the path's beginning, us.
     now: u64,
     said: u64,
@@ -145,6 +147,7 @@ impl<'a> Drive<'a> {
             latency: 0,
             is_odometry_silent: false,
             is_laser_silent: false,
+            laser_ahead: 0.0,
             now: 0,
             said: 0,
         };
@@ -224,7 +227,10 @@ impl<'a> Drive<'a> {
     }
 
     fn tell_revolution(&mut self, index: u64) {
-        let observations = self.revolution(index);
+        let mut observations = self.revolution(index);
+        for seen in &mut observations {
+            seen.time = seen.time.offset(self.laser_ahead);
+        }
         self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
     }
 

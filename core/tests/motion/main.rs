@@ -62,6 +62,23 @@ fn an_odometry_that_is_silent_is_told_and_its_motion_is_made_up_for() {
 }
 
 #[test]
+fn a_laser_whose_clock_jumps_on_does_not_lead_the_pose_on() {
+    let path = Path::straight(16.0);
+    for kind in KINDS {
+        for ahead in [0.2, 0.5, 0.9] {
+            let mut drive = Drive::start(&path, kind, false, 100);
+            drive.go(SETTLED, |_| {});
+            drive.laser_ahead = ahead;
+            drive.go(2.0, |drive| {
+                let said = drive.said();
+                assert!(said.time <= drive.time(), "{said:?} is of the future, {kind:?}, {ahead} s");
+                assert!(path.error(&said) < 0.03, "{} m off, {kind:?}, {ahead} s", path.error(&said));
+            });
+        }
+    }
+}
+
+#[test]
 fn a_short_silence_of_the_odometry_costs_no_motion() {
     let path = Path::new(16.0, |time| (1.0 - 0.5 * (2.0 * time).sin(), 0.1 * (1.5 * time).sin()));
     for kind in KINDS {
