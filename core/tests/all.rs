@@ -17,6 +17,7 @@ mod record;
 mod reflector_detection;
 mod reflector_search;
 mod start_finder;
+mod timeline;
 mod wire;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
