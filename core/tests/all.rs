@@ -9,6 +9,7 @@ mod geometry;
 mod integrity;
 mod landmarks;
 mod localizer;
+mod motion_check;
 mod odometry;
 mod order;
 mod orthogonal_corners;
