@@ -1,24 +1,40 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod augmented_filter;
+mod augmented_places;
 mod calibration;
 mod can;
+mod consistency;
+mod covariance_repair;
+mod drift_check;
 mod falko;
 mod filter;
 mod geometry;
 mod integrity;
+mod key_scans;
+mod landmark_observation;
+mod landmark_use;
 mod landmarks;
 mod localizer;
+mod mapping;
+mod modes;
 mod motion_check;
+mod moving_laser;
 mod odometry;
 mod order;
 mod orthogonal_corners;
+mod output_predictor;
 mod places;
+mod pose_output;
+mod prediction;
 mod record;
 mod reflector_detection;
 mod reflector_search;
 mod start_finder;
+mod start_search;
+mod support;
 mod timeline;
+mod uncertain_motion;
 mod wire;
 
 /// A file that is no module of this program would be no test, and nobody would notice.

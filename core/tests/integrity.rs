@@ -151,7 +151,7 @@ fn a_suspicion_of_the_laser_lasts_until_the_vehicle_has_driven_and_turned() {
     assert_eq!(check.suspect(), None);
 }
 
-fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
+pub fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
     PoseOutput {
         time: Time::default(),
         pose: Pose::default(),
