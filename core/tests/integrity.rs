@@ -197,7 +197,7 @@ fn the_heading_s_trend_holds_four_times_what_the_laser_looks_askew_by() {
     assert!(position == 0.0 && (heading - 8.0 * 0.001).abs() < 1e-9, "{heading}");
 }
 
-fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
+pub fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
     PoseOutput {
         time: Time::default(),
         pose: Pose::default(),

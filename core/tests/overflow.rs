@@ -1,18 +1,15 @@
 //! What happens to what finds no room: it is counted, and what is kept is spread over all directions.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-#[path = "support/hall.rs"]
-mod hall;
-
 use std::f64::consts::{PI, TAU};
 
+use crate::support::hall::{cast, corners};
 use agv_core::features::falko::{Detector, Parameters as Falko};
 use agv_core::features::{Keypoint, PointScan, ReflectorDetection, detect_reflectors};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Localizer, OBSERVATIONS, Parameters, PoseFix};
 use agv_core::measurement::{ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
-use hall::{cast, corners};
 
 /// How many of these directions, rad, lie in each quarter of a turn.
 fn quarters(bearings: impl Iterator<Item = f64>) -> [usize; 4] {

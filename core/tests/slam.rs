@@ -1,11 +1,9 @@
 //! Mapping while driving, in the localiser as a whole: a hall whose corners and reflectors are known to the test.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-#[path = "support/hall.rs"]
-mod hall;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use crate::support::hall::{cast, corners};
 use agv_core::features::ReflectorDetection;
 use agv_core::filter::{augmented_states, packed_entries};
 use agv_core::geometry::{Point, Pose};
@@ -13,7 +11,6 @@ use agv_core::landmarks::LandmarkKind;
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
 use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
-use hall::{cast, corners};
 
 const BEAMS: usize = 1440;
 const KEYS: usize = 2;

@@ -40,6 +40,12 @@ impl Remembered {
     fn is_expected(&self) -> bool {
         self.times >= 2 && self.age <= EXPECTED
     }
+
+    /// Whether it was seen in this revolution, or should be seen again in the next one: were it forgotten for what is new,
+    /// many landmarks at once would never contradict.
+    fn is_needed(&self) -> bool {
+        self.age == 0 || (self.times >= 2 && self.age < EXPECTED)
+    }
 }
 
 /// The memory, and how often it was contradicted.
@@ -107,9 +113,8 @@ impl MotionCheck {
         self.new = self.new.saturating_add(1);
         let one = Remembered { position, age: 0, times: 1 };
         if self.remembered.is_full() {
-            // What was seen in this revolution stays.
-            if let Some(place) = self.remembered.iter_mut().max_by_key(|other| other.age).filter(|other| other.age > 0)
-            {
+            let others = self.remembered.iter_mut().filter(|other| !other.is_needed());
+            if let Some(place) = others.max_by_key(|other| other.age) {
                 *place = one;
             }
         } else {

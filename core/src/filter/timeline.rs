@@ -301,6 +301,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     pub fn set_state(&mut self, time: Time, state: Ekf) -> Result<(), TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         let parts = self.motion_to(position, time)?;
+        self.settle(position + 1);
         self.divide(position, parts, Fusion::Given, state);
         Ok(())
     }

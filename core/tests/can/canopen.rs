@@ -9,7 +9,7 @@ use agv_core::wire::can::pdo::{MappingEntry, PdoMapping};
 use agv_core::wire::can::sdo::{AbortCode, Object, Request, Response, SdoClient, SdoError, TransferError, Value};
 use proptest::prelude::*;
 
-use crate::frames::{any_classic, frame};
+use super::frames::{any_classic, frame};
 
 fn node(number: u8) -> NodeId {
     NodeId::new(number).unwrap()

@@ -11,7 +11,7 @@ use agv_core::wire::can::controller::{
 use agv_core::wire::can::frame::{Frame, standard_id};
 use proptest::prelude::*;
 
-use crate::frames::{any_classic, frame};
+use super::frames::{any_classic, frame};
 
 fn node() -> NodeId {
     NodeId::new(16).unwrap()

@@ -9,7 +9,7 @@ use agv_core::wire::can::frame::Frame;
 use agv_core::wire::can::nmt::NmtState;
 use agv_core::wire::can::sdo::{AbortCode, Object, Request, Response, Value};
 
-use crate::frames::frame;
+use super::frames::frame;
 
 fn at(milliseconds: u64) -> Time {
     Time::from_micros(1_000_000 + milliseconds * 1000)

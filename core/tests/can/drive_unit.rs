@@ -6,7 +6,7 @@ use agv_core::wire::can::frame::standard_id;
 use agv_core::wire::can::signal::{ByteOrder, Signal};
 use proptest::prelude::*;
 
-use crate::frames::frame;
+use super::frames::frame;
 
 fn signal(first_byte: u8, length: u8, order: ByteOrder, is_signed: bool, scale: f64) -> Signal {
     Signal { first_byte, length, order, is_signed, scale, offset: 0.0 }

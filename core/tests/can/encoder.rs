@@ -9,8 +9,8 @@ use agv_core::wire::can::encoder::{
 use agv_core::wire::can::frame::Frame;
 use proptest::prelude::*;
 
-use crate::frames::{any_classic, frame};
-use crate::node::Node;
+use super::frames::{any_classic, frame};
+use super::node::Node;
 
 fn settings(number: u8) -> EncoderSettings {
     EncoderSettings::new(NodeId::new(number).unwrap())

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use agv_core::wire::can::frame::Frame;
 
-use crate::frames::frame;
+use super::frames::frame;
 
 pub const NO_SUCH_OBJECT: u32 = 0x0602_0000;
 

@@ -10,8 +10,8 @@ use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair, FAULT_PERI
 use agv_core::wire::can::frame::Frame;
 use agv_core::wire::can::supervision::SupervisionLimits;
 
-use crate::frames::frame;
-use crate::node::Node;
+use super::frames::frame;
+use super::node::Node;
 
 fn at(milliseconds: u64) -> Time {
     Time::from_micros(milliseconds * 1000)

@@ -4,7 +4,7 @@ use agv_core::wire::can::frame::{FdFrame, Frame, extended_id, standard_id};
 use agv_core::wire::can::slcan::{BitRate, Command, Decoder, MAX_LINE, Message, SlcanError};
 use proptest::prelude::*;
 
-use crate::frames::any_frame;
+use super::frames::any_frame;
 
 fn any_message() -> impl Strategy<Value = Message> {
     let rate = prop::sample::select(vec![BitRate::Kbit10, BitRate::Kbit125, BitRate::Kbit500, BitRate::Mbit1]);

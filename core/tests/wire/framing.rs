@@ -4,7 +4,7 @@ use agv_core::wire::cola::{CommandWord, Deframed, Deframer, Dialect, Writer};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use crate::values;
+use super::values;
 
 /// A telegram, and what must be found of it.
 #[derive(Clone, Debug)]

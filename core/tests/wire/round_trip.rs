@@ -11,7 +11,7 @@ use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-use crate::values::{self, OwnedChannel};
+use super::values::{self, OwnedChannel};
 
 /// Gives the payload of a telegram, which must be framed without loss.
 fn payload(dialect: Dialect, telegram: &[u8]) -> Vec<u8> {

@@ -10,7 +10,7 @@ use agv_core::wire::nav350::{
 };
 use proptest::prelude::*;
 
-use crate::peer::{Moods, Scene};
+use super::peer::{Moods, Scene};
 
 fn speaking(dialect: Dialect) -> Scene {
     let mut scene = Scene::new(Configuration { first_dialect: dialect, ..Configuration::default() });

@@ -1,7 +1,7 @@
 //! The detector in a synthetic storage whose true corners are known, and its properties on any scan.
 #![allow(clippy::expect_used, clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-mod scene;
+pub mod scene;
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,0 +1,54 @@
+//! All tests of this crate from outside, in one program: it is linked once.
+
+mod augmented_filter;
+mod augmented_places;
+mod calibration;
+mod can;
+mod consistency;
+mod covariance_repair;
+mod drift_check;
+mod falko;
+mod filter;
+mod geometry;
+mod integrity;
+mod key_scans;
+mod landmark_observation;
+mod landmark_use;
+mod landmarks;
+mod localizer;
+mod mapping;
+mod modes;
+mod motion;
+mod motion_check;
+mod moving_laser;
+mod odometry;
+mod order;
+mod orthogonal_corners;
+mod output_predictor;
+mod overflow;
+mod places;
+mod pose_output;
+mod prediction;
+mod record;
+mod reflector_detection;
+mod reflector_search;
+mod slam;
+mod start_finder;
+mod start_search;
+mod support;
+mod timeline;
+mod uncertain_motion;
+mod wire;
+
+/// A file that is no module of this program would be no test, and nobody would notice.
+#[test]
+fn every_file_beside_this_one_is_a_module_of_it() {
+    let entries = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")).expect("this folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let sources = paths.filter(|path| path.is_dir() || path.extension().is_some_and(|extension| extension == "rs"));
+    let names = sources.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()));
+    let mut files: Vec<_> = names.filter(|name| name != "all").collect();
+    files.sort_unstable();
+    let declarations = include_str!("all.rs").lines().filter_map(|line| line.strip_prefix("mod ")?.strip_suffix(';'));
+    assert_eq!(files, declarations.collect::<Vec<_>>());
+}

@@ -1,0 +1,165 @@
+//! Whether the laser has moved as the odometry says, held against the history of each place.
+#![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use agv_core::filter::MotionCheck;
+use agv_core::geometry::Point;
+use agv_core::measurement::Time;
+
+use super::falko::scene::Random;
+
+/// Places that are too far apart to be taken for one another.
+fn place(index: usize) -> Point {
+    Point::new(2.0 * (index % 6) as f64, 2.0 * (index / 6) as f64)
+}
+
+fn time(revolution: usize) -> Time {
+    Time::from_micros(1_000_000 + 125_000 * revolution as u64)
+}
+
+/// In how many revolutions a place was seen so far and how long ago last; forgotten after eight that it was not seen in.
+fn memory(seen: &[Vec<bool>], place: usize) -> (usize, usize) {
+    let (mut times, mut age) = (0, 0);
+    for revolution in seen {
+        age += 1;
+        if age > 8 {
+            times = 0;
+        }
+        if revolution[place] {
+            (times, age) = (times + 1, 0);
+        }
+    }
+    // The present revolution is one later.
+    if age + 1 > 8 { (0, age + 1) } else { (times, age + 1) }
+}
+
+#[test]
+fn verdicts_follow_from_the_history_of_each_place() {
+    const PLACES: usize = 20;
+    let mut random = Random::new(7);
+    let (mut wrong, mut right) = (0, 0);
+    for _ in 0..400 {
+        let mut check = MotionCheck::new();
+        let mut history: Vec<Vec<bool>> = Vec::new();
+        let mut contradictions = 0;
+        let mut share = [0.0; PLACES];
+        for revolution in 0..40 {
+            if random.unit() < 0.15 {
+                let groups = random.unit();
+                let often = random.uniform(0.7, 1.0);
+                share = share.map(|was| if (was < 0.5) == (random.unit() < groups) { often } else { 0.02 });
+            }
+            let seen = share.map(|share| random.unit() < share).to_vec();
+            let (mut expected, mut again, mut new) = (0, 0, 0);
+            for (index, is_seen) in seen.iter().enumerate() {
+                let (times, age) = memory(&history, index);
+                let is_expected = times >= 2 && age <= 2;
+                expected += usize::from(is_expected);
+                again += usize::from(is_expected && *is_seen);
+                new += usize::from(*is_seen && times < 2);
+            }
+            let count = seen.iter().filter(|is_seen| **is_seen).count();
+            let is_contradicted = expected >= 3 && count >= 3 && 5 * again < expected && 2 * new >= count;
+            contradictions = if is_contradicted { contradictions + 1 } else { 0 };
+            check.begin(time(revolution));
+            for (index, is_seen) in seen.iter().enumerate() {
+                if *is_seen {
+                    let shake = Point::new(random.uniform(-0.02, 0.02), random.uniform(-0.01, 0.01));
+                    check.see(&(place(index) + shake), 0.0);
+                }
+            }
+            assert_eq!(check.disagrees(), contradictions >= 2, "{revolution} {expected} {again} {new} {count}");
+            wrong += usize::from(contradictions >= 2);
+            right += usize::from(contradictions == 0 && expected >= 3);
+            history.push(seen);
+        }
+    }
+    assert!(wrong > 40 && right > 1000, "{wrong} {right}");
+}
+
+/// Three revolutions in one place and two in another that is `shift` (m) beside it, both seen from `range` (m), with `pause`
+/// (s) between the two.
+fn is_move_seen(count: usize, shift: f64, range: f64, pause: f64) -> bool {
+    let mut check = MotionCheck::new();
+    let mut now = time(0);
+    let mut last = false;
+    for revolution in 0..5 {
+        now = now.offset(if revolution == 3 { pause } else { 0.125 });
+        check.begin(now);
+        for index in 0..count {
+            let by = if revolution < 3 { 0.0 } else { shift };
+            check.see(&(place(index) + Point::new(by, 0.0)), range);
+        }
+        last = check.disagrees();
+    }
+    last
+}
+
+#[test]
+fn a_move_is_seen_if_it_is_larger_than_the_gate_for_the_distance() {
+    for range in [0.0, 5.0, 30.0] {
+        let gate = 0.05 + 0.006 * range;
+        assert!(!is_move_seen(8, 0.99 * gate, range, 0.125), "{range}");
+        assert!(is_move_seen(8, 1.01 * gate, range, 0.125), "{range}");
+    }
+}
+
+#[test]
+fn two_landmarks_and_a_long_pause_tell_nothing() {
+    assert_eq!([2, 3, 30].map(|count| is_move_seen(count, 0.5, 5.0, 0.125)), [false, true, true]);
+    assert_eq!([0.29, 0.31].map(|pause| is_move_seen(8, 0.5, 5.0, pause)), [true, false]);
+}
+
+#[test]
+fn what_is_cleared_contradicts_nothing() {
+    let mut check = MotionCheck::default();
+    for revolution in 0..8 {
+        if revolution == 5 {
+            check.clear();
+        }
+        check.begin(time(revolution));
+        for index in 0..8 {
+            check.see(&(place(index) + Point::new(if revolution < 4 { 0.0 } else { 0.5 }, 0.0)), 1.0);
+        }
+        assert!(!check.disagrees(), "{revolution}");
+    }
+}
+
+#[test]
+fn more_landmarks_than_there_is_room_for_still_tell_a_move() {
+    // Of 60, no more than 32 are remembered.
+    assert!(is_move_seen(60, 0.5, 5.0, 0.125));
+    assert!(!is_move_seen(60, 0.0, 5.0, 0.125));
+}
+
+#[test]
+fn landmarks_that_are_passed_make_room_for_those_that_come() {
+    let mut check = MotionCheck::new();
+    let mut last = false;
+    for revolution in 0..9 {
+        check.begin(time(revolution));
+        // 32 of them, then 8 others, which then seem to jump.
+        let seen = if revolution < 3 { 0..32 } else { 40..48 };
+        let by = if revolution < 7 { 0.0 } else { 0.5 };
+        for index in seen {
+            check.see(&(place(index) + Point::new(by, 0.0)), 1.0);
+        }
+        last = check.disagrees();
+        assert_eq!(last, revolution == 4 || revolution == 8, "{revolution}");
+    }
+    assert!(last);
+}
+
+#[test]
+fn a_fifth_of_the_landmarks_is_enough() {
+    for (seen, expected) in [(1, false), (0, true)] {
+        let mut check = MotionCheck::new();
+        for revolution in 0..5 {
+            check.begin(time(revolution));
+            for index in 0..10 {
+                let stays = revolution < 3 || index < 2 * seen;
+                check.see(&(place(index) + Point::new(if stays { 0.0 } else { 0.5 }, 0.0)), 1.0);
+            }
+            assert_eq!(check.disagrees(), expected && revolution == 4, "{seen} {revolution}");
+        }
+    }
+}

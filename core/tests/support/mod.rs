@@ -1,0 +1,4 @@
+//! A hall and a vehicle in it, whose truth is known to the tests.
+
+pub mod hall;
+pub mod stage;

@@ -1,0 +1,268 @@
+//! The filter's past, against a filter that keeps everything and computes it anew.
+
+use agv_core::filter::{Cartesian, Correction, Ekf, Observation, Timeline, TimelineError};
+use agv_core::geometry::{Point, Pose};
+use agv_core::measurement::Time;
+use agv_core::odometry::Motion;
+use nalgebra::{Matrix2, Matrix3};
+
+use super::falko::scene::Random;
+
+const LASER: Pose = Pose { x: 0.9, y: 0.1, theta: 0.2 };
+const STEP: u64 = 10_000;
+
+fn start() -> (Time, Ekf) {
+    (Time::from_micros(500_000), Ekf::new(Pose::new(2.0, -1.0, 0.4), 0.05, 0.02))
+}
+
+fn time(step: u64, micros: u64) -> Time {
+    Time::from_micros(500_000 + step * STEP + micros)
+}
+
+/// Motions that differ from one to the next.
+fn motion(step: u64) -> Motion {
+    let mut random = Random::new(step);
+    Motion {
+        start: time(step, 0),
+        end: time(step + 1, 0),
+        displacement: Pose::new(
+            random.uniform(0.005, 0.02),
+            random.uniform(-0.001, 0.001),
+            random.uniform(-0.02, 0.02),
+        ),
+        covariance: Matrix3::from_diagonal(&[1e-6, 2e-7, 3e-7].into()),
+        distance: random.uniform(0.005, 0.02),
+    }
+}
+
+fn correction(random: &mut Random) -> Correction {
+    let mut near = |size: f64| random.uniform(-size, size);
+    let landmark = Point::new(near(8.0), near(8.0));
+    let seen = start().1.pose.compose(&LASER).inverse_transform(&landmark) + Point::new(near(0.02), near(0.02));
+    let covariance = Matrix2::new(4e-4, 1e-4, 1e-4, 2e-4);
+    Correction {
+        observation: Observation::Cartesian(Cartesian { position: seen, covariance }),
+        landmark,
+        landmark_variance: 1e-6,
+    }
+}
+
+fn apply(state: &mut Ekf, correction: &Correction) {
+    let Correction { observation, landmark, landmark_variance } = correction;
+    let linearisation = observation.linearise(&state.pose, &LASER, landmark, *landmark_variance);
+    assert!(linearisation.is_some_and(|linearisation| state.correct(&linearisation)));
+}
+
+/// Everything that was told, in order of time; what is given replaces the state.
+#[derive(Clone, Copy)]
+enum Told {
+    Correction(Correction),
+    State(Ekf),
+}
+
+/// The state at `until` of a filter that is told everything in order of time.
+fn in_order(told: &[(Time, Told)], steps: u64, until: Time) -> Ekf {
+    let mut state = start().1;
+    let mut pending = told.iter().filter(|(at, _)| *at <= until).peekable();
+    for step in 0..steps {
+        let mut rest = motion(step);
+        while let Some((at, what)) = pending.next_if(|(at, _)| *at <= rest.end) {
+            let (first, second) = rest.split(*at);
+            state.predict(&first);
+            match what {
+                Told::Correction(correction) => apply(&mut state, correction),
+                Told::State(given) => state = *given,
+            }
+            rest = second;
+        }
+        if rest.end >= until {
+            state.predict(&rest.split(until).0);
+            return state;
+        }
+        state.predict(&rest);
+    }
+    state
+}
+
+fn assert_same(a: &Ekf, b: &Ekf) {
+    let off = a.pose.between(&b.pose);
+    assert!(off.x.hypot(off.y) < 1e-9 && off.theta.abs() < 1e-9, "{:?} {:?}", a.pose, b.pose);
+    assert!((a.covariance - b.covariance).norm() < 1e-9 * b.covariance.norm(), "{} {}", a.covariance, b.covariance);
+}
+
+#[test]
+fn the_state_at_any_time_is_that_of_what_was_told_until_then() {
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let mut timeline: Timeline<160> = Timeline::new(LASER, 0.1);
+        let (begin, state) = start();
+        timeline.begin(begin, state);
+        assert_eq!((timeline.start(), timeline.now()), (begin, begin));
+        for step in 0..30 {
+            timeline.advance(&motion(step));
+            assert_eq!((timeline.now(), *timeline.last_motion()), (motion(step).end, motion(step)));
+        }
+        let mut told: Vec<(Time, Told)> = Vec::new();
+        for _ in 0..12 {
+            let at = Time::from_micros(500_001 + (random.unit() * 299_998.0) as u64);
+            if random.unit() < 0.2 && told.iter().all(|(other, _)| *other < at) {
+                let given = Ekf::new(Pose::new(random.unit(), random.unit(), 0.1), 0.03, 0.01);
+                assert_eq!(timeline.set_state(at, given), Ok(()));
+                told.push((at, Told::State(given)));
+            } else {
+                let correction = correction(&mut random);
+                let before = in_order(&told, 30, at);
+                let answer = timeline.correct(at, |state| {
+                    assert_same(state, &before);
+                    Some(correction)
+                });
+                assert_eq!(answer, Ok(true));
+                told.push((at, Told::Correction(correction)));
+            }
+            told.sort_by_key(|(at, _)| *at);
+            // Asked for in any order, and at the entries themselves, too.
+            let asked = Time::from_micros(500_000 + (random.unit() * 300_000.0) as u64);
+            for asked in [asked, at, begin, motion(17).end] {
+                match timeline.state_at(asked) {
+                    Ok(state) => assert_same(&state, &in_order(&told, 30, asked)),
+                    Err(error) => assert_eq!(None, Some(error), "{asked:?}"),
+                }
+            }
+        }
+        assert_same(&timeline.state(), &in_order(&told, 30, motion(29).end));
+        // The odometry's own pose has no steps.
+        let odometry = (0..30).fold(start().1.pose, |pose, step| pose.compose(&motion(step).displacement));
+        let off = timeline.odometry_pose().between(&odometry);
+        assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_past_that_is_too_short_forgets_the_oldest_and_nothing_else() {
+    // Room for 8 entries; corrections take places of motions, and the ring is written round several times.
+    let mut random = Random::new(11);
+    let mut timeline: Timeline<8> = Timeline::new(LASER, 0.1);
+    let (begin, state) = start();
+    timeline.begin(begin, state);
+    let mut told: Vec<(Time, Told)> = Vec::new();
+    for step in 0..60 {
+        timeline.advance(&motion(step));
+        for late in [2, 1, 0] {
+            if step >= 3 && random.unit() < 0.4 {
+                let at = time(step - late, 1 + (random.unit() * 9_998.0) as u64);
+                let correction = correction(&mut random);
+                // What is inserted into a full ring may itself be too old.
+                if timeline.correct(at, |_| Some(correction)) == Ok(true) {
+                    told.push((at, Told::Correction(correction)));
+                    told.sort_by_key(|(at, _)| *at);
+                }
+            }
+        }
+        assert_same(&timeline.state(), &in_order(&told, step + 1, motion(step).end));
+    }
+    assert!(told.len() > 40, "{}", told.len());
+    assert_eq!(timeline.state_at(time(40, 0)), Err(TimelineError::TooLate));
+    assert_eq!(timeline.set_state(time(40, 0), state), Err(TimelineError::TooLate));
+}
+
+#[test]
+fn beyond_the_newest_sample_the_last_motion_goes_on_for_a_while() {
+    let mut timeline: Timeline<40> = Timeline::new(LASER, 0.1);
+    let (begin, state) = start();
+    timeline.begin(begin, state);
+    timeline.advance(&motion(0));
+    let last = motion(0);
+    for micros in [1, 4_000, 10_000, 100_000] {
+        let mut expected = in_order(&[], 1, last.end);
+        expected.predict(&last.extrapolate(last.end.offset(micros as f64 * 1e-6)));
+        assert!(timeline.state_at(time(1, micros)).is_ok_and(|state| {
+            assert_same(&state, &expected);
+            true
+        }));
+    }
+    assert_eq!(timeline.state_at(time(1, 100_001)), Err(TimelineError::TooEarly));
+    assert_eq!(timeline.set_state(time(1, 100_001), state), Err(TimelineError::TooEarly));
+    // Nothing was kept of what was only asked for.
+    assert_eq!(timeline.now(), last.end);
+    // Two states are given ahead, and two samples are behind the second one: then the odometry has its way.
+    let given = Ekf::new(Pose::new(7.0, 7.0, 0.0), 0.01, 0.01);
+    for micros in [4_000, 25_000] {
+        assert_eq!(timeline.set_state(time(1, micros), given), Ok(()));
+        assert_eq!(timeline.now(), time(1, micros));
+    }
+    let assumed = last.displacement.fraction(2.5);
+    let until = timeline.odometry_pose().between(&start().1.pose.compose(&last.displacement).compose(&assumed));
+    assert!(until.x.hypot(until.y) < 1e-12 && until.theta.abs() < 1e-12, "{until:?}");
+    for step in 1..5 {
+        timeline.advance(&motion(step));
+        assert_eq!(*timeline.last_motion(), motion(step));
+        assert_eq!(timeline.now(), motion(step).end.max(time(1, 25_000)));
+    }
+    let odometry = (0..5).fold(start().1.pose, |pose, step| pose.compose(&motion(step).displacement));
+    let off = timeline.odometry_pose().between(&odometry);
+    assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
+    let way = (1..5).fold(Pose::default(), |pose, step| pose.compose(&motion(step).displacement));
+    let moved = given.pose.compose(&assumed.between(&way));
+    let off = timeline.state().pose.between(&moved);
+    assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
+}
+
+#[test]
+fn the_motions_between_two_times_are_cut_at_both() {
+    let mut timeline: Timeline<40> = Timeline::new(LASER, 0.1);
+    let (begin, state) = start();
+    timeline.begin(begin, state);
+    for step in 0..20 {
+        timeline.advance(&motion(step));
+    }
+    for (from, to) in [(33_000, 158_000), (30_000, 50_000), (31_000, 34_000), (0, 200_000), (195_000, 215_000)] {
+        let (from, to) = (time(0, from), time(0, to));
+        let motions: Vec<_> = timeline.motions(from, to).collect();
+        assert!(motions.windows(2).all(|pair| pair[0].end == pair[1].start), "{motions:?}");
+        assert_eq!(motions.first().map(|first| first.start), Some(from));
+        assert_eq!(motions.last().map(|last| last.end), Some(to));
+        let mut pose = Pose::default();
+        let (mut variance, mut distance) = (0.0, 0.0);
+        for motion in &motions {
+            assert!(motion.end > motion.start);
+            pose = pose.compose(&motion.displacement);
+            variance += motion.covariance.m11;
+            distance += motion.distance;
+        }
+        // Each is part of one of those that were told; the last of those goes on.
+        let (mut expected, mut expected_distance) = (Pose::default(), 0.0);
+        for step in 0..22 {
+            let whole = if step < 20 {
+                motion(step)
+            } else {
+                Motion { start: time(step, 0), end: time(step + 1, 0), ..motion(19) }
+            };
+            let part = whole.split(from).1.split(to).0;
+            expected = expected.compose(&part.displacement);
+            expected_distance += part.distance;
+        }
+        let off = pose.between(&expected);
+        assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{from:?} {off:?}");
+        assert!((variance - 1e-4 * to.since(from)).abs() < 1e-15, "{variance}");
+        assert!((distance - expected_distance).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_timeline_that_begins_anew_knows_nothing_of_what_was() {
+    let mut timeline: Timeline<40> = Timeline::new(LASER, 0.1);
+    assert!(timeline.begun().is_none() && timeline.begun_mut().is_none());
+    let (begin, state) = start();
+    timeline.begin(begin, state);
+    timeline.advance(&motion(0));
+    assert_eq!(timeline.set_state(time(1, 5_000), state), Ok(()));
+    let (later, other) = (time(7, 0), Ekf::new(Pose::new(-3.0, 1.0, 2.0), 0.1, 0.1));
+    timeline.begin(later, other);
+    assert!(timeline.begun().is_some() && timeline.begun_mut().is_some());
+    assert_eq!((timeline.start(), timeline.now(), timeline.state()), (later, later, other));
+    assert_eq!((*timeline.odometry_pose(), *timeline.last_motion()), (other.pose, Motion::none(later)));
+    timeline.advance(&motion(7));
+    let expected = other.pose.compose(&motion(7).displacement);
+    let off = timeline.state().pose.between(&expected);
+    assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
+}
