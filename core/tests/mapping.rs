@@ -6,7 +6,7 @@ use agv_core::landmarks::{LandmarkKind, Verdict};
 use agv_core::localizer::{LandmarkSource, Localizer, Mode, Parameters, Reason};
 
 use super::support::hall::corners;
-use super::support::stage::{Small, Stage, parameters, reflectors};
+use super::support::stage::{Small, Stage, features, parameters, reflectors};
 
 fn mapping() -> Parameters {
     let mut parameters = parameters();
@@ -343,4 +343,18 @@ fn only_what_is_of_its_kind_and_looks_its_way_is_a_landmark() {
             stage.drive(0.2, 0.0);
         }
     }
+}
+
+#[test]
+fn features_that_no_map_has_are_no_evidence() {
+    let mut stage = without_map(mapping());
+    assert_eq!(stage.localizer.add_landmarks(&features()[..6]), Ok(()));
+    let mut fixed = 0;
+    for _ in 0..20 {
+        stage.drive(0.5, 0.3);
+        stage.scan();
+        fixed += accepted(&stage, LandmarkSource::Fixed);
+        assert!(stage.said().acceptance > 0.95, "{}", stage.said().acceptance);
+    }
+    assert!(fixed > 8, "{fixed}");
 }

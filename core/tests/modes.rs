@@ -1,7 +1,7 @@
 //! What the localiser says of itself in each plight, and why.
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::localizer::{Event, Mode, Outputs, PoseOutput, Reason};
+use agv_core::localizer::{Event, Mode, Outputs, PoseFix, PoseOutput, Reason};
 use agv_core::measurement::{EncoderFault, EncoderFaults, ReflectorObservation};
 
 use super::support::stage::{Stage, parameters};
@@ -287,4 +287,22 @@ fn a_pose_that_is_given_far_beside_the_one_that_was_contradicted_tells_of_a_knoc
     stage.truth = stage.said().pose.compose(&Pose::new(0.0, 0.4, 0.3));
     stage.tell(stage.truth, 0.001, 0.0005);
     assert_eq!(said(&stage.look()), fine);
+}
+
+#[test]
+fn of_a_motion_during_which_a_pose_is_given_the_rest_counts() {
+    for late in [0.0, 0.004, 0.01] {
+        let mut stage = Stage::told(parameters());
+        drive(&mut stage, 2, by_reflectors);
+        let pose = Pose::new(1.0, 1.0, 0.0);
+        let time = stage.time().offset(late);
+        let fix = PoseFix { time, pose, position_deviation: 0.01, heading_deviation: 0.01 };
+        stage.localizer.handle(&Event::SetPose(fix));
+        stage.sample += 1;
+        stage.report(&Pose::new(0.02, 0.0, 0.0));
+        let rest = 0.02 * (1.0 - late / 0.01);
+        assert!((stage.said().pose.x - 1.0 - rest).abs() < 1e-9, "{late} {:?}", stage.said());
+        assert!((stage.said().dead_reckoning_distance - rest).abs() < 1e-9);
+        assert_eq!(stage.said().time, stage.time());
+    }
 }
