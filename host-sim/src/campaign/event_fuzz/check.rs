@@ -66,6 +66,8 @@ fn fits(mode: Mode, reason: Reason) -> bool {
                 | Reason::MotionDisagrees
                 | Reason::Uncertain
                 | Reason::NoLandmarks
+                // The pose that was given is of a time that the odometry has not reached.
+                | Reason::NoPose
         ),
     }
 }
