@@ -83,7 +83,8 @@ fn succeeds(mut command: Command) -> anyhow::Result<bool> {
 /// Installs a command of cargo if it is not there.
 fn install(package: &str, probe: &[&str]) -> anyhow::Result<()> {
     let is_there = || quiet(cargo(probe)).status().is_ok_and(|status| status.success());
-    if !is_there() && !(succeeds(cargo(&["install", "--locked", package]))? && is_there()) {
+    let is_ready = is_there() || (succeeds(cargo(&["install", "--locked", package]))? && is_there());
+    if !is_ready {
         bail!("{package} is missing; `cargo install --locked {package}` brings it");
     }
     Ok(())
