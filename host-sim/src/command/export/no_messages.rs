@@ -19,11 +19,4 @@ pub fn mcap(
     anyhow::bail!(BAGS)
 }
 
-pub fn rosbag2(
-    _: &Path,
-    _: &Recording,
-    _: &Replay,
-    _: Box<dyn FnMut(usize)>,
-) -> anyhow::Result<BTreeMap<&'static str, u64>> {
-    anyhow::bail!(BAGS)
-}
+pub use mcap as rosbag2;
