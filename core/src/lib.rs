@@ -10,8 +10,8 @@
 //! |---|---|
 //! | 5 | [`record`] |
 //! | 4 | [`localizer`] |
-//! | 3 | [`calibration`], [`features`], [`filter`], [`places`] |
-//! | 2 | [`odometry`], [`landmarks`], [`wire`] |
+//! | 3 | [`calibration`], [`filter`], [`relocalization`] |
+//! | 2 | [`maps`], [`odometry`], [`sensing`] |
 //! | 1 | [`geometry`], [`measurement`], [`order`], [`state`] |
 //!
 //! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.
@@ -22,15 +22,14 @@
 #![forbid(unsafe_code)]
 
 pub mod calibration;
-pub mod features;
 pub mod filter;
 pub mod geometry;
-pub mod landmarks;
 pub mod localizer;
+pub mod maps;
 pub mod measurement;
 pub mod odometry;
 pub mod order;
-pub mod places;
 pub mod record;
+pub mod relocalization;
+pub mod sensing;
 pub mod state;
-pub mod wire;

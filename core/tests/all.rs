@@ -3,7 +3,6 @@
 mod augmented_filter;
 mod augmented_places;
 mod calibration;
-mod can;
 mod consistency;
 mod covariance_repair;
 mod drift_check;
@@ -23,10 +22,8 @@ mod motion_check;
 mod moving_laser;
 mod odometry;
 mod order;
-mod orthogonal_corners;
 mod output_predictor;
 mod overflow;
-mod places;
 mod pose_output;
 mod prediction;
 mod record;
@@ -38,7 +35,6 @@ mod start_search;
 mod support;
 mod timeline;
 mod uncertain_motion;
-mod wire;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
 #[test]

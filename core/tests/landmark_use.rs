@@ -1,8 +1,8 @@
 //! What is told of each observation, worked out by hand from the pose before it and its covariance.
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::LandmarkSource;
+use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::ReflectorObservation;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2};
 

@@ -1,7 +1,7 @@
 //! Maps and association, against brute force and a literal reading of Algorithm 1.
 
 use agv_core::geometry::Point;
-use agv_core::landmarks::{
+use agv_core::maps::{
     DynamicMap, DynamicMapParameters, FixedMap, Landmark, LandmarkKind, MapError, NearestNeighbour, Verdict,
 };
 use proptest::prelude::*;

@@ -1,14 +1,14 @@
 //! The localiser as a whole: what it says of itself, and that nothing from outside can hurt it.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use agv_core::features::{ReflectorDetection, falko};
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason};
+use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
     EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time,
 };
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_core::sensing::{ReflectorDetection, falko};
 use proptest::prelude::*;
 
 type Small = Localizer<360, 64, 64, 32>;

@@ -2,8 +2,8 @@
 
 use agv_core::filter::BiasDeviations;
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{LandmarkKind, Verdict};
 use agv_core::localizer::{LandmarkSource, Localizer, Mode, Parameters, Reason};
+use agv_core::maps::{LandmarkKind, Verdict};
 
 use super::support::hall::corners;
 use super::support::stage::{Small, Stage, features, parameters, reflectors};

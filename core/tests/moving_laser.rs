@@ -1,8 +1,8 @@
 //! What is seen in one revolution is seen from different places: each observation is used where the laser was.
 
-use agv_core::features::ReflectorDetection;
-use agv_core::landmarks::{LandmarkKind, Verdict};
 use agv_core::localizer::{MapUse, Mode, Parameters};
+use agv_core::maps::{LandmarkKind, Verdict};
+use agv_core::sensing::ReflectorDetection;
 
 use super::support::stage::{Stage, parameters, reflectors};
 

@@ -4,12 +4,12 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::support::hall::{cast, corners};
-use agv_core::features::falko::{Detector, Parameters as Falko};
-use agv_core::features::{Keypoint, PointScan, ReflectorDetection, detect_reflectors};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Localizer, OBSERVATIONS, Parameters, PoseFix};
 use agv_core::measurement::{ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
+use agv_core::sensing::falko::{Detector, Parameters as Falko};
+use agv_core::sensing::{Keypoint, PointScan, ReflectorDetection, detect_reflectors};
 
 /// How many of these directions, rad, lie in each quarter of a turn.
 fn quarters(bearings: impl Iterator<Item = f64>) -> [usize; 4] {

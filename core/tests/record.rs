@@ -2,18 +2,18 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind, Verdict};
 use agv_core::localizer::{
-    Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
+    Capacities, Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
 };
+use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
     EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample,
     Time,
 };
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
-    Capacities, DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Raw, RawSource, Record,
-    Reference, Scratch, Step, Truth, encode,
+    DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Raw, RawSource, Record, Reference, Scratch,
+    Step, Truth, encode,
 };
 use proptest::prelude::*;
 
@@ -470,7 +470,8 @@ fn another_version_is_told_apart_from_damage() {
 fn the_header_of_a_localiser_s_log_states_its_room() {
     let parameters = Parameters::new(Vehicle::Increments, Pose::default());
     let mut buffer = vec![0; MAX_FRAME];
-    let header = Localizer::<360, 64, 32, 8>::header("test", &parameters);
+    let capacities = Localizer::<360, 64, 32, 8>::CAPACITIES;
+    let header = Header { software: "test", parameters: &parameters, capacities };
     let length = encode(&Record::Header(header), 0, &mut buffer).unwrap();
     let mut scratch = Box::new(Scratch::<1, 1>::new());
     let (_, Step::Item(Item::Record { record: Record::Header(read), .. })) =

@@ -3,9 +3,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::features::{ReflectorDetection, detect_reflectors};
 use agv_core::geometry::{Point, Pose, difference};
 use agv_core::measurement::{ReflectorObservation, Scan, Time};
+use agv_core::sensing::{ReflectorDetection, detect_reflectors};
 use proptest::prelude::*;
 
 const BEAMS: usize = 1440;

@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{FixedMap, Landmark};
-use agv_core::places::{
-    IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
-    RelocalizationParameters, RelocalizationProgress,
+use agv_core::maps::{FixedMap, Landmark};
+use agv_core::relocalization::{
+    ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters,
+    RelocalizationProgress,
 };
 use proptest::prelude::*;
 
@@ -22,7 +22,7 @@ impl Hall {
         let reflectors: Vec<Landmark> =
             (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.002)).collect();
         map.extend(&reflectors).unwrap();
-        index.build(&map);
+        index.build(map.view());
         Self { map, index }
     }
 
@@ -32,7 +32,7 @@ impl Hall {
         for position in seen {
             snapshot.see(position, position.norm(), &ReflectorNoise::default());
         }
-        let reflectors = IndexedReflectors { map: &self.map, index: &self.index };
+        let reflectors = self.index.of(self.map.view());
         let mut relocalizer = ReflectorRelocalizer::<64>::new(RelocalizationParameters::default());
         relocalizer.begin(&snapshot, &reflectors);
         for _ in 0..10_000_000 {
@@ -141,8 +141,8 @@ fn no_step_takes_much_more_than_its_slice() {
         for (id, position) in (0..).zip(&map_positions) {
             map.extend(&[Landmark::reflector(id, *position, 0.002)]).unwrap();
         }
-        index.build(&map);
-        let reflectors = IndexedReflectors { map: &map, index: &index };
+        index.build(map.view());
+        let reflectors = index.of(map.view());
         let mut snapshot = ReflectorSnapshot::<64>::new();
         for position in &seen_positions {
             snapshot.see(position, position.norm(), &ReflectorNoise::default());

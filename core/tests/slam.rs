@@ -4,13 +4,13 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::support::hall::{cast, corners};
-use agv_core::features::ReflectorDetection;
 use agv_core::filter::{augmented_states, packed_entries};
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::LandmarkKind;
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
+use agv_core::maps::LandmarkKind;
 use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
+use agv_core::sensing::ReflectorDetection;
 
 const BEAMS: usize = 1440;
 const KEYS: usize = 2;

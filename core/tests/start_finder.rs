@@ -2,11 +2,11 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{FixedMap, Landmark};
 use agv_core::localizer::{Event, Parameters, PoseFix, StartFinder, StartState};
+use agv_core::maps::{FixedMap, Landmark};
 use agv_core::measurement::{EncoderFault, EncoderFaults, PoseIncrement, ReflectorObservation, Reflectors, Time};
 use agv_core::odometry::Vehicle;
-use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
+use agv_core::relocalization::{ReflectorIndex, RelocalizationParameters};
 use proptest::prelude::*;
 
 /// Time of a revolution, s.
@@ -26,13 +26,13 @@ impl Search {
         let reflectors: Vec<Landmark> =
             (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.002)).collect();
         map.extend(&reflectors).unwrap();
-        index.build(&map);
+        index.build(map.view());
         let finder = StartFinder::new(parameters, RelocalizationParameters::default());
         Self { map, index, finder, laser: parameters.laser }
     }
 
     fn tell(&mut self, event: &Event) -> StartState {
-        let reflectors = IndexedReflectors { map: &self.map, index: &self.index };
+        let reflectors = self.index.of(self.map.view());
         self.finder.handle(event, &reflectors);
         self.finder.search(&reflectors, u32::MAX)
     }

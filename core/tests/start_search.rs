@@ -1,15 +1,15 @@
 //! Finding the pose of a vehicle that is switched on, in slices, from what it sees while it stands or drives.
 #![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_core::features::ReflectorDetection;
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{FixedMap, Landmark};
 use agv_core::localizer::{
     EFFORT_A_REVOLUTION, Event, Mode, Parameters, PoseFix, StartFinder, StartSearch, StartState,
 };
+use agv_core::maps::{FixedMap, Landmark};
 use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Time};
-use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
-use agv_core::wire::can::controller;
+use agv_core::relocalization::{ReflectorIndex, RelocalizationParameters};
+use agv_core::sensing::ReflectorDetection;
+use agv_core::state::Relocalization;
 
 use super::support::stage::{LASER, Stage, parameters, reflectors};
 
@@ -43,23 +43,23 @@ impl Search {
     fn new(landmarks: &[Landmark], is_wanted: bool) -> Self {
         let map = map(landmarks);
         let mut search = Box::new(StartSearch::new(&parameters(), is_wanted));
-        search.index(&map);
-        assert_eq!(search.state(), controller::StartSearch::Idle);
+        search.index(map.view());
+        assert_eq!(search.state(), Relocalization::Idle);
         Self { map, search, mode: Mode::NotLocalised }
     }
 
     fn see(&mut self, observations: &[ReflectorObservation]) {
-        self.search.handle(&Event::Reflectors(Reflectors { observations }), self.mode, &self.map);
+        self.search.handle(&Event::Reflectors(Reflectors { observations }), self.mode, self.map.view());
     }
 
     /// Slices until there is nothing more to do.
     fn found(&mut self) -> Option<PoseFix> {
         for _ in 0..=EFFORT_A_REVOLUTION / 2_000 {
-            let (goes_on, fix) = self.search.advance(&self.map);
+            let (goes_on, fix) = self.search.advance(self.map.view());
             if fix.is_some() || !goes_on {
                 return fix;
             }
-            assert_eq!(self.search.state(), controller::StartSearch::Searching);
+            assert_eq!(self.search.state(), Relocalization::Searching);
         }
         None
     }
@@ -75,7 +75,7 @@ fn a_vehicle_that_does_not_know_where_it_is_finds_it() {
     for mode in [Mode::NotLocalised, Mode::Lost] {
         let mut search = Search::new(&reflectors(), true);
         search.mode = mode;
-        assert_eq!(search.search.advance(&search.map), (false, None), "nothing has been seen");
+        assert_eq!(search.search.advance(search.map.view()), (false, None), "nothing has been seen");
         search.see(&view(&pose));
         let fix = search.found();
         assert!(fix.is_some_and(|fix| is_near(&fix, &pose) && fix.time == Time::from_seconds(2.0)), "{fix:?}");
@@ -84,7 +84,7 @@ fn a_vehicle_that_does_not_know_where_it_is_finds_it() {
         // The localiser knows it now.
         search.mode = Mode::Reflectors;
         search.see(&view(&pose));
-        assert_eq!(search.search.state(), controller::StartSearch::Idle);
+        assert_eq!(search.search.state(), Relocalization::Idle);
         assert_eq!(search.found(), None);
     }
 }
@@ -98,7 +98,7 @@ fn who_knows_it_or_does_not_want_to_does_not_search() {
         let mut search = Search::new(&reflectors(), is_wanted);
         search.mode = mode;
         search.see(&view(&pose));
-        assert_eq!((search.found(), search.search.state()), (None, controller::StartSearch::Idle), "{mode:?}");
+        assert_eq!((search.found(), search.search.state()), (None, Relocalization::Idle), "{mode:?}");
     }
 }
 
@@ -107,7 +107,7 @@ fn a_search_without_a_pose_says_why() {
     let pose = Pose::new(1.0, 0.5, 2.0);
     let mut search = Search::new(&reflectors(), true);
     search.see(&view(&pose)[..3]);
-    assert_eq!((search.found(), search.search.state()), (None, controller::StartSearch::TooFew));
+    assert_eq!((search.found(), search.search.state()), (None, Relocalization::TooFew));
     let mut search = Search::new(&reflectors(), true);
     let elsewhere: Vec<_> = (0..9)
         .map(|index| {
@@ -117,7 +117,7 @@ fn a_search_without_a_pose_says_why() {
         })
         .collect();
     search.see(&elsewhere);
-    assert_eq!((search.found(), search.search.state()), (None, controller::StartSearch::Unknown));
+    assert_eq!((search.found(), search.search.state()), (None, Relocalization::Unknown));
     // A hall that looks the same from both ends.
     let half = reflectors();
     let other = half.iter().map(|one| Landmark::reflector(one.id + 20, -one.position(), one.deviation));
@@ -125,10 +125,10 @@ fn a_search_without_a_pose_says_why() {
     let mut search = Search::new(&both, true);
     let seen: Vec<_> = both.iter().map(|landmark| at(&pose, landmark, Time::from_seconds(2.0))).collect();
     search.see(&seen);
-    assert_eq!((search.found(), search.search.state()), (None, controller::StartSearch::Ambiguous));
+    assert_eq!((search.found(), search.search.state()), (None, Relocalization::Ambiguous));
     // While it searches anew, the last answer stands.
     search.see(&seen);
-    assert_eq!(search.search.state(), controller::StartSearch::Ambiguous);
+    assert_eq!(search.search.state(), Relocalization::Ambiguous);
 }
 
 struct Finder {
@@ -149,7 +149,7 @@ impl Finder {
         let parameters: Parameters = parameters();
         let map = map(&reflectors());
         let mut index = Box::new(ReflectorIndex::new());
-        index.build(&map);
+        index.build(map.view());
         let finder = StartFinder::new(parameters, RelocalizationParameters::default());
         let mut finder = Self { map, index, finder, pose: Pose::new(-3.0, 0.5, 0.2), time: 5.0 };
         finder.drive(0.0, 1);
@@ -157,7 +157,7 @@ impl Finder {
     }
 
     fn tell(&mut self, event: &Event) {
-        self.finder.handle(event, &IndexedReflectors { map: &self.map, index: &self.index });
+        self.finder.handle(event, &self.index.of(self.map.view()));
     }
 
     fn drive(&mut self, speed: f64, samples: usize) {
@@ -183,7 +183,7 @@ impl Finder {
     }
 
     fn search(&mut self) -> StartState {
-        self.finder.search(&IndexedReflectors { map: &self.map, index: &self.index }, u32::MAX)
+        self.finder.search(&self.index.of(self.map.view()), u32::MAX)
     }
 
     fn found(&mut self) -> Option<PoseFix> {

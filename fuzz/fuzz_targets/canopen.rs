@@ -2,13 +2,13 @@
 
 use agv_core::measurement::Time;
 use agv_core::odometry::CounterRange;
-use agv_core::wire::can::canopen::{Message, NodeId};
-use agv_core::wire::can::controller::{Content, OrderReceiver, PoseReceiver};
-use agv_core::wire::can::encoder::{EncoderSettings, Reporting};
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
-use agv_core::wire::can::frame::{Frame, extended_id, standard_id};
-use agv_core::wire::can::sdo::{Request, Response};
-use agv_core::wire::can::supervision::SupervisionLimits;
+use agv_wire::can::canopen::{Message, NodeId};
+use agv_wire::can::controller::{Content, OrderReceiver, PoseReceiver};
+use agv_wire::can::encoder::{EncoderSettings, Reporting};
+use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::frame::{Frame, extended_id, standard_id};
+use agv_wire::can::sdo::{Request, Response};
+use agv_wire::can::supervision::SupervisionLimits;
 use libfuzzer_sys::fuzz_target;
 
 /// Bytes of one frame: 2 of time, 2 of identifier and kind, 1 of length, 8 of data.

@@ -1,6 +1,6 @@
 #![no_main]
 
-use agv_core::wire::cola::Dialect;
+use agv_wire::cola::Dialect;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

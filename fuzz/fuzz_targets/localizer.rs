@@ -1,6 +1,6 @@
 #![no_main]
 
-use agv_host_sim::campaign::event_fuzz;
+use agv_lab::campaign::event_fuzz;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -1,6 +1,6 @@
 #![no_main]
 
-use agv_core::wire::can::slcan::{Decoder, Message};
+use agv_wire::can::slcan::{Decoder, Message};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -1,8 +1,8 @@
 //! What the targets have in common.
 
 use agv_core::measurement::Time;
-use agv_core::wire::cola::{Deframed, Deframer, Dialect};
-use agv_core::wire::nav350::{Answer, DeviceTime, MethodResult, Request, Revolution, SensorClock, SensorFrame};
+use agv_wire::cola::{Deframed, Deframer, Dialect};
+use agv_wire::nav350::{Answer, DeviceTime, MethodResult, Request, Revolution, SensorClock, SensorFrame};
 
 /// Everything that a payload goes through. What was read must be written and read again as the same.
 pub fn decode(dialect: Dialect, payload: &[u8]) {

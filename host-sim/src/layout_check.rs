@@ -12,16 +12,16 @@ pub use page::page;
 use std::collections::BTreeMap;
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{FixedMap, Landmark, MapError};
 use agv_core::localizer::ReflectorParameters;
-use agv_core::places::{
+use agv_core::maps::{FixedMap, Landmark, MapError};
+use agv_core::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
 };
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::evaluate::accuracy::Spread;
+use crate::accuracy::Spread;
 
 /// Most reflectors of a layout.
 pub const REFLECTORS: usize = 1024;
@@ -161,12 +161,12 @@ impl Check {
 /// # Errors
 /// If there are too many reflectors, or one is nowhere.
 pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, MapError> {
-    let (mut map, mut index) = (Box::new(FixedMap::new()), Box::new(ReflectorIndex::new()));
+    let (mut map, mut index) = (Box::new(FixedMap::<REFLECTORS>::new()), Box::new(ReflectorIndex::<4096>::new()));
     let reflectors: Vec<Landmark> =
         (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.0)).collect();
     map.extend(&reflectors)?;
-    index.build(&map);
-    let map = IndexedReflectors { map: &map, index: &index };
+    index.build(map.view());
+    let map = index.of(map.view());
     let places = grid(positions, options.spacing);
     let looked: Vec<CheckedPlace> = places
         .par_iter()
@@ -218,7 +218,7 @@ fn look(
     place: &Point,
     positions: &[Point],
     options: &CheckOptions,
-    map: &IndexedReflectors<REFLECTORS, 4096>,
+    map: &IndexedReflectors,
     relocalizer: &mut ReflectorRelocalizer<64>,
 ) -> CheckedPlace {
     let mut near: Vec<_> = positions

@@ -11,8 +11,8 @@ mod drawing;
 use std::path::Path;
 use std::str::FromStr;
 
-use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
+use agv_core::maps::{Landmark, LandmarkKind};
+use agv_wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
 
 use crate::mapping::map_file;
 use crate::text_file::{self, TextFileError};

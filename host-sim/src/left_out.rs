@@ -10,6 +10,18 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
+    /// What is there only with a feature of the command's package.
+    #[must_use]
+    pub const fn unless(is_built: bool, what: &'static str, feature: &'static str) -> Self {
+        Self { what, feature, is_left_out: !is_built }
+    }
+
+    /// The feature that builds it.
+    #[must_use]
+    pub const fn feature(&self) -> &'static str {
+        self.feature
+    }
+
     /// Asks for the part, before work is begun that ends with it.
     ///
     /// # Errors
@@ -20,41 +32,15 @@ impl LeftOut {
 }
 
 /// Recordings of ROS 2.
-pub const BAGS: LeftOut =
-    LeftOut { what: "recordings of ROS 2 (MCAP, rosbag2)", feature: "bags", is_left_out: !cfg!(feature = "bags") };
+pub const BAGS: LeftOut = LeftOut::unless(cfg!(feature = "bags"), "recordings of ROS 2 (MCAP, rosbag2)", "bags");
 
 /// Layouts as drawings.
-pub const DRAWINGS: LeftOut =
-    LeftOut { what: "drawings (.dxf)", feature: "drawings", is_left_out: !cfg!(feature = "drawings") };
+pub const DRAWINGS: LeftOut = LeftOut::unless(cfg!(feature = "drawings"), "drawings (.dxf)", "drawings");
 
 /// Point clouds for other programs.
-pub const POINT_CLOUDS: LeftOut = LeftOut {
-    what: "point clouds (.pcd, .ply, .las)",
-    feature: "point-clouds",
-    is_left_out: !cfg!(feature = "point-clouds"),
-};
+pub const POINT_CLOUDS: LeftOut =
+    LeftOut::unless(cfg!(feature = "point-clouds"), "point clouds (.pcd, .ply, .las)", "point-clouds");
 
 /// Mapping without known poses.
 pub const POSE_GRAPHS: LeftOut =
-    LeftOut { what: "mapping from unknown poses", feature: "pose-graphs", is_left_out: !cfg!(feature = "pose-graphs") };
-
-/// Results of campaigns as Parquet.
-pub const TABLES: LeftOut =
-    LeftOut { what: "tables (.parquet)", feature: "tables", is_left_out: !cfg!(feature = "tables") };
-
-#[cfg(test)]
-mod tests {
-    use super::{BAGS, DRAWINGS, POINT_CLOUDS, POSE_GRAPHS, TABLES};
-
-    #[test]
-    fn what_is_left_out_names_a_feature_of_the_package() {
-        let manifest: toml::Table = include_str!("../Cargo.toml").parse().unwrap();
-        let features = manifest["features"].as_table().unwrap();
-        let full = features["full"].as_array().unwrap();
-        for part in [BAGS, DRAWINGS, POINT_CLOUDS, POSE_GRAPHS, TABLES] {
-            assert!(features.contains_key(part.feature), "{part}");
-            assert!(full.iter().any(|feature| feature.as_str() == Some(part.feature)), "{part}");
-        }
-        assert_eq!(full.len(), 5);
-    }
-}
+    LeftOut::unless(cfg!(feature = "pose-graphs"), "mapping from unknown poses", "pose-graphs");

@@ -1,13 +1,14 @@
 //! The localiser on a desktop: simulation, replay, import, evaluation and reports.
 
+pub mod accuracy;
 pub mod bus;
 pub mod calibrate;
-pub mod campaign;
 pub mod data;
+pub mod drive;
 pub mod emulate;
-pub mod evaluate;
 pub mod export;
 pub mod file_kind;
+pub mod hdl64e_packets;
 pub mod import;
 pub mod layout_check;
 pub mod layout_file;

@@ -5,8 +5,8 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use agv_core::landmarks::Landmark;
 use agv_core::localizer::{Localizer, Parameters};
+use agv_core::maps::Landmark;
 use agv_core::record::{
     self, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
     LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Output, Record, Scratch,
@@ -246,7 +246,8 @@ impl Writer {
     /// # Errors
     /// If the file cannot be written.
     pub fn begin(path: &Path, parameters: &Parameters, landmarks: &[Landmark]) -> Result<Self, LogError> {
-        let mut writer = Self::create(path, &<Localizer>::header(SOFTWARE, parameters))?;
+        let capacities = <Localizer>::CAPACITIES;
+        let mut writer = Self::create(path, &Header { software: SOFTWARE, parameters, capacities })?;
         for piece in landmarks.chunks(LANDMARKS_A_RECORD) {
             writer.write(&Record::Landmarks(piece))?;
         }

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use agv_core::features::falko::{Detector, Parameters};
-use agv_core::features::{Keypoint, PointScan};
 use agv_core::geometry::{Pose, ScanPoint};
 use agv_core::measurement::Time;
-use agv_core::places::{
+use agv_core::sensing::falko::{Detector, Parameters};
+use agv_core::sensing::{Keypoint, PointScan};
+use agv_places::{
     Candidate, Glare, GlareParameters, GlareTables, PlaceIndex, PlaceView, RecognitionParameters, Recognizer,
 };
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! What a controller's flash holds when it is delivered: settings, map and key.
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_settings::Settings;
 use agv_settings::store::{KEY, PIECE, Store, StoreError};
 use embedded_storage::nor_flash::{

@@ -1,8 +1,8 @@
 //! A drive in memory: what the sensors said, in the order of arrival, and apart from that where the vehicle really was.
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::Landmark;
 use agv_core::localizer::{Event, LandmarkUse, Parameters, PoseFix, PoseOutput};
+use agv_core::maps::Landmark;
 use agv_core::measurement::{
     EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
 };

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::localizer::{Parameters, PoseFix};
+use agv_core::localizer::{Capacities, Parameters, PoseFix};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, SpeedSample, Time};
 use agv_core::odometry::Vehicle;
-use agv_core::record::{Capacities, Damage, DamageReason, Header, Item, Record};
+use agv_core::record::{Damage, DamageReason, Header, Item, Record};
 use agv_host_sim::log::{self, LogError, Reader, Writer};
 use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording, Reference, Truth};
 use proptest::prelude::*;

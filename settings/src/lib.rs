@@ -5,7 +5,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod encoders;
 pub mod leaf;
 mod leaves;
 pub mod service;

@@ -4,7 +4,7 @@
 //! moment its index is written, so that a loss of power leaves the old map or the new one. Flash whose words can be
 //! written once only will do.
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_core::record::LANDMARKS_A_RECORD;
 use embassy_futures::block_on;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};

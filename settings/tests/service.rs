@@ -2,7 +2,7 @@
 
 mod support;
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use agv_settings::leaf::Value;
 use agv_settings::service::authentication::{Nonce, tag};

@@ -12,13 +12,13 @@ use std::time::Instant;
 
 use agv_core::geometry::difference;
 use agv_core::measurement::Time;
-use agv_core::wire::nav350::{Configuration, Revolution, SensorFrame};
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::{Happening, Link};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options, Turn};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_tests::{is_on_path, skip};
+use agv_wire::nav350::{Configuration, Revolution, SensorFrame};
 
 const NAME: &str = "the_session_holds_on_a_bad_network";
 /// Set for the program inside.

@@ -13,13 +13,6 @@ use agv_core::localizer::{Event, Localizer, PoseFix};
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::state::Mode;
-use agv_core::wire::can::canopen::{Message, NodeId, transmit_pdo_id};
-use agv_core::wire::can::controller::{Health, OrderReceiver, PosePublisher, PoseReceiver};
-use agv_core::wire::can::controller_node::ControllerNode;
-use agv_core::wire::can::encoder::{EncoderSettings, EncoderState};
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
-use agv_core::wire::can::frame::{Frame, Id};
-use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::emulate::foreign_traffic::ForeignTraffic;
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions, Watch};
@@ -28,6 +21,13 @@ use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
 use agv_tests::{emulator, image, too_busy};
+use agv_wire::can::canopen::{Message, NodeId, transmit_pdo_id};
+use agv_wire::can::controller::{Health, OrderReceiver, PosePublisher, PoseReceiver};
+use agv_wire::can::controller_node::ControllerNode;
+use agv_wire::can::encoder::{EncoderSettings, EncoderState};
+use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::frame::{Frame, Id};
+use agv_wire::can::supervision::SupervisionLimits;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -100,9 +100,9 @@ fn priority(frame: &Frame) -> u32 {
 fn frames_are_as_long_as_the_standard_says() {
     let data = |length: usize| [0x55; 8][..length].to_vec();
     for count in 0..=8 {
-        let standard = Frame::new(agv_core::wire::can::frame::standard_id(0x2AA), &data(count)).unwrap();
-        let extended = Frame::new(agv_core::wire::can::frame::extended_id(0x0AAA_AAAA), &data(count)).unwrap();
-        let zero = Frame::new(agv_core::wire::can::frame::standard_id(0), &vec![0; count]).unwrap();
+        let standard = Frame::new(agv_wire::can::frame::standard_id(0x2AA), &data(count)).unwrap();
+        let extended = Frame::new(agv_wire::can::frame::extended_id(0x0AAA_AAAA), &data(count)).unwrap();
+        let zero = Frame::new(agv_wire::can::frame::standard_id(0), &vec![0; count]).unwrap();
         let count = count as u64;
         // Without a stuffed bit a frame has 47 or 67 bits and those of its data; one in four can be stuffed.
         assert_eq!(plain_bits(&standard).len() as u64 + 13, 47 + 8 * count);
@@ -113,7 +113,7 @@ fn frames_are_as_long_as_the_standard_says() {
         }
     }
     // 34 equal bits: every fifth is followed by a stuffed one.
-    assert_eq!(length(&Frame::new(agv_core::wire::can::frame::standard_id(0), &[]).unwrap()), 47 + 6);
+    assert_eq!(length(&Frame::new(agv_wire::can::frame::standard_id(0), &[]).unwrap()), 47 + 6);
 }
 
 /// A frame that waits, and since when.

@@ -1,6 +1,6 @@
 //! The real tricycle, held to what its calibration must show.
 
-use agv_host_sim::evaluate::calibration::sapienza::{self, Fit};
+use agv_lab::evaluate::calibration::sapienza::{self, Fit};
 use agv_tests::recordings;
 
 #[test]

@@ -5,11 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use agv_host_sim::campaign::results::Row;
-use agv_host_sim::campaign::soak::soak;
-use agv_host_sim::campaign::table::table;
-use agv_host_sim::campaign::{Campaign, Shard};
 use agv_host_sim::simulate::scenario::Scenario;
+use agv_lab::campaign::results::Row;
+use agv_lab::campaign::soak::soak;
+use agv_lab::campaign::table::table;
+use agv_lab::campaign::{Campaign, Shard};
 
 fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)

@@ -109,7 +109,7 @@ fn a_lost_worker_changes_nothing() {
 
     let cluster = folder.join("cluster.parquet");
     let mut driver = python
-        .arg(repository("host-sim/ray/campaign.py"))
+        .arg(repository("lab/ray/campaign.py"))
         .args([campaign, "--workers", "2", "--shards", "6", "--agv"])
         .arg(&agv)
         .arg("--output")

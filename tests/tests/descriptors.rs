@@ -2,9 +2,10 @@
 
 use std::f32::consts::{PI, TAU};
 
-use agv_core::features::falko::{Parameters, Sectors};
-use agv_core::features::{BinaryShapeContext, CumulativeGaussianHistogram, Kernel, Keypoint, PointScan};
-use agv_host_sim::evaluate::falko::{BEAMS, RANGES, ReferenceKeypoint, Set, detect};
+use agv_core::sensing::falko::{Parameters, Sectors};
+use agv_core::sensing::{Keypoint, PointScan};
+use agv_lab::evaluate::falko::{BEAMS, RANGES, ReferenceKeypoint, Set, detect};
+use agv_places::{BinaryShapeContext, CumulativeGaussianHistogram, Kernel};
 use agv_tests::recordings;
 
 /// Radius of the descriptors in the reference file, m.

@@ -4,16 +4,16 @@ use std::path::Path;
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{MapUse, Mode, PoseOutput};
-use agv_host_sim::evaluate::carpark::{self, Knowledge, Noise};
-use agv_host_sim::evaluate::slam::OfficeDrive;
-use agv_host_sim::evaluate::warehouse::{Map, Method, PATHS, experiment};
-use agv_host_sim::evaluate::warehouse_disturbance::Disturbance;
-use agv_host_sim::evaluate::windows::{Candidate, Worsening, drift};
 use agv_host_sim::recording::truth_at;
 use agv_host_sim::replay::replay;
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
 use agv_host_sim::simulate::simulate;
+use agv_lab::evaluate::carpark::{self, Knowledge, Noise};
+use agv_lab::evaluate::slam::OfficeDrive;
+use agv_lab::evaluate::warehouse::{Map, Method, PATHS, experiment};
+use agv_lab::evaluate::warehouse_disturbance::Disturbance;
+use agv_lab::evaluate::windows::{Candidate, Worsening, drift};
 use agv_tests::recordings;
 
 #[test]

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use agv_core::features::falko::Parameters;
-use agv_host_sim::evaluate::falko::{Set, detect, positions, reference_match};
-use agv_host_sim::evaluate::repeatability;
+use agv_core::sensing::falko::Parameters;
 use agv_host_sim::export;
+use agv_lab::evaluate::falko::{Set, detect, positions, reference_match};
+use agv_lab::evaluate::repeatability;
 use agv_tests::{python, recordings};
 
 const SETS: [(&str, Set); 2] = [("fr079", Set::Fr079), ("intel", Set::Intel)];
@@ -65,7 +65,7 @@ fn repeatability_beats_the_reference_program_by_the_independent_score() {
 fn score_by_script(
     script: &PathBuf,
     scans: &[agv_host_sim::import::PosedScan],
-    keypoints: Vec<Vec<agv_core::features::Keypoint>>,
+    keypoints: Vec<Vec<agv_core::sensing::Keypoint>>,
 ) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();
     export::keypoints::write(folder.path(), scans.iter().zip(keypoints)).unwrap();

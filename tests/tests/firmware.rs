@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use agv_host_sim::evaluate::demonstration;
 use agv_host_sim::{log, replay};
+use agv_lab::evaluate::demonstration;
 use agv_tests::{emulator, image};
 
 /// The folder of the images of the emulated board. None, and a word about it, if one is missing or there is no emulator.

@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::Verdict;
+use agv_core::maps::Verdict;
 use agv_core::measurement::Time;
-use agv_host_sim::evaluate::demonstration::{self, LocalisedDrive};
+use agv_lab::evaluate::demonstration::{self, LocalisedDrive};
 
 /// Time between the lines of a table, s.
 const INTERVAL: f64 = 0.5;

@@ -1,19 +1,19 @@
 //! Recognition of places, mapping, and finding oneself, held to what they must show.
 
-use agv_core::landmarks::Landmark;
-use agv_core::places::RelocalizationParameters;
-use agv_host_sim::evaluate::falko::Set;
-use agv_host_sim::evaluate::features::{DetectorKind, run as measure_features};
-use agv_host_sim::evaluate::kidnapping::{Case, feature_map, run as kidnap};
-use agv_host_sim::evaluate::places::{Combination, Experiment, Method, Mode, Outcome, Protocol};
-use agv_host_sim::evaluate::repeatability::overlapping_pairs;
-use agv_host_sim::evaluate::slam::{OfficeDrive, run as map_office};
+use agv_core::maps::Landmark;
+use agv_core::relocalization::RelocalizationParameters;
 use agv_host_sim::mapping::slam::SlamParameters;
 use agv_host_sim::mapping::{Clustering, map_features_at, slam_poses};
 use agv_host_sim::places::{FindParameters, Observer, PlaceAnswer, PlaceMap, Spacing, choose};
 use agv_host_sim::simulate::block_storage::BlockStoragePath;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_lab::evaluate::falko::Set;
+use agv_lab::evaluate::features::{DetectorKind, run as measure_features};
+use agv_lab::evaluate::kidnapping::{Case, feature_map, run as kidnap};
+use agv_lab::evaluate::places::{Combination, Experiment, Method, Mode, Outcome, Protocol};
+use agv_lab::evaluate::repeatability::overlapping_pairs;
+use agv_lab::evaluate::slam::{OfficeDrive, run as map_office};
 use agv_tests::recordings;
 
 fn recognise(set: Set, asked: &[(Protocol, Mode)]) -> Vec<Outcome> {

@@ -9,7 +9,7 @@ use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_core::measurement::EncoderSample;
 use agv_core::state::Mode;
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions, Watch};

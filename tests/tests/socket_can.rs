@@ -13,15 +13,15 @@ use std::time::{Duration, Instant};
 
 use agv_core::measurement::Time;
 use agv_core::odometry::CounterRange;
-use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::encoder::EncoderSettings;
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
-use agv_core::wire::can::frame::{AnyFrame, FdFrame, Frame, extended_id, standard_id};
-use agv_core::wire::can::supervision::SupervisionLimits;
 use agv_host_sim::bus::{Bus, SocketCanBus};
 use agv_host_sim::emulate::encoder::EmulatedEncoder;
 use agv_host_sim::import::candump::{Line, parse_line};
 use agv_tests::{is_on_path, skip};
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::encoder::EncoderSettings;
+use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::frame::{AnyFrame, FdFrame, Frame, extended_id, standard_id};
+use agv_wire::can::supervision::SupervisionLimits;
 
 /// Names the interface to the program inside.
 const INTERFACE: &str = "AGV_CAN_INTERFACE";

@@ -11,8 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use agv_core::measurement::EncoderFault;
-use agv_core::state::Mode;
-use agv_core::wire::can::controller::{LaserHealth, StartSearch};
+use agv_core::state::{LaserHealth, Mode, Relocalization};
 use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, ServiceError};
 use agv_host_sim::recording::Recording;
@@ -146,7 +145,7 @@ fn a_vehicle_that_is_told_nothing_finds_itself() {
     let driven = vehicle::drive(&recording, &options, 5.0, |_| ()).unwrap();
     assert!(driven.poses.first().is_some_and(|heard| heard.pose.mode == Mode::NotLocalised));
     let last = driven.poses.last().unwrap().pose;
-    assert_eq!((last.mode, last.health.start_search), (Mode::Reflectors, StartSearch::Idle));
+    assert_eq!((last.mode, last.health.start_search), (Mode::Reflectors, Relocalization::Idle));
     let errors = vehicle::errors(&driven, &recording).unwrap();
     println!("{errors:?}");
     // The machine may be busy: a wrong place would be metres away.
@@ -312,12 +311,12 @@ fn rubbish_in_flash_is_said_and_replaced() {
     std::fs::write(folder.path().join("flash.bin"), &rubbish).unwrap();
     let (_board, mut bus) = agv_host_sim::emulate::board::Board::start(&image, folder.path()).unwrap();
     let (mut has_said_so, mut modes) = (false, Vec::new());
-    let node = agv_core::wire::can::canopen::NodeId::new(16).unwrap();
-    let mut receiver = agv_core::wire::can::controller::PoseReceiver::new(node);
+    let node = agv_wire::can::canopen::NodeId::new(16).unwrap();
+    let mut receiver = agv_wire::can::controller::PoseReceiver::new(node);
     let start = Instant::now();
     while start.elapsed().as_secs_f64() < 20.0 && (!has_said_so || modes.len() < 20) {
-        use agv_core::wire::can::canopen::Message;
         use agv_host_sim::bus::Bus;
+        use agv_wire::can::canopen::Message;
         let Some(frame) = bus.receive(Instant::now() + Duration::from_millis(100)).unwrap() else { continue };
         let frame = frame.classic().unwrap();
         if let Ok(Message::Emergency { emergency, .. }) = Message::decode(frame) {

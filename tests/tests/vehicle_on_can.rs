@@ -10,9 +10,6 @@ use std::time::{Duration, Instant};
 
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
-use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::controller::{Content, PoseReceiver, PublishedPose};
-use agv_core::wire::can::frame::AnyFrame;
 use agv_host_sim::bus::{Bus, BusError, SocketCanBus};
 use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::emulate::vehicle::settings_like;
@@ -22,6 +19,9 @@ use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_tests::{emulator, image, is_on_path, python, repository, skip};
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::controller::{Content, PoseReceiver, PublishedPose};
+use agv_wire::can::frame::AnyFrame;
 use serde_json::Value;
 
 /// Names the interface to the program inside.

@@ -27,7 +27,7 @@ struct Program {
 const PROGRAMS: [Program; 3] = [
     Program { name: "firmware-h743", package: "firmware", features: H743.feature, target: Some(TARGET) },
     Program { name: "firmware-an500", package: "firmware", features: AN500.feature, target: Some(TARGET) },
-    Program { name: "agv", package: "host-sim", features: "", target: None },
+    Program { name: "agv", package: "agv", features: "", target: None },
 ];
 
 /// Version of CycloneDX.

@@ -24,7 +24,7 @@ impl Emulate {
         let image = firmware::emulated_vehicle()?;
         let cargo = std::env::var_os("CARGO").map_or_else(|| PathBuf::from("cargo"), PathBuf::from);
         let mut agv = Command::new(cargo);
-        agv.args(["run", "--quiet", "--release", "--package", "agv-host-sim", "--", "emulate", "--image"]);
+        agv.args(["run", "--quiet", "--release", "--package", "agv", "--", "emulate", "--image"]);
         agv.arg(image).args(self.arguments).current_dir(repository());
         if agv.status().context("cargo cannot be started")?.success() { Ok(()) } else { bail!("the drive failed") }
     }

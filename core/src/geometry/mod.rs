@@ -1,10 +1,14 @@
-//! Angles and planar poses.
+//! Angles, planar poses and transforms, and the rigid fit of points to points.
 
 mod angle;
 mod pose;
+mod rigid_fit;
+mod transform;
 
 pub use angle::{difference, wrap};
 pub use pose::{Pose, Twist};
+pub use rigid_fit::{RigidFit, fit_rigid};
+pub use transform::Transform;
 
 /// A point or a displacement in the plane, m.
 pub type Point = nalgebra::Vector2<f64>;

@@ -4,7 +4,7 @@ use super::sighting::Sighting;
 use super::{LandmarkSource, LandmarkUse, Outputs, Reason};
 use crate::filter::{Consistency, Innovation};
 use crate::geometry::Point;
-use crate::landmarks::{LandmarkKind, Verdict};
+use crate::maps::{LandmarkKind, Verdict};
 
 /// What became of something that was seen.
 #[derive(Clone, Copy, Debug)]

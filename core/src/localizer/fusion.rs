@@ -4,7 +4,7 @@ use super::evidence::{Evidence, Fate};
 use super::maps::Association;
 use super::{LandmarkSource, Localizer};
 use crate::geometry::Point;
-use crate::landmarks::Verdict;
+use crate::maps::Verdict;
 
 impl<
     const BEAMS: usize,

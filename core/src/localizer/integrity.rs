@@ -3,7 +3,7 @@
 use super::{Localizer, PoseFix, Reason};
 use crate::filter::Ekf;
 use crate::geometry::Pose;
-use crate::landmarks::{LandmarkKind, Verdict};
+use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::Time;
 
 /// Where the vehicle is, and where it would be by odometry alone.

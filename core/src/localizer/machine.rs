@@ -7,14 +7,13 @@ use super::integrity::{Corrected, Estimate};
 use super::maps::Maps;
 use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
-use super::{Event, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
-use crate::features::{PointScan, SensorPath, detect_reflectors, falko};
+use super::{Capacities, Event, Localize, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline};
 use crate::geometry::{Point, Pose, wrap};
-use crate::landmarks::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError};
+use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
-use crate::record::{Capacities, Header};
+use crate::sensing::{PointScan, SensorPath, detect_reflectors, falko};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -83,15 +82,9 @@ impl<
     const ENTRIES: usize,
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
-    /// How much it has room for, as the log of its vehicle states it.
+    /// How much it has room for.
     pub const CAPACITIES: Capacities =
         Capacities { landmarks: (REFLECTORS + FEATURES) as u32, beams: BEAMS as u32, history: PAST as u32 };
-
-    /// What the log of its vehicle begins with.
-    #[must_use]
-    pub const fn header<'a>(software: &'a str, parameters: &'a Parameters) -> Header<'a> {
-        Header { software, parameters, capacities: Self::CAPACITIES }
-    }
 
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
@@ -185,8 +178,8 @@ impl<
 
     /// The map of the reflectors.
     #[must_use]
-    pub fn reflectors(&self) -> &FixedMap<REFLECTORS> {
-        &self.maps.reflectors
+    pub fn reflectors(&self) -> MapView<'_> {
+        self.maps.reflectors.view()
     }
 
     /// The landmarks in the state of the filter, those too that were given: kind and position in W, m.
@@ -493,6 +486,34 @@ impl<
             self.outputs.pose.count_reset(correction);
         }
         self.outputs.pose.overflows = self.outputs.pose.overflows.wrapping_add(u8::from(self.outputs.has_cut));
+    }
+}
+
+impl<
+    const BEAMS: usize,
+    const REFLECTORS: usize,
+    const FEATURES: usize,
+    const DYNAMIC: usize,
+    const KEYS: usize,
+    const LANDMARKS: usize,
+    const STATES: usize,
+    const ENTRIES: usize,
+> Localize for Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
+{
+    fn handle(&mut self, event: &Event) -> &Outputs {
+        self.handle(event)
+    }
+
+    fn outputs(&self) -> &Outputs {
+        self.outputs()
+    }
+
+    fn odometry_bias(&self) -> OdometryBias {
+        self.odometry_bias()
+    }
+
+    fn reflectors(&self) -> MapView<'_> {
+        self.reflectors()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{LandmarkSource, MapUse, Parameters};
 use crate::filter::{Correction, Ekf, Innovation, Observation};
 use crate::geometry::Point;
-use crate::landmarks::{DynamicMap, FixedMap, LandmarkKind, NearestNeighbour, Verdict};
+use crate::maps::{DynamicMap, FixedMap, LandmarkKind, NearestNeighbour, Verdict};
 
 /// The fixed maps and the dynamic one.
 #[derive(Clone, Debug)]
@@ -70,7 +70,7 @@ impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> Maps<
             let (best, verdict) = nearest.decide(association.gate, association.margin);
             Association { verdict, nearest: best.map(|best| best.landmark) }
         };
-        let fixed = |landmark: &crate::landmarks::Landmark| {
+        let fixed = |landmark: &crate::maps::Landmark| {
             let deviation = f64::from(landmark.deviation);
             let variance = association.shared_map_error * deviation * deviation;
             compare(LandmarkSource::Fixed, landmark.id, Point::new(landmark.x, landmark.y), variance)

@@ -1,9 +1,11 @@
 //! The machine that owns all below: one event in, outputs out.
 
+mod capacities;
 mod event;
 mod evidence;
 mod fusion;
 mod integrity;
+mod localize;
 mod machine;
 mod maps;
 mod output;
@@ -15,7 +17,9 @@ mod slam_fusion;
 mod start_finder;
 mod start_search;
 
+pub use capacities::Capacities;
 pub use event::Event;
+pub use localize::Localize;
 pub use machine::Localizer;
 pub use output::{LandmarkSource, LandmarkUse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;

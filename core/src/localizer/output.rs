@@ -3,7 +3,7 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::landmarks::{LandmarkKind, Verdict};
+use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::Time;
 use crate::state::PoseOutput;
 

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::slam::SlamParameters;
-use crate::features::{ReflectorDetection, falko};
 use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
-use crate::landmarks::DynamicMapParameters;
+use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
 use crate::odometry::{Integration, OdometryNoise, Vehicle};
+use crate::sensing::{ReflectorDetection, falko};
 
 /// What the localiser believes of its vehicle and its sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,12 +5,12 @@ use nalgebra::Matrix2;
 
 use super::Parameters;
 use super::output::OBSERVATIONS;
-use crate::features::{Keypoint, KeypointKind, PointScan, SensorPath, falko};
 use crate::filter::{Cartesian, Observation, RangeBearing};
 use crate::geometry::{Point, difference};
-use crate::landmarks::{LandmarkKind, Verdict};
+use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::{ReflectorObservation, Scan, Time};
 use crate::order::{Evenly, insertion_sort_by};
+use crate::sensing::{Keypoint, KeypointKind, PointScan, SensorPath, falko};
 
 /// Memory that is used within one event only.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::Localizer;
 use super::evidence::{Evidence, Fate};
 use super::slam::{Seen, cartesian};
 use crate::geometry::Point;
-use crate::landmarks::{LandmarkKind, Verdict};
+use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::{Scan, Time};
 
 impl<

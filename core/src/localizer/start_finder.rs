@@ -6,14 +6,14 @@
 use heapless::Vec;
 
 use super::{Event, Parameters, PoseFix};
-use crate::features::detect_reflectors;
 use crate::geometry::{Point, Pose};
 use crate::measurement::{ReflectorObservation, Time};
 use crate::odometry::{Motion, Odometer, OdometryError};
-use crate::places::{
+use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
 };
+use crate::sensing::detect_reflectors;
 
 /// What is known of the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,11 +86,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     }
 
     /// Takes one event. A revolution begins a search unless one is under way.
-    pub fn handle<const REFLECTORS: usize, const WORDS: usize>(
-        &mut self,
-        event: &Event,
-        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
-    ) {
+    pub fn handle(&mut self, event: &Event, reflectors: &IndexedReflectors) {
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
@@ -154,11 +150,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         }
     }
 
-    fn revolution<const REFLECTORS: usize, const WORDS: usize>(
-        &mut self,
-        observations: &[ReflectorObservation],
-        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
-    ) {
+    fn revolution(&mut self, observations: &[ReflectorObservation], reflectors: &IndexedReflectors) {
         if let Some(first) = observations.first()
             && first.time.since(self.last_motion.end) > LONGEST_SILENCE
         {
@@ -179,11 +171,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
 
     /// Goes on with the search that is under way, if one is, until about `effort` is spent: see
     /// [`ReflectorRelocalizer::advance`].
-    pub fn search<const REFLECTORS: usize, const WORDS: usize>(
-        &mut self,
-        reflectors: &IndexedReflectors<REFLECTORS, WORDS>,
-        effort: u32,
-    ) -> StartState {
+    pub fn search(&mut self, reflectors: &IndexedReflectors, effort: u32) -> StartState {
         let Some(since) = self.since else { return StartState::Waiting };
         let answer = match self.relocalizer.advance(reflectors, effort) {
             RelocalizationProgress::Searching => return StartState::Searching,

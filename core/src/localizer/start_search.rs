@@ -1,9 +1,9 @@
 //! The search for the pose of a vehicle that does not know where it is, in slices between events.
 
 use super::{Event, Mode, Parameters, PoseFix, StartFinder, StartState};
-use crate::landmarks::FixedMap;
-use crate::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
-use crate::wire::can::controller;
+use crate::maps::MapView;
+use crate::relocalization::{ReflectorIndex, RelocalizationParameters};
+use crate::state::Relocalization;
 
 /// Words of the rough picture of where reflectors are: 4 kB, cells of about half a metre in a hall of 100 m x 60 m.
 const WORDS: usize = 1024;
@@ -23,7 +23,7 @@ pub struct StartSearch {
     is_wanted: bool,
     /// What is left of the effort of this revolution.
     left: u32,
-    state: controller::StartSearch,
+    state: Relocalization,
 }
 
 impl StartSearch {
@@ -36,52 +36,52 @@ impl StartSearch {
             index: ReflectorIndex::new(),
             is_wanted,
             left: 0,
-            state: controller::StartSearch::Idle,
+            state: Relocalization::Idle,
         }
     }
 
     /// Makes ready for the reflectors that the localiser has.
-    pub fn index<const REFLECTORS: usize>(&mut self, reflectors: &FixedMap<REFLECTORS>) {
+    pub fn index(&mut self, reflectors: MapView) {
         self.index.build(reflectors);
     }
 
     /// How far it has come.
     #[must_use]
-    pub fn state(&self) -> controller::StartSearch {
+    pub fn state(&self) -> Relocalization {
         self.state
     }
 
     /// Takes an event that the localiser has taken; `mode` is what it has said, `reflectors` is its map.
-    pub fn handle<const REFLECTORS: usize>(&mut self, event: &Event, mode: Mode, reflectors: &FixedMap<REFLECTORS>) {
+    pub fn handle(&mut self, event: &Event, mode: Mode, reflectors: MapView) {
         let is_lost = matches!(mode, Mode::NotLocalised | Mode::Lost);
         if self.is_wanted && is_lost {
-            let reflectors = IndexedReflectors { map: reflectors, index: &self.index };
+            let reflectors = self.index.of(reflectors);
             self.finder.handle(event, &reflectors);
             if matches!(event, Event::Reflectors(_) | Event::Scan(_)) {
                 self.left = EFFORT_A_REVOLUTION;
             }
-        } else if self.state != controller::StartSearch::Idle {
+        } else if self.state != Relocalization::Idle {
             self.finder.forget();
-            self.state = controller::StartSearch::Idle;
+            self.state = Relocalization::Idle;
         }
     }
 
     /// Searches for a while. Whether there is more to do, and the pose if it is found.
-    pub fn advance<const REFLECTORS: usize>(&mut self, reflectors: &FixedMap<REFLECTORS>) -> (bool, Option<PoseFix>) {
+    pub fn advance(&mut self, reflectors: MapView) -> (bool, Option<PoseFix>) {
         if self.left == 0 {
             return (false, None);
         }
         self.left = self.left.saturating_sub(SLICE);
-        let reflectors = IndexedReflectors { map: reflectors, index: &self.index };
+        let reflectors = self.index.of(reflectors);
         let state = self.finder.search(&reflectors, SLICE);
         // While it searches anew, the last answer stands.
         self.state = match (&state, self.state) {
-            (StartState::Searching, controller::StartSearch::Idle) => controller::StartSearch::Searching,
+            (StartState::Searching, Relocalization::Idle) => Relocalization::Searching,
             (StartState::Searching | StartState::Waiting, before) => before,
-            (StartState::Found(_), _) => controller::StartSearch::Searching,
-            (StartState::Ambiguous(..), _) => controller::StartSearch::Ambiguous,
-            (StartState::TooFew, _) => controller::StartSearch::TooFew,
-            (StartState::Unknown, _) => controller::StartSearch::Unknown,
+            (StartState::Found(_), _) => Relocalization::Searching,
+            (StartState::Ambiguous(..), _) => Relocalization::Ambiguous,
+            (StartState::TooFew, _) => Relocalization::TooFew,
+            (StartState::Unknown, _) => Relocalization::Unknown,
         };
         match state {
             StartState::Found(fix) => (true, Some(fix)),

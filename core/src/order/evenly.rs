@@ -3,23 +3,27 @@
 /// Which of a sequence of `count` things are taken if there is room for `room`: all, or so many at even distances, the
 /// first one among them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Evenly {
+pub struct Evenly {
     room: usize,
     count: usize,
     sum: usize,
 }
 
 impl Evenly {
+    /// Chooses as many as there is room for.
+    #[must_use]
     pub const fn new(room: usize, count: usize) -> Self {
         Self { room, count, sum: count.saturating_sub(room) }
     }
 
     /// Takes everything.
+    #[must_use]
     pub const fn all() -> Self {
         Self::new(0, 0)
     }
 
     /// Whether something must be left out.
+    #[must_use]
     pub const fn has_cut(&self) -> bool {
         self.count > self.room
     }

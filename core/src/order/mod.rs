@@ -7,6 +7,6 @@ mod evenly;
 mod heap_sort;
 mod insertion_sort;
 
-pub(crate) use evenly::Evenly;
+pub use evenly::Evenly;
 pub use heap_sort::heap_sort;
 pub use insertion_sort::insertion_sort_by;

@@ -28,7 +28,5 @@ pub use frame::{
     MAX_FRAME, MAX_PAYLOAD,
 };
 pub use log::{Item, LogReader, Step, encode};
-pub use payload::{
-    Capacities, EncodeError, Header, LANDMARKS_A_RECORD, Output, RAW_A_RECORD, Raw, RawSource, Record, Scratch,
-};
+pub use payload::{EncodeError, Header, LANDMARKS_A_RECORD, Output, RAW_A_RECORD, Raw, RawSource, Record, Scratch};
 pub use truth::{Reference, Truth};

@@ -5,23 +5,12 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
 use super::truth::{Reference, Truth};
-use crate::landmarks::Landmark;
-use crate::localizer::{Event, LandmarkUse, Outputs, Parameters, PoseOutput};
+use crate::localizer::{Capacities, Event, LandmarkUse, Outputs, Parameters, PoseOutput};
+use crate::maps::Landmark;
 use crate::measurement::{ReflectorObservation, Reflectors, Scan, Time};
 
 /// Greatest number of landmarks in one record; a map is written in pieces.
 pub const LANDMARKS_A_RECORD: usize = 50;
-
-/// How much the localiser that wrote a log had room for. Another size may answer differently.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Capacities {
-    /// Landmarks of the fixed maps, reflectors and features together.
-    pub landmarks: u32,
-    /// Beams of a scan.
-    pub beams: u32,
-    /// Motions and corrections of the filter's past.
-    pub history: u32,
-}
 
 /// What a log begins with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -5,10 +5,10 @@ pub mod scene;
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::features::falko::{Detector, Parameters, Sectors, pair_sum};
-use agv_core::features::{Keypoint, KeypointKind, PointScan};
 use agv_core::geometry::ScanPoint;
 use agv_core::measurement::{Scan, Time};
+use agv_core::sensing::falko::{Detector, Parameters, Sectors, pair_sum};
+use agv_core::sensing::{Keypoint, KeypointKind, PointScan};
 use proptest::prelude::*;
 use scene::{Random, Scene};
 

@@ -1,8 +1,8 @@
 //! A vehicle with an exact path, in a hall with reflectors, and the events that it gives.
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{Event, Localizer, Parameters, PoseFix, PoseOutput};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, SpeedSample, Time};
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 

@@ -5,10 +5,10 @@
 mod drive;
 
 use self::drive::{Drive, KINDS, Kind, Path, parameters};
-use agv_core::features::SensorPath;
 use agv_core::geometry::{Pose, Twist};
 use agv_core::localizer::{Event, Mode, OutputPredictor, Reason};
 use agv_core::measurement::{EncoderSample, Reflectors, SpeedSample, Time};
+use agv_core::sensing::SensorPath;
 
 /// Time after which the pose is as good as it gets, s.
 const SETTLED: f64 = 3.0;

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use agv_core::filter::{augmented_states, packed_entries};
 use agv_core::geometry::{Point, Pose, Twist, difference};
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{Event, Localizer, Outputs, Parameters, PoseFix, PoseOutput};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
 

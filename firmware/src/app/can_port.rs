@@ -1,7 +1,7 @@
 //! The bus as the application sees it.
 
 use agv_core::measurement::Time;
-use agv_core::wire::can::frame::Frame;
+use agv_wire::can::frame::Frame;
 
 /// A CAN controller with queues.
 pub trait CanPort {

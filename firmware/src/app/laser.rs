@@ -1,7 +1,8 @@
 //! The NAV350 over TCP.
 
-use agv_core::wire::nav350::{Configuration, Revolution, Session, Step};
+use agv_controller::{Laser, TELEGRAM};
 use agv_settings::Network;
+use agv_wire::nav350::{Configuration, Revolution, Step};
 use embassy_futures::select::{Either, select};
 use embassy_net::tcp::TcpSocket;
 use embassy_net::{IpAddress, IpEndpoint, Stack};
@@ -17,8 +18,8 @@ const SEND: Duration = Duration::from_secs(1);
 
 /// Memory of the connection.
 pub struct LaserMemory {
-    /// The session, with room for the longest telegram of a revolution with 1440 beams, in either dialect.
-    pub session: Session<{ 18 * 1024 }>,
+    /// The session.
+    pub laser: Laser<TELEGRAM>,
     /// Received bytes; the sensor may send no more than this ahead, which is less than the Ethernet controller holds.
     pub receive: [u8; 8192],
     /// Bytes to send.
@@ -31,8 +32,7 @@ impl LaserMemory {
     /// Memory of a connection that has not begun.
     #[must_use]
     pub fn new() -> Self {
-        let session = Session::new(Configuration::default());
-        Self { session, receive: [0; 8192], transmit: [0; 1024], read: [0; 1024] }
+        Self { laser: Laser::new(Configuration::default()), receive: [0; 8192], transmit: [0; 1024], read: [0; 1024] }
     }
 }
 
@@ -49,7 +49,7 @@ pub async fn run(
     mut revolutions: RevolutionSender,
     network: &Network,
 ) -> ! {
-    let LaserMemory { session, receive, transmit, read } = memory;
+    let LaserMemory { laser, receive, transmit, read } = memory;
     let [a, b, c, d] = network.laser;
     let endpoint = IpEndpoint::new(IpAddress::v4(a, b, c, d), network.laser_port);
     let mut socket = TcpSocket::new(stack, receive, transmit);
@@ -57,15 +57,14 @@ pub async fn run(
     let mut is_open = false;
     loop {
         let revolution = revolutions.send().await;
-        next(session, &mut socket, &mut is_open, endpoint, read, revolution).await;
-        exchange::laser_has_measured();
+        next(laser, &mut socket, &mut is_open, endpoint, read, revolution).await;
         revolutions.send_done();
     }
 }
 
 /// Holds the session until a revolution is complete.
 async fn next(
-    session: &mut Session<{ 18 * 1024 }>,
+    laser: &mut Laser<TELEGRAM>,
     socket: &mut TcpSocket<'_>,
     is_open: &mut bool,
     endpoint: IpEndpoint,
@@ -74,22 +73,24 @@ async fn next(
 ) {
     loop {
         supervision::check_in(Task::Network);
-        match session.poll(now(), revolution) {
-            Step::Revolution => return,
+        exchange::set_laser(laser.watch());
+        match laser.poll(now(), revolution) {
+            Step::Revolution => {
+                exchange::set_laser(laser.watch());
+                return;
+            }
             Step::Connect => {
                 socket.abort();
                 *is_open = matches!(with_timeout(CONNECT, socket.connect(endpoint)).await, Ok(Ok(())));
                 if *is_open {
-                    session.connected(now());
+                    laser.connected(now());
                 } else {
-                    exchange::laser_is_unreachable();
-                    session.closed();
+                    laser.unreachable();
                 }
             }
             Step::Disconnect(reason) => {
                 *is_open = false;
                 socket.abort();
-                exchange::laser_was_lost(reason);
                 defmt::warn!("nav350: {}", defmt::Display2Format(&reason));
             }
             Step::Send(bytes) => {
@@ -103,12 +104,10 @@ async fn next(
                 }
                 if !is_sent {
                     *is_open = false;
-                    exchange::laser_is_unreachable();
-                    session.closed();
+                    laser.unreachable();
                 }
             }
             Step::Report(report) => {
-                exchange::laser_has_reported(report);
                 defmt::info!("nav350: {}", defmt::Display2Format(&report));
             }
             Step::Wait(until) => {
@@ -123,14 +122,13 @@ async fn next(
                         let time = now();
                         while !rest.is_empty() {
                             // A telegram is shorter than the session's room, so it always takes some.
-                            let taken = session.receive(rest, time);
+                            let taken = laser.receive(rest, time);
                             rest = rest.get(taken..).unwrap_or_default();
                         }
                     }
                     Either::First(_) => {
                         *is_open = false;
-                        exchange::laser_is_unreachable();
-                        session.closed();
+                        laser.unreachable();
                     }
                     Either::Second(()) => {}
                 }

@@ -1,19 +1,17 @@
 //! The localiser's loop, below all interrupts.
 
-use agv_core::localizer::{Event, StartSearch};
+use agv_core::localizer::{Event, Outputs};
 use agv_core::record::{Output, Record};
 
-use super::exchange::{self, BUS_EVENTS, BusEvent, RevolutionReceiver};
+use super::exchange::{self, BUS_EVENTS, RevolutionReceiver};
 use super::log_stream::LogWriter;
 use super::room::Localizer;
 use super::supervision::{self, Task};
 
 /// What handles events.
 pub struct Localization {
-    /// The localiser.
-    pub localizer: &'static mut Localizer,
-    /// What searches its pose when it has none.
-    pub search: &'static mut StartSearch,
+    /// The localiser, and what searches its pose when it has none.
+    pub localization: agv_controller::Localization<&'static mut Localizer>,
     /// Where events and outputs are written.
     pub log: LogWriter,
 }
@@ -22,7 +20,7 @@ impl Localization {
     /// Handles what has come, and returns whether there was anything.
     ///
     /// Samples that wait go first: they are what a revolution is seen from. A revolution takes up to 10 ms at 480 MHz; what
-    /// comes meanwhile waits, and the predictor publishes without it. A search takes what time is left.
+    /// comes meanwhile waits, and the bus publishes without it. A search takes what time is left.
     pub fn step(&mut self, revolutions: &mut RevolutionReceiver) -> bool {
         supervision::check_in(Task::Localizer);
         if self.take_bus_event() {
@@ -31,12 +29,9 @@ impl Localization {
         let Some(revolution) = revolutions.try_receive() else {
             return self.search();
         };
-        if let Some(reflectors) = revolution.reflectors() {
-            self.handle(&Event::Reflectors(reflectors));
-        }
-        if let Some(scan) = revolution.scan() {
-            self.handle(&Event::Scan(scan));
-        }
+        let Self { localization, log } = self;
+        localization.revolution(revolution, |event, outputs| write(log, event, outputs));
+        exchange::publish(localization.estimate());
         revolutions.receive_done();
         true
     }
@@ -44,33 +39,34 @@ impl Localization {
     /// Handles what the bus has told, and returns whether there was anything.
     pub fn take_bus_event(&mut self) -> bool {
         let Ok(event) = BUS_EVENTS.try_receive() else { return false };
-        self.handle(&match event {
-            BusEvent::Encoders(sample) => Event::Encoders(sample),
-            BusEvent::EncoderFaults(faults) => Event::EncoderFaults(faults),
-            BusEvent::SetPose(fix) => Event::SetPose(fix),
-        });
+        self.handle(&event.event());
         true
     }
 
     /// Tells the localiser something, publishes what it says, and logs both.
     pub fn handle(&mut self, event: &Event) {
-        self.log.write(&Record::Event(*event));
-        self.localizer.handle(event);
-        let outputs = self.localizer.outputs();
-        exchange::update(&outputs.pose, &self.localizer.odometry_bias());
-        self.log.write(&Record::Output(Output::from(outputs)));
-        let mode = outputs.pose.mode;
-        self.search.handle(event, mode, self.localizer.reflectors());
+        let Self { localization, log } = self;
+        localization.handle(event, |event, outputs| write(log, event, outputs));
+        exchange::publish(localization.estimate());
     }
 
-    /// Goes on with the search for a pose. A pose that is found is an event like any other, so that a replay of the log
-    /// needs no search.
+    /// Goes on with the search for a pose.
     fn search(&mut self) -> bool {
-        let (is_busy, found) = self.search.advance(self.localizer.reflectors());
-        if let Some(fix) = found {
-            self.handle(&Event::SetPose(fix));
+        let Self { localization, log } = self;
+        let before = localization.relocalization();
+        let mut has_spoken = false;
+        let is_busy = localization.search(|event, outputs| {
+            has_spoken = true;
+            write(log, event, outputs);
+        });
+        if has_spoken || localization.relocalization() != before {
+            exchange::publish(localization.estimate());
         }
-        exchange::set_start_search(self.search.state());
         is_busy
     }
+}
+
+fn write(log: &mut LogWriter, event: &Event, outputs: &Outputs) {
+    log.write(&Record::Event(*event));
+    log.write(&Record::Output(Output::from(outputs)));
 }

@@ -3,9 +3,9 @@
 //! Frames are numbered. What does not fit the queue, because the network is slow or nobody listens, is dropped whole; the
 //! gap in the numbers tells how much. Nothing ever waits.
 
-use agv_core::landmarks::Landmark;
 use agv_core::localizer::Parameters;
-use agv_core::record::{LANDMARKS_A_RECORD, Record, encode};
+use agv_core::maps::Landmark;
+use agv_core::record::{Header, LANDMARKS_A_RECORD, Record, encode};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -142,7 +142,7 @@ async fn greet(
     parameters: &Parameters,
     landmarks: &[Landmark],
 ) -> Result<(), Gone> {
-    let header = Localizer::header(SOFTWARE, parameters);
+    let header = Header { software: SOFTWARE, parameters, capacities: Localizer::CAPACITIES };
     let mut sequence = 0;
     let first = encode(&Record::Header(header), sequence, frame).map_err(|_| Gone)?;
     send(socket, frame.get(..first).unwrap_or_default()).await?;

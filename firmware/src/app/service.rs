@@ -4,6 +4,7 @@
 //! ten seconds after the last answer is closed, as is one that does not take an answer for as long: neither silence nor
 //! single bytes hold it open. Requests are answered no faster than one in two milliseconds: whoever floods the port waits.
 
+use agv_controller::BusEvent;
 use agv_settings::service::{Action, Controller, Frames, LONGEST_MESSAGE, Session};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
@@ -12,7 +13,7 @@ use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Instant, Timer, with_deadline, with_timeout};
 use embedded_storage::nor_flash::NorFlash;
 
-use super::exchange::{self, BusEvent, now};
+use super::exchange::{self, now};
 
 /// How long a peer may take for a request, from the last answer on, and to take an answer.
 const PATIENCE: Duration = Duration::from_secs(10);

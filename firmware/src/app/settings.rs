@@ -1,6 +1,6 @@
 //! What the flash tells at the start.
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_settings::Settings;
 use agv_settings::service::Controller;
 use agv_settings::store::{LANDMARKS, Store};

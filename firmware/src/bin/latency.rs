@@ -7,8 +7,9 @@
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
-use agv_core::localizer::{Event, OutputPredictor, StartSearch};
-use agv_core::measurement::{EncoderSample, Scan};
+use agv_controller::BusEvent;
+use agv_core::localizer::{Event, OutputPredictor, Parameters};
+use agv_core::measurement::{EncoderSample, Scan, Time};
 use agv_core::record::Record;
 use agv_firmware::app::exchange;
 use agv_firmware::app::localize::Localization;
@@ -18,6 +19,7 @@ use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
 use agv_firmware::board::an500::log_file::LogBuffer;
 use agv_firmware::board::an500::{panic, time_driver, uart};
+use agv_settings::Settings;
 use cortex_m_semihosting::{debug, hprintln};
 use defmt_semihosting as _;
 use embassy_time::{Duration, Instant, Timer};
@@ -34,12 +36,13 @@ defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
-static SEARCH: StaticCell<StartSearch> = StaticCell::new();
 static FRAME: ConstStaticCell<[u8; LONGEST]> = ConstStaticCell::new([0; LONGEST]);
 
 /// Ticks between samples, and the time between them: no multiple of anything, so that they meet a scan's work everywhere.
 const STEP: u32 = 120;
 const PERIOD: Duration = Duration::from_micros(12_347);
+/// Motions that the prediction remembers, as on the bus.
+const MOTIONS: usize = agv_controller::MOTIONS;
 /// Scans that are processed.
 const SCANS: u32 = 60;
 
@@ -48,16 +51,27 @@ static SAMPLES: AtomicU32 = AtomicU32::new(0);
 static DURING_SCANS: AtomicU32 = AtomicU32::new(0);
 static IS_BUSY: AtomicU32 = AtomicU32::new(0);
 
-/// What stands for the encoders: a timer's interrupt, as a frame has one.
+/// Longest time from a sample to its prediction, us.
+static LATEST: AtomicU32 = AtomicU32::new(0);
+
+/// What stands for the bus: a timer's interrupt, as a frame has one, and the prediction of the pose.
 #[embassy_executor::task]
-async fn encoders() {
+async fn encoders(parameters: Parameters) {
+    let mut predictor: OutputPredictor<MOTIONS> = OutputPredictor::new(&parameters);
     let mut due = Instant::now() + PERIOD;
     loop {
         Timer::at(due).await;
         let number = SAMPLES.fetch_add(1, Ordering::Relaxed);
         DURING_SCANS.fetch_add(IS_BUSY.load(Ordering::Relaxed), Ordering::Relaxed);
-        let time = agv_core::measurement::Time::from_micros(due.as_micros());
-        exchange::take_encoders(EncoderSample { time, drive: number.wrapping_mul(STEP), steering: 0 });
+        let time = Time::from_micros(due.as_micros());
+        let sample = EncoderSample { time, drive: number.wrapping_mul(STEP), steering: 0 };
+        if let Some(estimate) = exchange::newest_estimate() {
+            predictor.update(&estimate.pose, &estimate.bias);
+        }
+        predictor.encoders(&sample);
+        let delay = exchange::now().micros().saturating_sub(time.micros());
+        LATEST.fetch_max(u32::try_from(delay).unwrap_or(u32::MAX), Ordering::Relaxed);
+        exchange::pass_on(BusEvent::Encoders(sample));
         due += PERIOD;
     }
 }
@@ -76,17 +90,15 @@ fn main() -> ! {
         Record::Header(header) if localization.is_none() => {
             let mut parameters = *header.parameters;
             parameters.maps.dynamic = true;
-            exchange::start(OutputPredictor::new(&parameters));
-            localization = log.take().map(|log| Localization {
-                localizer: LOCALIZER.init_with(|| Localizer::new(parameters)),
-                search: SEARCH.init_with(|| StartSearch::new(&parameters, false)),
-                log,
-            });
-            BUS_TASKS.start(Interrupt::BusTasks).spawn(encoders().expect("the task runs once"));
+            let settings = Settings { start_search: false, ..Settings::of(parameters) };
+            let localizer = LOCALIZER.init_with(|| Localizer::new(parameters));
+            let new = |localizer| agv_controller::Localization::new(localizer, &settings);
+            localization = log.take().map(|log| Localization { localization: new(localizer), log });
+            BUS_TASKS.start(Interrupt::BusTasks).spawn(encoders(parameters).expect("the task runs once"));
         }
         Record::Landmarks(piece) => {
-            if let Some(Localization { localizer, .. }) = &mut localization {
-                localizer.add_landmarks(piece).expect("the map has room");
+            if let Some(Localization { localization, .. }) = &mut localization {
+                localization.localizer_mut().add_landmarks(piece).expect("the map has room");
             }
         }
         Record::Event(event) if scans < SCANS => {
@@ -114,7 +126,7 @@ fn main() -> ! {
     let mut text: String<256> = String::new();
     let samples = SAMPLES.load(Ordering::Relaxed);
     let during = DURING_SCANS.load(Ordering::Relaxed);
-    let latest = exchange::latest_prediction();
+    let latest = LATEST.load(Ordering::Relaxed);
     let _ = writeln!(text, "scans,samples,samples during scans,latest prediction in us at 64 ns an instruction,lost");
     let _ = writeln!(text, "{scans},{samples},{during},{latest},{}", exchange::lost_events());
     let written = HostFile::create(c"latency.csv").and_then(|mut file| file.write(text.as_bytes()));

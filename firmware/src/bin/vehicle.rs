@@ -4,8 +4,7 @@
 
 use core::panic::PanicInfo;
 
-use agv_core::localizer::{OutputPredictor, Parameters, StartSearch};
-use agv_core::wire::nav350::Revolution;
+use agv_core::localizer::Parameters;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
 use agv_firmware::app::localize::Localization;
@@ -18,6 +17,7 @@ use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, W
 use agv_firmware::board::{retained, stack};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
+use agv_wire::nav350::Revolution;
 use embassy_executor::Spawner;
 use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -39,7 +39,7 @@ const CONNECTIONS: usize = 2;
 static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
 static SETTINGS: StaticCell<Settings> = StaticCell::new();
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
-static SEARCH: StaticCell<StartSearch> = StaticCell::new();
+static LOCALIZATION: StaticCell<Localization> = StaticCell::new();
 static REVOLUTIONS: ConstStaticCell<[Revolution; 1]> = ConstStaticCell::new([Revolution::new()]);
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
 static LASER: StaticCell<LaserMemory> = StaticCell::new();
@@ -54,7 +54,7 @@ static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::
 struct Shared {
     settings: &'static Settings,
     controller: &'static SharedController<Flash>,
-    landmarks: &'static [agv_core::landmarks::Landmark],
+    landmarks: &'static [agv_core::maps::Landmark],
 }
 
 #[embassy_executor::task]
@@ -108,7 +108,7 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
 
 /// What the loop works with.
 struct Vehicle {
-    localization: Localization,
+    localization: &'static mut Localization,
     revolutions: RevolutionReceiver,
     watchdog: Watchdog,
 }
@@ -121,8 +121,13 @@ fn build_localizer(parameters: &Parameters) -> &'static mut Localizer {
 }
 
 #[inline(never)]
-fn build_search(parameters: &Parameters, is_wanted: bool) -> &'static mut StartSearch {
-    SEARCH.init_with(|| StartSearch::new(parameters, is_wanted))
+fn build_localization(
+    localizer: &'static mut Localizer,
+    settings: &Settings,
+    log: LogWriter,
+) -> &'static mut Localization {
+    LOCALIZATION
+        .init_with(|| Localization { localization: agv_controller::Localization::new(localizer, settings), log })
 }
 
 #[inline(never)]
@@ -144,24 +149,22 @@ fn start() -> Vehicle {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
         exchange::set_settings_sound(false);
     }
-    let search = build_search(&settings.parameters, settings.start_search);
-    search.index(localizer.reflectors());
-    exchange::start(OutputPredictor::new(&settings.parameters));
-    exchange::update(&localizer.outputs().pose, &localizer.odometry_bias());
     let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
     let (sender, revolutions) = channel.split();
     let log = LogWriter::new(FRAME.take(), landmarks.len());
+    let localization = build_localization(localizer, settings, log);
+    exchange::publish(localization.localization.estimate());
     watchdog.unleash();
     let has_panicked = !panic.is_empty();
     board::bus_tasks().spawn(bus_task(can, settings, has_panicked).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
     board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
-    Vehicle { localization: Localization { localizer, search, log }, revolutions, watchdog }
+    Vehicle { localization, revolutions, watchdog }
 }
 
 #[inline(never)]
 fn run(vehicle: Vehicle) -> ! {
-    let Vehicle { mut localization, mut revolutions, mut watchdog } = vehicle;
+    let Vehicle { localization, mut revolutions, mut watchdog } = vehicle;
     let mut deepest = 0;
     loop {
         if localization.step(&mut revolutions) {

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use agv_core::wire::can::frame::AnyFrame;
+use agv_wire::can::frame::AnyFrame;
 
 use super::{Bus, BusError};
 

@@ -8,7 +8,7 @@ mod socket_can;
 
 use std::time::Instant;
 
-use agv_core::wire::can::frame::AnyFrame;
+use agv_wire::can::frame::AnyFrame;
 
 pub use in_process::{InProcessBus, InProcessNode};
 #[cfg(target_os = "linux")]
@@ -65,7 +65,7 @@ pub trait Bus: Send {
 /// If there is no such bus, or it cannot be used.
 #[cfg(target_os = "linux")]
 pub fn open(name: &str) -> Result<Box<dyn Bus>, BusError> {
-    use agv_core::wire::can::slcan::BitRate;
+    use agv_wire::can::slcan::BitRate;
 
     let wrong = || BusError::Name { name: name.to_owned() };
     let with_rate = |text: &str| match text.rsplit_once('@') {

@@ -7,8 +7,8 @@ use std::net::TcpStream;
 use std::os::fd::AsFd;
 use std::time::{Duration, Instant};
 
-use agv_core::wire::can::frame::AnyFrame;
-use agv_core::wire::can::slcan::{BitRate, Command, Decoder, Message};
+use agv_wire::can::frame::AnyFrame;
+use agv_wire::can::slcan::{BitRate, Command, Decoder, Message};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{BaudRate, SetArg, cfmakeraw, cfsetspeed, tcgetattr, tcsetattr};
 

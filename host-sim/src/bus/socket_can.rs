@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
-use agv_core::wire::can::frame::{AnyFrame, FdFrame, Frame};
+use agv_wire::can::frame::{AnyFrame, FdFrame, Frame};
 use socketcan::{CanAnyFrame, CanFdFrame, CanFdSocket, CanFrame, EmbeddedFrame, Socket};
 
 use super::{Bus, BusError};

@@ -1,6 +1,6 @@
 //! From a log to windows.
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_core::odometry::{Tricycle, Vehicle};
 
 use super::counted::{Counted, CounterFault, count};

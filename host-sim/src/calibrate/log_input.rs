@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{Event, Parameters};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderSample, ReflectorObservation};
 use agv_core::record::{Damage, Item, Record};
 

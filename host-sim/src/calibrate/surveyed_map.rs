@@ -2,7 +2,7 @@
 
 use agv_core::calibration::Registration;
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use nalgebra::Matrix3;
 

@@ -2,7 +2,7 @@
 
 use agv_core::calibration::Registration;
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{NearestNeighbour, Verdict};
+use agv_core::maps::{NearestNeighbour, Verdict};
 use agv_core::measurement::{ReflectorObservation, Time};
 
 use super::odometry_path::OdometryPath;

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use agv_core::measurement::Time;
 use agv_core::odometry::CounterRange;
-use agv_core::wire::can::canopen::{Message, NodeId, transmit_pdo_id};
-use agv_core::wire::can::encoder::object;
-use agv_core::wire::can::frame::Frame;
-use agv_core::wire::can::nmt::{NmtCommand, NmtState};
-use agv_core::wire::can::sdo::{AbortCode, Object, Request, Response, Value};
+use agv_wire::can::canopen::{Message, NodeId, transmit_pdo_id};
+use agv_wire::can::encoder::object;
+use agv_wire::can::frame::Frame;
+use agv_wire::can::nmt::{NmtCommand, NmtState};
+use agv_wire::can::sdo::{AbortCode, Object, Request, Response, Value};
 
 /// Objects that a master may write.
 const WRITABLE: [Object; 4] =

@@ -3,8 +3,8 @@
 use agv_core::localizer::Event;
 use agv_core::measurement::{EncoderSample, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
-use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::frame::Frame;
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::frame::Frame;
 
 use super::encoder::EmulatedEncoder;
 use crate::recording::Recording;

@@ -1,7 +1,7 @@
 //! What other nodes say on the vehicle's bus.
 
-use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::frame::{Frame, Id, extended_id, standard_id};
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::frame::{Frame, Id, extended_id, standard_id};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -130,7 +130,7 @@ impl ForeignTraffic {
 mod tests {
     use std::collections::HashSet;
 
-    use agv_core::wire::can::canopen::{Message, NodeId};
+    use agv_wire::can::canopen::{Message, NodeId};
 
     use super::*;
 

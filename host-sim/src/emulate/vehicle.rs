@@ -12,12 +12,12 @@ use std::time::{Duration, Instant};
 use agv_core::geometry::{Pose, wrap};
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
-use agv_core::wire::can::canopen::{Message, NodeId};
-use agv_core::wire::can::controller::{Content, PoseReceiver, PublishedPose};
-use agv_core::wire::can::emcy::Emergency;
-use agv_core::wire::nav350::SensorFrame;
 use agv_settings::Settings;
 use agv_settings::store::KEY;
+use agv_wire::can::canopen::{Message, NodeId};
+use agv_wire::can::controller::{Content, PoseReceiver, PublishedPose};
+use agv_wire::can::emcy::Emergency;
+use agv_wire::nav350::SensorFrame;
 use serde::Serialize;
 
 use super::board::{self, Board, BoardError, Ports};
@@ -423,7 +423,7 @@ impl Stage<'_> {
         self.heard().poses.last().map(|heard| heard.pose.mode)
     }
 
-    fn hear(&self, frame: &agv_core::wire::can::frame::Frame, controller: NodeId, receiver: &mut PoseReceiver) {
+    fn hear(&self, frame: &agv_wire::can::frame::Frame, controller: NodeId, receiver: &mut PoseReceiver) {
         let time = Instant::now();
         if let Some(pose) = receiver.handle(frame) {
             self.heard().poses.push(HeardPose { heard: time, pose });
@@ -438,10 +438,10 @@ impl Stage<'_> {
     fn send_sensor_frame(
         &self,
         bus: &mut SlcanBus,
-        frame: &agv_core::wire::can::frame::Frame,
+        frame: &agv_wire::can::frame::Frame,
         sent: &mut u32,
     ) -> Result<(), BoardError> {
-        use agv_core::wire::can::frame::Frame;
+        use agv_wire::can::frame::Frame;
         let is_drive = matches!(
             Message::decode(frame),
             Ok(Message::TransmitPdo { node, .. } | Message::Heartbeat { node, .. })
@@ -465,7 +465,7 @@ impl Stage<'_> {
         Ok(bus.send(&(*frame).into())?)
     }
 
-    fn initial_pose(&self, controller: NodeId, counter: u8) -> [agv_core::wire::can::frame::Frame; 2] {
+    fn initial_pose(&self, controller: NodeId, counter: u8) -> [agv_wire::can::frame::Frame; 2] {
         let driven = self.heard().begin.map_or(0.0, |begin| begin.elapsed().as_secs_f64());
         let Pose { x, y, theta } = truth_at(&self.recording.truth, self.first.offset(driven)).unwrap_or_default();
         let [position_deviation, heading_deviation] = START_DEVIATIONS;

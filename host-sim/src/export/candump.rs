@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use agv_core::wire::can::frame::AnyFrame;
+use agv_wire::can::frame::AnyFrame;
 
 use crate::import::candump::{SeenFrame, log_line};
 use crate::import::raw;

@@ -5,7 +5,7 @@ use std::io::Write;
 use agv_core::localizer::{Mode, Reason};
 use serde::Serialize;
 
-use crate::evaluate::drive::Track;
+use crate::drive::Track;
 use crate::recording::{Recording, truth_at};
 
 /// One instant. Lengths in m, times in s, angles in rad; empty where nobody knows.

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use agv_core::features::{Keypoint, KeypointKind};
+use agv_core::sensing::{Keypoint, KeypointKind};
 
 use crate::import::PosedScan;
 

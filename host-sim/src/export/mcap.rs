@@ -8,15 +8,15 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{LandmarkKind, Verdict};
 use agv_core::localizer::{LandmarkUse, Mode, PoseOutput, Reason};
+use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::{EncoderFault, EncoderFaults, PoseFix, Time};
 use agv_core::odometry::{Motion, Odometer};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use serde::Serialize;
 
-use crate::evaluate::drive::{KINDS, kind_name, mode_name, reason_name};
+use crate::drive::{KINDS, kind_name, mode_name, reason_name};
 use crate::log::SOFTWARE;
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::replay::Replay;

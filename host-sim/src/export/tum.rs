@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
 
-use crate::evaluate::drive::Track;
+use crate::drive::Track;
 use crate::recording::{Recording, truth_at};
 
 /// Writes poses.

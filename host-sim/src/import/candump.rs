@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use agv_core::measurement::Time;
-use agv_core::wire::can::frame::{AnyFrame, FdFrame, Frame, Id, extended_id, standard_id};
+use agv_wire::can::frame::{AnyFrame, FdFrame, Frame, Id, extended_id, standard_id};
 
 use crate::text_file::{self, TextFileError};
 

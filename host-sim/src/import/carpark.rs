@@ -6,8 +6,8 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::Parameters;
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{SpeedSample, Time};
 use agv_core::odometry::{Ackermann, Vehicle};
 

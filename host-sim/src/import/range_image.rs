@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::packet::LENGTH;
 
-use crate::export::velodyne::hdl64e_packets;
+use crate::hdl64e_packets::hdl64e_packets;
 
 /// Why range images could not be read.
 #[derive(Debug, thiserror::Error)]

@@ -3,16 +3,16 @@
 use std::convert::Infallible;
 use std::path::Path;
 
+use agv_controller::{self as controller, EncoderNodes, EncoderOutput, channels};
 use agv_core::localizer::{Event, Parameters};
 use agv_core::measurement::Time;
 use agv_core::record::{Damage, Item, RAW_A_RECORD, Raw, RawSource, Record};
-use agv_core::wire::can::canopen::transmit_pdo_id;
-use agv_core::wire::can::frame::{AnyFrame, Frame};
-use agv_core::wire::can::slcan::Message;
-use agv_core::wire::nav350::SensorFrame;
+use agv_wire::can::canopen::transmit_pdo_id;
+use agv_wire::can::frame::{AnyFrame, Frame};
+use agv_wire::can::slcan::Message;
+use agv_wire::nav350::SensorFrame;
 
 use crate::link::encoder_listener::EncoderListener;
-use crate::link::encoders::{self, EncoderLink, EncoderNodes, Outcome};
 use crate::link::nav350_listener::{Heard, Listener};
 use crate::log::{self, LogError, Reader, Writer};
 use crate::recording::{RecordedEvent, Recording};
@@ -105,14 +105,14 @@ pub fn read_drive(path: &Path, nodes: &EncoderNodes) -> Result<(Recording, Vec<D
 /// Who was the master of the encoders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bus {
-    /// The program that recorded the bytes: [`EncoderLink`].
+    /// The program that recorded the bytes: [`controller::Encoders`].
     Served,
     /// Another one: the encoders' own words are all there is.
     Overheard,
 }
 
 enum Encoders {
-    Served(EncoderLink),
+    Served(controller::Encoders),
     Overheard(EncoderListener),
 }
 
@@ -167,23 +167,20 @@ impl<'a> EventMaker<'a> {
             return;
         }
         let encoders = self.encoders.get_or_insert_with(|| match self.bus {
-            Bus::Served => Encoders::Served(EncoderLink::new(self.nodes, self.parameters, time)),
+            Bus::Served => Encoders::Served(controller::Encoders::new(self.nodes, self.parameters, time)),
             Bus::Overheard => {
-                let [drive, steering] = encoders::settings(self.nodes, self.parameters);
+                let [drive, steering] = channels(self.nodes, self.parameters);
                 Encoders::Overheard(EncoderListener::new(&drive, &steering, time))
             }
         });
         match encoders {
             // The first record says when the bus was opened.
             Encoders::Served(_) if is_first => {}
-            Encoders::Served(link) => {
-                let Ok(()) = link.look::<Infallible>(time, frame, |outcome| {
-                    if let Outcome::Event(event) = outcome {
-                        events.push(event.into());
-                    }
-                    Ok(())
-                });
-            }
+            Encoders::Served(encoders) => encoders.look(time, frame, |output| {
+                if let EncoderOutput::Event(event) = output {
+                    events.push(event.event().into());
+                }
+            }),
             Encoders::Overheard(listener) => {
                 let Some(frame) = frame else { return };
                 let (faults, sample) = listener.hear(frame, time);

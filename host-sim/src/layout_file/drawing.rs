@@ -1,6 +1,6 @@
 //! Layouts as drawings.
 
-use agv_core::wire::nav350::IdentifiedLandmark;
+use agv_wire::nav350::IdentifiedLandmark;
 use dxf::entities::{Entity, EntityType, ModelPoint, Text};
 use dxf::enums::Units;
 use dxf::{Drawing, DxfError, Point};

@@ -1,11 +1,11 @@
 //! What two encoders said on a bus whose master is another.
 
 use agv_core::measurement::{EncoderFaults, EncoderSample, Time};
-use agv_core::wire::can::canopen::Message;
-use agv_core::wire::can::encoder_pair::{ChannelSettings, EncoderPair};
-use agv_core::wire::can::frame::Frame;
-use agv_core::wire::can::nmt::NmtState;
-use agv_core::wire::can::sdo::{AbortCode, Request, Response};
+use agv_wire::can::canopen::Message;
+use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::frame::Frame;
+use agv_wire::can::nmt::NmtState;
+use agv_wire::can::sdo::{AbortCode, Request, Response};
 
 /// Telegrams with which a pair sets up its encoders, at most.
 const SET_UP: usize = 100;

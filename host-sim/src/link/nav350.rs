@@ -5,10 +5,8 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
 use agv_core::measurement::Time;
-use agv_core::wire::cola::{Deframed, Deframer, Dialect};
-use agv_core::wire::nav350::{
-    Answer, Configuration, LostReason, Report, Request, Revolution, SensorSpeed, Session, Step,
-};
+use agv_wire::cola::{Deframed, Deframer, Dialect};
+use agv_wire::nav350::{Answer, Configuration, LostReason, Report, Request, Revolution, SensorSpeed, Session, Step};
 
 use super::clock::Clock;
 
@@ -241,7 +239,7 @@ impl Client {
         let stream = connect(address, PATIENCE).map_err(io)?;
         let dialect = Dialect::Binary;
         let mut client = Self { address: address.to_owned(), stream, dialect, deframer: Box::default() };
-        let identity = Request::Read(agv_core::wire::nav350::Variable::DeviceIdent);
+        let identity = Request::Read(agv_wire::nav350::Variable::DeviceIdent);
         if client.ask(&identity, Duration::from_secs(1), |_| true).is_err() {
             client.dialect = Dialect::Ascii;
             client.ask(&identity, PATIENCE, |_| true)?;

@@ -1,8 +1,8 @@
 //! What a NAV350 said to another host, from the bytes of both directions.
 
 use agv_core::measurement::Time;
-use agv_core::wire::cola::{Deframed, Deframer};
-use agv_core::wire::nav350::{
+use agv_wire::cola::{Deframed, Deframer};
+use agv_wire::nav350::{
     Answer, Channel, DeviceTime, ErrorCode, Method, MethodResult, Request, Revolution, SensorClock, SensorFrame,
 };
 
@@ -22,7 +22,7 @@ pub enum Heard {
     Undecodable,
 }
 
-/// Listens to a talk with a sensor, and makes of it what [`Session`](agv_core::wire::nav350::Session) does: from the
+/// Listens to a talk with a sensor, and makes of it what [`Session`](agv_wire::nav350::Session) does: from the
 /// same bytes at the same times the same revolutions. The sensor's clock is known from the questions for it that it
 /// hears; of a host that never asks, the arrival of each scan is taken as the end of its revolution.
 pub struct Listener {

@@ -5,7 +5,7 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_settings::leaf::Value;
 use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, PROTOCOL, Refusal, Request, Response, encode};

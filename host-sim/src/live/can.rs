@@ -3,16 +3,16 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use agv_core::localizer::{Event, Parameters};
+use agv_controller::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
+use agv_core::localizer::Parameters;
 use agv_core::measurement::{EncoderFault, Time};
 use agv_core::record::{RawSource, Record};
-use agv_core::wire::can::frame::{AnyFrame, Frame};
-use agv_core::wire::can::slcan::Message;
+use agv_wire::can::frame::{AnyFrame, Frame};
+use agv_wire::can::slcan::Message;
 
 use super::{LiveError, Recorder};
 use crate::bus::{Bus, BusError};
 use crate::link::clock::Clock;
-use crate::link::encoders::{EncoderLink, EncoderNodes, Outcome};
 use crate::log::LogError;
 
 /// What a recording brought.
@@ -35,7 +35,7 @@ const PAUSE: Duration = Duration::from_secs(1);
 
 struct Recording<'a> {
     recorder: &'a Recorder,
-    link: EncoderLink,
+    encoders: Encoders,
     summary: CanSummary,
     faults: [Option<EncoderFault>; 2],
 }
@@ -58,8 +58,8 @@ pub fn record_can(
     let mut bus = Some(open()?);
     let start = clock.now();
     recorder.write_raw(RawSource::FromCan, start, &[])?;
-    let link = EncoderLink::new(nodes, parameters, start);
-    let mut recording = Recording { recorder, link, summary: CanSummary::default(), faults: [None; 2] };
+    let encoders = Encoders::new(nodes, parameters, start);
+    let mut recording = Recording { recorder, encoders, summary: CanSummary::default(), faults: [None; 2] };
     let mut tried = Instant::now();
     while !is_stopped.load(Ordering::Relaxed) && clock.now() < until {
         let deadline = Instant::now() + LOOK.min(clock.until(until));
@@ -102,30 +102,34 @@ impl Recording<'_> {
 
     /// Records one look and what comes of it; gives the frames to send.
     fn step(&mut self, now: Time, frame: Option<&AnyFrame>) -> Result<Vec<Frame>, LogError> {
-        let Self { recorder, link, summary, faults } = self;
+        let Self { recorder, encoders, summary, faults } = self;
         let line = frame.map(|frame| Message::from(*frame).encode()).unwrap_or_default();
         recorder.write_raw(RawSource::FromCan, now, &line)?;
         summary.frames += usize::from(frame.is_some());
         let mut answers = Vec::new();
-        link.look(now, frame.and_then(AnyFrame::classic), |outcome| match outcome {
-            Outcome::Send(frame) => {
-                answers.push(frame);
-                recorder.write_raw(RawSource::ToCan, now, &Message::from(AnyFrame::from(frame)).encode())
-            }
-            Outcome::Event(event) => {
-                summary.samples += usize::from(matches!(event, Event::Encoders(_)));
-                if let Event::EncoderFaults(found) = event
-                    && [found.drive, found.steering] != *faults
-                {
-                    *faults = [found.drive, found.steering];
-                    summary.fault_changes += 1;
-                    let name = |fault: Option<_>| fault.map_or("sound".to_owned(), |fault| format!("{fault:?}"));
-                    let note = format!("can: encoders: drive {}, steering {}", name(found.drive), name(found.steering));
-                    recorder.write(&Record::Note(&note.to_lowercase()))?;
+        let mut outputs = Vec::new();
+        encoders.look(now, frame.and_then(AnyFrame::classic), |output| outputs.push(output));
+        for output in outputs {
+            let event = match output {
+                EncoderOutput::Send(frame) => {
+                    answers.push(frame);
+                    recorder.write_raw(RawSource::ToCan, now, &Message::from(AnyFrame::from(frame)).encode())?;
+                    continue;
                 }
-                recorder.write(&Record::Event(event))
+                EncoderOutput::Event(event) => event,
+            };
+            summary.samples += usize::from(matches!(event, BusEvent::Encoders(_)));
+            if let BusEvent::EncoderFaults(found) = event
+                && [found.drive, found.steering] != *faults
+            {
+                *faults = [found.drive, found.steering];
+                summary.fault_changes += 1;
+                let name = |fault: Option<_>| fault.map_or("sound".to_owned(), |fault| format!("{fault:?}"));
+                let note = format!("can: encoders: drive {}, steering {}", name(found.drive), name(found.steering));
+                recorder.write(&Record::Note(&note.to_lowercase()))?;
             }
-        })?;
+            recorder.write(&Record::Event(event.event()))?;
+        }
         Ok(answers)
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use agv_core::geometry::Point;
-use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::maps::{Landmark, LandmarkKind};
 
 /// A feature, where it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]

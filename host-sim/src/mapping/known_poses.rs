@@ -1,8 +1,8 @@
 //! Sightings of landmarks from poses that another instrument has measured.
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::LandmarkKind;
 use agv_core::localizer::{MapUse, PoseFix};
+use agv_core::maps::LandmarkKind;
 
 use super::Sighting;
 use crate::recording::{RecordedEvent, Recording, Truth, truth_at};

@@ -12,7 +12,7 @@ use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::Path;
 
-use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::maps::{Landmark, LandmarkKind};
 
 use crate::text_file::{self, TextFileError};
 

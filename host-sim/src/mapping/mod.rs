@@ -11,8 +11,8 @@ mod slam_poses;
 pub use clustering::{Clustering, Sighting, cluster};
 pub use slam_poses::{SlamPosesError, slam_poses};
 
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{MapUse, Mode, PoseOutput};
+use agv_core::maps::{Landmark, LandmarkKind};
 
 use crate::recording::{Recording, Truth};
 use crate::replay::{ReplayError, replay};

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::measurement::Time;
-use agv_core::places::{
+use agv_places::{
     Candidate, GlareParameters, GlareTables, OverlapParameters, PlaceIndex, Recognition, RecognitionParameters,
     Recognizer, ScanAlignmentParameters, align_scans, overlap,
 };

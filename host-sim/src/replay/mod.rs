@@ -8,8 +8,8 @@ pub use start_search::{StartSearchError, find_start};
 
 use std::time::{Duration, Instant};
 
-use agv_core::landmarks::MapError;
 use agv_core::localizer::{LandmarkUse, Localizer, PoseOutput};
+use agv_core::maps::MapError;
 use agv_core::record::Output;
 use thiserror::Error;
 

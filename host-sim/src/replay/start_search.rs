@@ -1,8 +1,8 @@
 //! Where a drive begins, found as the controller finds it: by the reflectors that are seen.
 
-use agv_core::landmarks::{FixedMap, Landmark, LandmarkKind, MapError};
 use agv_core::localizer::{PoseFix, StartFinder, StartState};
-use agv_core::places::{IndexedReflectors, ReflectorIndex, RelocalizationParameters};
+use agv_core::maps::{FixedMap, Landmark, LandmarkKind, MapError};
+use agv_core::relocalization::{ReflectorIndex, RelocalizationParameters};
 
 use crate::recording::Recording;
 
@@ -48,8 +48,8 @@ pub fn find_start(recording: &Recording) -> Result<(usize, PoseFix), StartSearch
     }
     let (mut map, mut index) = (Box::new(FixedMap::<REFLECTORS>::new()), Box::new(ReflectorIndex::<4096>::new()));
     map.extend(&reflectors)?;
-    index.build(&map);
-    let reflectors = IndexedReflectors { map: &map, index: &index };
+    index.build(map.view());
+    let reflectors = index.of(map.view());
     let mut finder = Box::new(StartFinder::<64>::new(recording.parameters, RelocalizationParameters::default()));
     let mut reason = StartSearchError::TooFew;
     for (number, event) in recording.events.iter().enumerate().filter(|(_, event)| !event.is_told()) {

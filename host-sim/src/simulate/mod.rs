@@ -19,8 +19,8 @@ pub mod warehouse_hall;
 pub mod world;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{Parameters, PoseFix};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::Time;
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 

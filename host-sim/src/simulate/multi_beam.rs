@@ -10,7 +10,7 @@ use agv_lidar3d::packet::LENGTH;
 use nalgebra::{Rotation3, Vector3};
 
 use super::random::Random;
-use crate::export::velodyne::hdl64e_packets;
+use crate::hdl64e_packets::hdl64e_packets;
 
 /// Lasers of an HDL-64E.
 const LASERS: usize = 64;

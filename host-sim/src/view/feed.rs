@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use agv_core::landmarks::MapError;
 use agv_core::localizer::Localizer;
+use agv_core::maps::MapError;
 use agv_core::record::{Item, Record};
 
 use super::server::Shared;

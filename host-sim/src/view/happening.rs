@@ -5,7 +5,7 @@ use agv_core::localizer::{Mode, PoseOutput, Reason};
 use agv_core::measurement::{EncoderFault, EncoderFaults};
 use serde::Serialize;
 
-use crate::evaluate::drive::{mode_name, reason_name};
+use crate::drive::{mode_name, reason_name};
 
 /// What kind of thing happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use agv_core::landmarks::{LandmarkKind, Verdict};
 use agv_core::localizer::{LandmarkSource, LandmarkUse};
+use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::Time;
 use serde::Serialize;
 

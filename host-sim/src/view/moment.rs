@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::hits::FoundLandmark;
 use super::scans::Found;
 use super::timeline::{Revolution, Timeline};
-use crate::evaluate::drive::{mode_name, reason_name};
+use crate::drive::{mode_name, reason_name};
 use crate::recording::{RecordedScan, truth_at};
 
 /// A sensor that has been silent for longer is no longer sound, s.

@@ -5,7 +5,7 @@ use agv_core::measurement::Time;
 use serde::Serialize;
 
 use super::timeline::Timeline;
-use crate::evaluate::drive::{MODES, mode_name};
+use crate::drive::{MODES, mode_name};
 
 /// Intervals of one answer at the most.
 const MOST: usize = 4000;

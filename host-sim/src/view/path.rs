@@ -4,7 +4,7 @@ use agv_core::localizer::Mode;
 use serde::{Deserialize, Serialize};
 
 use super::timeline::Timeline;
-use crate::evaluate::drive::MODES;
+use crate::drive::MODES;
 
 /// Points of one answer at the most.
 const MOST: usize = 20_000;

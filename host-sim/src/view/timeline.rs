@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
 use agv_core::localizer::{Event, LandmarkUse, Mode, Parameters, PoseOutput};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderFaults, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::record::{Damage, DamageReason, Output, Record};
@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::happening::{self, Happening, HappeningKind, ModeMemory};
 use super::hits::Hits;
 use super::scans::Scans;
-use crate::evaluate::drive::parameter_rows;
+use crate::drive::parameter_rows;
 use crate::recording::Truth;
 
 /// Happenings that are kept; a drive with more has another problem.

@@ -4,7 +4,7 @@ use agv_host_sim::simulate::block_storage::{BlockStorage, BlockStoragePath, Refl
 use agv_host_sim::simulate::scenario::{Scenario, WorldOptions};
 use agv_host_sim::simulate::simulate;
 
-use crate::support::{encoder_samples, revolutions, scans};
+use super::support::{encoder_samples, revolutions, scans};
 
 #[test]
 fn events_come_in_the_order_of_arrival() {

@@ -3,7 +3,7 @@ use agv_host_sim::recording::RecordedScan;
 use agv_host_sim::simulate::scenario::{PersonOptions, PoseOptions, Scenario};
 use agv_host_sim::simulate::{Simulation, simulate};
 
-use crate::support::{assert_unit_mean_square, hall_scenario, mean_square, range_to_hall, scans, true_pose};
+use super::support::{assert_unit_mean_square, hall_scenario, mean_square, range_to_hall, scans, true_pose};
 
 /// Measured less true range of every beam, with the laser where it was at the time that `time_of(scan, beam)` gives.
 fn range_errors(simulation: &Simulation, time_of: impl Fn(&RecordedScan, usize) -> Time) -> Vec<f64> {

@@ -8,7 +8,7 @@ use agv_host_sim::simulate::simulate;
 use agv_host_sim::simulate::speed_profile::SpeedProfile;
 use proptest::prelude::*;
 
-use crate::support::{assert_unit_mean_square, distance_to_segment, encoder_samples, first_and_last, hall_scenario};
+use super::support::{assert_unit_mean_square, distance_to_segment, encoder_samples, first_and_last, hall_scenario};
 
 const PATHS: [BlockStoragePath; 5] =
     [BlockStoragePath::P1, BlockStoragePath::P2, BlockStoragePath::P3, BlockStoragePath::P4, BlockStoragePath::Mapping];

@@ -5,7 +5,7 @@ use agv_host_sim::simulate::raycast::RayCaster;
 use agv_host_sim::simulate::world::{Circle, Rectangle, World};
 use proptest::prelude::*;
 
-use crate::support::crossing;
+use super::support::crossing;
 
 fn circle_crossing(origin: &Point, angle: f64, circle: &Circle) -> Option<f64> {
     let centre = Pose::new(origin.x, origin.y, angle).inverse_transform(&circle.centre);

@@ -4,7 +4,7 @@ use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::simulate::world::World;
 
-use crate::support::{assert_unit_mean_square, crossing, revolutions, true_pose};
+use super::support::{assert_unit_mean_square, crossing, revolutions, true_pose};
 
 fn is_free(world: &World, from: &Point, to: &Point) -> bool {
     let offset = to - from;

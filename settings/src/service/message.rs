@@ -1,6 +1,6 @@
 //! What is asked over the service port, and answered.
 
-use agv_core::landmarks::Landmark;
+use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! The controller's side of a connection, without sockets.
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::Landmark;
 use agv_core::localizer::PoseFix;
+use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;

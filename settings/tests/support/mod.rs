@@ -1,7 +1,7 @@
 //! Flash that loses its power.
 #![allow(dead_code, reason = "each test uses its part")]
 
-use agv_core::landmarks::{Landmark, LandmarkKind};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_settings::store::{LANDMARKS, Loaded, Store};
 use agv_settings::{LEAVES, Settings};
 use embedded_storage::nor_flash::{

@@ -18,7 +18,7 @@ const PACKAGES: [(&str, &str); 11] = [
     ("rosbags>=0.10,<1", "rosbags"),
     ("evo>=1.30,<2", "evo"),
     ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
-    (include_str!("../../../host-sim/ray/requirements.txt").trim_ascii(), "ray"),
+    (include_str!("../../../lab/ray/requirements.txt").trim_ascii(), "ray"),
 ];
 
 /// Debian's own, for machines whose first `python3` cannot make environments.

@@ -2,10 +2,10 @@
 
 use nalgebra::Matrix3;
 
-use crate::features::PointScan;
 use crate::filter::{Augmented, RelativePose};
 use crate::geometry::{Pose, difference};
-use crate::places::{SurfaceScan, align_to_surfaces};
+use crate::sensing::PointScan;
+use crate::sensing::{SurfaceScan, align_to_surfaces};
 
 use super::KeyScanParameters;
 

@@ -1,8 +1,8 @@
 //! What is known of the landmarks in the state beside their positions.
 
 use crate::geometry::difference;
-use crate::landmarks::LandmarkKind;
 use crate::localizer::LandmarkSource;
+use crate::maps::LandmarkKind;
 
 use super::SlamParameters;
 

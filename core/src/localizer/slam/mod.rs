@@ -10,15 +10,15 @@ mod parameters;
 
 pub use parameters::{KeyScanParameters, SlamParameters};
 
-use crate::features::PointScan;
 use crate::filter::{
     Augmented, Cartesian, Ekf, Innovation, Observation, SparseLinearisation, Timeline, augmented_states, packed_entries,
 };
 use crate::geometry::{Point, Pose, difference};
-use crate::landmarks::{LandmarkKind, NearestNeighbour, Verdict};
 use crate::localizer::{LandmarkSource, Parameters};
+use crate::maps::{LandmarkKind, NearestNeighbour, Verdict};
 use crate::measurement::Time;
 use crate::odometry::OdometryBias;
+use crate::sensing::PointScan;
 
 use super::evidence::Fate;
 use super::maps::Maps;
@@ -266,7 +266,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
                 consider(Candidate::InState { place, source: entry.source, id: entry.id }, &linearisation);
             }
         }
-        let mut given = |landmark: &crate::landmarks::Landmark| {
+        let mut given = |landmark: &crate::maps::Landmark| {
             if landmark.kind != seen.kind || self.book.has_fixed(landmark.id, landmark.kind) {
                 return;
             }

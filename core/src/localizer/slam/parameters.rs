@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::filter::{BiasDeviations, BiasWalk};
-use crate::places::{SurfaceAlignmentParameters, SurfaceParameters};
+use crate::sensing::{SurfaceAlignmentParameters, SurfaceParameters};
 
 /// How the pose, the calibration and the landmarks that are found while driving are estimated together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ pub struct SlamParameters {
     pub place_size: f64,
     /// The same for its heading, rad.
     pub place_turn: f64,
-    /// Alignment to key scans; none if only features count.
+    /// RigidFit to key scans; none if only features count.
     pub key_scans: Option<KeyScanParameters>,
 }
 

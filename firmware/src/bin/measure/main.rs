@@ -8,21 +8,21 @@ mod search;
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
-use agv_core::features::{Keypoint, PointScan, falko};
 use agv_core::geometry::Point;
-use agv_core::landmarks::{DynamicMap, FixedMap, Landmark, LandmarkKind, NearestNeighbour};
 use agv_core::localizer::{Event, Localizer, MapUse};
+use agv_core::maps::{DynamicMap, FixedMap, Landmark, LandmarkKind, NearestNeighbour};
 use agv_core::measurement::{Reflectors, Scan, Time};
 use agv_core::record::Record;
-use agv_core::wire::cola::{Deframed, Deframer, Dialect, Sequence};
-use agv_core::wire::nav350::{
-    Answer, Channel, ChannelName, DeviceTime, ErrorCode, MethodResult, Milliangle, NavigationData, Revolution,
-    SensorClock, SensorFrame,
-};
+use agv_core::sensing::{Keypoint, PointScan, falko};
 use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::log_file::LogBuffer;
 use agv_firmware::board::an500::panic;
 use agv_firmware::board::an500::stopwatch::Stopwatch;
+use agv_wire::cola::{Deframed, Deframer, Dialect, Sequence};
+use agv_wire::nav350::{
+    Answer, Channel, ChannelName, DeviceTime, ErrorCode, MethodResult, Milliangle, NavigationData, Revolution,
+    SensorClock, SensorFrame,
+};
 use cortex_m_semihosting::{debug, hprintln};
 use heapless::{String, Vec};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -97,7 +97,7 @@ fn main() -> ! {
     let points = POINTS.take();
     let map = MAP.init_with(FixedMap::new);
     map.extend(&thousand_reflectors()).expect("a thousand reflectors fit");
-    let dynamic = DYNAMIC.init_with(|| DynamicMap::new(agv_core::landmarks::DynamicMapParameters::default()));
+    let dynamic = DYNAMIC.init_with(|| DynamicMap::new(agv_core::maps::DynamicMapParameters::default()));
     BUFFER
         .take()
         .for_each(&mut input, |record| match (record, &mut localizer) {

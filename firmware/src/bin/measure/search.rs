@@ -1,11 +1,11 @@
 //! What it costs to find a pose among reflectors that look alike.
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::landmarks::{FixedMap, Landmark};
 use agv_core::localizer::EFFORT_A_REVOLUTION;
-use agv_core::places::{
-    IndexedReflectors, ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
-    RelocalizationParameters, RelocalizationProgress,
+use agv_core::maps::{FixedMap, Landmark};
+use agv_core::relocalization::{
+    ReflectorAnswer, ReflectorIndex, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot, RelocalizationParameters,
+    RelocalizationProgress,
 };
 use agv_firmware::board::an500::stopwatch::Stopwatch;
 use heapless::Vec;
@@ -63,8 +63,8 @@ fn searches(
 ) -> Count {
     map.clear();
     map.extend(reflectors).expect("a thousand reflectors fit");
-    index.build(map);
-    let indexed = IndexedReflectors { map, index };
+    index.build(map.view());
+    let indexed = index.of(map.view());
     let mut chance = Chance(2);
     let mut count = Count::new(name);
     for place in 0..10 {

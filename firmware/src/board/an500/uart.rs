@@ -6,8 +6,8 @@ use core::future::poll_fn;
 use core::task::Poll;
 
 use agv_core::measurement::Time;
-use agv_core::wire::can::frame::{AnyFrame, Frame};
-use agv_core::wire::can::slcan::{Decoder, Message};
+use agv_wire::can::frame::{AnyFrame, Frame};
+use agv_wire::can::slcan::{Decoder, Message};
 use critical_section::Mutex;
 use embassy_sync::waitqueue::WakerRegistration;
 use heapless::Deque;

@@ -6,7 +6,7 @@
 //! In the mode that takes other frames, too, it states the time of the interrupt.
 
 use agv_core::measurement::Time;
-use agv_core::wire::can::frame::Frame;
+use agv_wire::can::frame::Frame;
 use embassy_stm32::Peri;
 use embassy_stm32::can::config::FrameTransmissionConfig;
 use embassy_stm32::can::{BufferedCan, BufferedCanSender, CanConfigurator, RxBuf, RxPin, TxBuf, TxPin};

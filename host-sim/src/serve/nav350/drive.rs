@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use agv_core::geometry::Pose;
 use agv_core::localizer::Event;
 use agv_core::measurement::{ReflectorObservation, Time};
-use agv_core::wire::nav350::{Distance, IdentifiedLandmark, Milliangle, SensorFrame};
+use agv_wire::nav350::{Distance, IdentifiedLandmark, Milliangle, SensorFrame};
 
 use crate::layout_file;
 use crate::recording::{RecordedEvent, RecordedScan, Recording};

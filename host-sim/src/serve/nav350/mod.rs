@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use agv_core::wire::cola::Dialect;
-use agv_core::wire::nav350::{IdentifiedLandmark, SpeedReport};
+use agv_wire::cola::Dialect;
+use agv_wire::nav350::{IdentifiedLandmark, SpeedReport};
 
 pub use drive::{Drive, DriveError, Turn};
 pub use sensor::{Connection, Sensor, SensorClockOptions};

@@ -1,8 +1,8 @@
 //! Questions that a sensor answers at the end of a turn.
 
 use agv_core::measurement::Time;
-use agv_core::wire::cola::{Dialect, Sequence};
-use agv_core::wire::nav350::{
+use agv_wire::cola::{Dialect, Sequence};
+use agv_wire::nav350::{
     Angle, Answer, Channel, ChannelName, Coordinate, CoordinateFormat, Distance, ErrorCode, LandmarkData,
     LandmarkDataFormat, MethodName, MethodResult, NavigationData, OperatingMode, PoseAnswer, PoseDetails, PoseReport,
     PositionMode, Reflector, ReflectorDetails, ReflectorList, Setting, Size,

@@ -1,8 +1,8 @@
 //! What the sensor is: its settings, layout, modes and clock, and what it answers, without sockets and without a clock
 //! of its own.
 
-use agv_core::wire::cola::{CommandWord, Deframed, Deframer, Dialect, Fault, Raw, Sequence, Telegram, Text};
-use agv_core::wire::nav350::{
+use agv_wire::cola::{CommandWord, Deframed, Deframer, Dialect, Fault, Raw, Sequence, Telegram, Text};
+use agv_wire::nav350::{
     Answer, Coordinate, CoordinateFormat, DeviceTime, ErrorCode, IdentifiedLandmark, LandmarkDataFormat,
     MapConfiguration, Method, MethodName, MethodResult, Milliangle, OperatingMode, PoseDataFormat, ReflectorType,
     Request, ScanDataFormat, Setting, Size, SpeedReport, UserLevel, Value, Variable,
@@ -330,7 +330,7 @@ pub(super) fn encode(dialect: Dialect, answer: &Answer) -> Vec<u8> {
 
 fn refuse(dialect: Dialect, fault: Fault) -> Vec<u8> {
     let mut buffer = vec![0; 32];
-    let length = agv_core::wire::cola::Writer::fault(dialect, fault, &mut buffer).unwrap_or(0);
+    let length = agv_wire::cola::Writer::fault(dialect, fault, &mut buffer).unwrap_or(0);
     buffer.truncate(length);
     buffer
 }

@@ -170,7 +170,8 @@ impl Scenario {
 }
 
 /// Line, from 1, and what is wrong there, in one line.
-pub(crate) fn toml_complaint(text: &str, error: &toml::de::Error) -> (usize, String) {
+#[must_use]
+pub fn toml_complaint(text: &str, error: &toml::de::Error) -> (usize, String) {
     let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
     (before.matches('\n').count() + 1, error.message().replace('\n', ", "))
 }

@@ -2,45 +2,27 @@
 
 use core::hint::black_box;
 
-use agv_core::localizer::{OutputPredictor, Parameters};
-use agv_core::measurement::{EncoderFaults, Time};
+use agv_controller::{Bus as ControllerBus, Estimate, Troubles};
+use agv_core::measurement::Time;
 use agv_core::odometry::OdometryBias;
-use agv_core::wire::can::canopen::NodeId;
-use agv_core::wire::can::controller::{Health, LaserHealth, OrderReceiver, PosePublisher, StartSearch};
-use agv_core::wire::can::controller_node::ControllerNode;
-use agv_core::wire::can::encoder_pair::EncoderPair;
-use agv_core::wire::can::frame::{Frame, extended_id, standard_id};
-use agv_core::wire::can::slcan;
+use agv_core::state::{LaserHealth, Relocalization};
 use agv_settings::Settings;
-use agv_settings::encoders::{SYNC_PERIOD, channels, node};
+use agv_wire::can::frame::{Frame, extended_id, standard_id};
+use agv_wire::can::slcan;
 
 use super::any;
 
 /// What takes part in the bus.
 pub struct Bus {
-    pair: EncoderPair,
-    node: ControllerNode,
-    orders: OrderReceiver,
-    publisher: PosePublisher,
-    predictor: OutputPredictor<16>,
+    bus: ControllerBus,
     slcan: slcan::Decoder,
 }
 
 impl Bus {
     pub fn new() -> Self {
         let settings: Settings = any(Settings::default());
-        let start = any(Time::default());
-        let controller: NodeId = node(settings.nodes.controller);
-        let [drive, steering] = channels(&settings);
-        let parameters: Parameters = settings.parameters;
-        Self {
-            pair: EncoderPair::new(&drive, &steering, SYNC_PERIOD, start),
-            node: ControllerNode::new(controller, start),
-            orders: OrderReceiver::new(controller),
-            publisher: PosePublisher::new(controller, start),
-            predictor: OutputPredictor::new(&parameters),
-            slcan: slcan::Decoder::new(),
-        }
+        let troubles = Troubles { has_panicked: any(false), are_settings_lost: any(false) };
+        Self { bus: ControllerBus::new(&settings, troubles, any(Time::default())), slcan: slcan::Decoder::new() }
     }
 
     /// A frame, a byte of a serial adapter, and what is due.
@@ -61,36 +43,19 @@ impl Bus {
                 self.take(frame, time);
             }
         }
-        if self.orders.is_standstill(time) {
-            self.pair.expect_standstill();
-        }
-        if let Some(faults) = self.pair.poll_faults(time) {
-            self.predictor.doubt_encoders(&faults);
-        }
-        while let Some(frame) = self.pair.poll(time) {
-            black_box(frame);
-        }
-        while let Some(frame) = self.node.poll(time) {
-            black_box(frame);
-        }
-        let faults: EncoderFaults = self.pair.faults(time);
-        let health = Health {
-            drive: faults.drive,
-            steering: faults.steering,
-            laser: any(LaserHealth::Unknown),
-            start_search: any(StartSearch::Idle),
-        };
-        if let Some(output) = self.predictor.output() {
-            self.predictor.update(&any(output), &any(OdometryBias::default()));
-            black_box(self.publisher.poll(time, &output, &health));
+        self.bus.poll(time, any(LaserHealth::Unknown), |output| {
+            black_box(output);
+        });
+        black_box(self.bus.is_standing(time));
+        if let Some(pose) = self.bus.output() {
+            let (bias, relocalization) = (any(OdometryBias::default()), any(Relocalization::Idle));
+            self.bus.update(&Estimate { pose: any(pose), bias, relocalization });
         }
     }
 
     fn take(&mut self, frame: &Frame, time: Time) {
-        if let Some(sample) = self.pair.handle(frame, time) {
-            self.predictor.encoders(&sample);
-        }
-        black_box(self.node.handle(frame));
-        black_box(self.orders.handle(frame, time));
+        self.bus.hear(frame, time, |output| {
+            black_box(output);
+        });
     }
 }

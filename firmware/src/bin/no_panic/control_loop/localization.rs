@@ -3,8 +3,8 @@
 use core::hint::black_box;
 
 use agv_core::geometry::Pose;
-use agv_core::landmarks::{Landmark, LandmarkKind};
-use agv_core::localizer::{self, Event, Parameters, PoseFix, StartSearch};
+use agv_core::localizer::{self, Event, Outputs, PoseFix};
+use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
     EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
 };
@@ -26,9 +26,8 @@ type SlamLocalizer = localizer::Localizer;
 
 /// The localisers of an image with the feature `slam` and of one without.
 pub struct Localization {
-    localizer: room::Localizer,
+    localization: agv_controller::Localization<room::Localizer>,
     slam: SlamLocalizer,
-    search: StartSearch,
     frame: [u8; MAX_FRAME],
 }
 
@@ -61,11 +60,11 @@ fn event() -> Event<'static> {
 impl Localization {
     #[inline(always)]
     pub fn new() -> Self {
-        let parameters: Parameters = any(Settings::default().parameters);
+        let settings: Settings = any(Settings::default());
+        let parameters = settings.parameters;
         Self {
-            localizer: room::Localizer::new(parameters),
+            localization: agv_controller::Localization::new(room::Localizer::new(parameters), &settings),
             slam: SlamLocalizer::new(parameters),
-            search: StartSearch::new(&parameters, any(true)),
             frame: [0; MAX_FRAME],
         }
     }
@@ -73,20 +72,19 @@ impl Localization {
     /// One event, logged, handled and searched with, and a slice of the search.
     pub fn step(&mut self) {
         let event = event();
-        self.write(&Record::Event(event));
-        let _ = black_box(self.localizer.add_landmarks(part(&LANDMARKS)));
-        self.search.index(self.localizer.reflectors());
-        let outputs = self.localizer.handle(&event);
-        let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
-        black_box(outputs.pose.protection_level());
-        let mode = outputs.pose.mode;
-        self.search.handle(&event, mode, self.localizer.reflectors());
-        black_box(self.search.advance(self.localizer.reflectors()));
+        let Self { localization, frame, .. } = self;
+        let _ = black_box(localization.localizer_mut().add_landmarks(part(&LANDMARKS)));
+        localization.index();
+        localization.handle(&event, |event, outputs| log(frame, event, outputs));
+        black_box(localization.search(|event, outputs| log(frame, event, outputs)));
+        black_box(localization.estimate());
         let outputs = self.slam.handle(&event);
         let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
     }
+}
 
-    fn write(&mut self, record: &Record) {
-        let _ = black_box(encode(record, any(0), &mut self.frame));
-    }
+fn log(frame: &mut [u8], event: &Event, outputs: &Outputs) {
+    let _ = black_box(encode(&Record::Event(*event), any(0), frame));
+    let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), frame));
+    black_box(outputs.pose.protection_level());
 }

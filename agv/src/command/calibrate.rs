@@ -1,0 +1,271 @@
+//! `agv calibrate`.
+
+mod plan;
+
+use std::path::PathBuf;
+
+use agv_core::calibration::{MountingSide, Offsets};
+use agv_core::maps::{Landmark, LandmarkKind};
+use agv_host_sim::calibrate::drive::{Drive, Preparation};
+use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find};
+use agv_host_sim::calibrate::log_input::LogInput;
+use agv_host_sim::calibrate::model::PARAMETERS;
+use agv_host_sim::calibrate::report::{add_calibration, parameter_rows, remark_rows};
+use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_host_sim::mapping::map_file;
+use agv_host_sim::report::Page;
+use anyhow::{Context, ensure};
+use clap::ValueEnum;
+use serde::Serialize;
+
+use super::{output, progress};
+
+const HELP: &str = "\
+Examples:
+  agv calibrate drive.agvlog
+  agv calibrate drive.agvlog --method atc --report calibration
+  agv calibrate drive.agvlog --wheelbase --apply vehicle.toml
+  agv replay other.agvlog --vehicle vehicle.toml
+  agv calibrate plan --area 14x11 --steering 18..50 --time 900 --scenario plan.toml
+
+The vehicle drives arcs from standstill to standstill, forward and backward, to the left and to the right, with different
+steering angles, among at least four reflectors. Without stops, or with poses instead of reflectors, the drive is cut by time.
+Keys of --json:
+  method, source, segments, grade, parameters, std, wheelbase_seen_m, wheelbase_seen_std_m,
+  conditioning {equations, normal_equations}, noise {slip_m_per_root_m, steering_rad, laser},
+  outliers [start_s, end_s, x_m, y_m, theta_rad], faults [text], remarks [text].";
+
+/// Find the vehicle's parameters from the log of a drive, or plan such a drive.
+#[derive(clap::Args)]
+#[command(after_help = HELP, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct Calibrate {
+    #[command(subcommand)]
+    command: Option<Subcommand>,
+    /// The log.
+    #[arg(required = true)]
+    log: Option<PathBuf>,
+    /// How the parameters are found.
+    #[arg(long, value_enum, default_value = "joint")]
+    method: MethodName,
+    /// Find the wheelbase too, instead of holding it.
+    #[arg(long)]
+    wheelbase: bool,
+    /// Find the steering encoder's scale too.
+    #[arg(long)]
+    steering_ratio: bool,
+    /// Where the laser is known to be.
+    #[arg(long, value_enum)]
+    side: Option<Side>,
+    /// Map of the reflectors, to place each stop in it.
+    #[arg(long, value_name = "MAP")]
+    map: Option<PathBuf>,
+    /// Mend the faults of the encoders that are found.
+    #[arg(long)]
+    mend: bool,
+    /// Write the parameters to a file that `agv replay --vehicle` takes.
+    #[arg(long, value_name = "FILE")]
+    apply: Option<PathBuf>,
+    /// Write a page with pictures to DIR/index.html.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(clap::Subcommand)]
+enum Subcommand {
+    Plan(plan::Plan),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Closed form with one steering offset.
+    Stc,
+    /// Closed form with a steering offset for each sense of travel.
+    Atc,
+    /// Nonlinear fit of everything at once, with two offsets.
+    Joint,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Side {
+    Front,
+    Rear,
+    Left,
+    Right,
+}
+
+/// Every parameter by the name that it has in a vehicle file; null where it was held.
+#[derive(Serialize)]
+struct Named {
+    steer_offset_forward_rad: Option<f64>,
+    steer_offset_backward_rad: Option<f64>,
+    drive_scale_m_per_tick: Option<f64>,
+    wheelbase_m: Option<f64>,
+    steering_ratio: Option<f64>,
+    laser_x_m: Option<f64>,
+    laser_y_m: Option<f64>,
+    laser_theta_rad: Option<f64>,
+}
+
+impl Named {
+    fn of(values: [Option<f64>; PARAMETERS]) -> Self {
+        let [forward, backward, scale, wheelbase, ratio, x, y, heading] = values;
+        Self {
+            steer_offset_forward_rad: forward,
+            steer_offset_backward_rad: backward,
+            drive_scale_m_per_tick: scale,
+            wheelbase_m: wheelbase,
+            steering_ratio: ratio,
+            laser_x_m: x,
+            laser_y_m: y,
+            laser_theta_rad: heading,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Summary {
+    method: &'static str,
+    source: &'static str,
+    segments: usize,
+    grade: &'static str,
+    parameters: Named,
+    std: Named,
+    wheelbase_seen_m: f64,
+    wheelbase_seen_std_m: f64,
+    conditioning: Conditioning,
+    noise: Noise,
+    outliers: Vec<Outlier>,
+    faults: Vec<String>,
+    remarks: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Conditioning {
+    equations: f64,
+    normal_equations: f64,
+}
+
+#[derive(Serialize)]
+struct Noise {
+    slip_m_per_root_m: f64,
+    steering_rad: f64,
+    laser: f64,
+}
+
+#[derive(Serialize)]
+struct Outlier {
+    start_s: f64,
+    end_s: f64,
+    x_m: f64,
+    y_m: f64,
+    theta_rad: f64,
+}
+
+impl Calibrate {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        if let Some(Subcommand::Plan(plan)) = self.command {
+            return plan.run();
+        }
+        let log = self.log.as_ref().context("a log is needed")?;
+        let size = std::fs::metadata(log).map_or(0, |metadata| metadata.len());
+        let reading = progress::bar("reading", size);
+        let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
+        reading.finish_and_clear();
+        let map: Option<Vec<Landmark>> = match &self.map {
+            Some(path) => {
+                let mut map = map_file::read(path)?;
+                map.retain(|landmark| landmark.kind == LandmarkKind::Reflector);
+                ensure!(!map.is_empty(), "{}: the map holds no reflectors", path.display());
+                Some(map)
+            }
+            None => None,
+        };
+        let name = || log.display().to_string();
+        let mut drive = Drive::new(&input, &Preparation { map: map.as_deref(), mend: self.mend }).with_context(name)?;
+        drive.remarks.extend(damages.iter().map(|damage| format!("the log is damaged: {damage}")));
+        let found = find(&drive, &self.question()).with_context(name)?;
+        if let Some(path) = &self.apply {
+            VehicleFile::of(&found.model.apply(&drive.tricycle), &found.model.laser).write(path)?;
+        }
+        if let Some(folder) = &self.report {
+            let mut page =
+                Page::new(&format!("Calibration from {}", log.file_name().unwrap_or_default().to_string_lossy()));
+            add_calibration(&mut page, &drive, &found)?;
+            let path = folder.join("index.html");
+            page.write(&path).with_context(|| path.display().to_string())?;
+        }
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&self.summary(&drive, &found))?);
+            return Ok(());
+        }
+        println!("{:<26} {:>12} {:>12} {:>12}", "", "before", "after", "std");
+        for [name, before, after, deviation, unit] in parameter_rows(&drive, &found) {
+            println!("{name:<26} {before:>12} {after:>12} {deviation:>12} {unit}");
+        }
+        let mut rows = remark_rows(&drive, &found);
+        rows.extend(self.apply.iter().map(|path| ["written".to_owned(), path.display().to_string()]));
+        if let Some(folder) = &self.report {
+            rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
+        }
+        output::print_rows(&rows);
+        Ok(())
+    }
+
+    fn question(&self) -> Question {
+        Question {
+            method: if self.method == MethodName::Joint { Method::Joint } else { Method::ClosedForm },
+            offsets: if self.method == MethodName::Stc { Offsets::Common } else { Offsets::ForEachSense },
+            is_wheelbase_free: self.wheelbase,
+            is_steering_ratio_free: self.steering_ratio,
+            side: self.side.map(|side| match side {
+                Side::Front => MountingSide::Front,
+                Side::Rear => MountingSide::Rear,
+                Side::Left => MountingSide::Left,
+                Side::Right => MountingSide::Right,
+            }),
+        }
+    }
+
+    fn summary(&self, drive: &Drive, found: &Found) -> Summary {
+        let outlier = |residual: &agv_host_sim::calibrate::found::Residual| Outlier {
+            start_s: residual.start.seconds(),
+            end_s: residual.end.seconds(),
+            x_m: residual.motion.x,
+            y_m: residual.motion.y,
+            theta_rad: residual.motion.z,
+        };
+        Summary {
+            method: match self.method {
+                MethodName::Stc => "stc",
+                MethodName::Atc => "atc",
+                MethodName::Joint => "joint",
+            },
+            source: drive.source.name(),
+            segments: drive.windows.len(),
+            grade: match found.grade() {
+                Grade::Good => "good",
+                Grade::Fair => "fair",
+            },
+            parameters: Named::of(found.model.vector().map(Some)),
+            std: Named::of(found.deviations.map(|deviation| (deviation > 0.0).then_some(deviation))),
+            wheelbase_seen_m: found.suggested_wheelbase[0],
+            wheelbase_seen_std_m: found.suggested_wheelbase[1],
+            conditioning: Conditioning {
+                equations: found.conditioning.equations,
+                normal_equations: found.conditioning.normal_equations,
+            },
+            noise: Noise {
+                slip_m_per_root_m: found.noise.slip,
+                steering_rad: found.noise.steering,
+                laser: found.noise.laser,
+            },
+            outliers: found.outliers().map(outlier).collect(),
+            faults: drive.faults.iter().map(ToString::to_string).collect(),
+            remarks: drive.remarks.clone(),
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! `agv emulate`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use agv_host_sim::emulate::vehicle::{self, Errors, VehicleOptions, Watch};
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+use agv_host_sim::{log, replay};
+use anyhow::{Context, bail};
+use indicatif::ProgressStyle;
+use serde::Serialize;
+
+use super::output::{note, print_rows};
+use super::progress;
+
+const HELP: &str = "\
+The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
+replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that
+is printed. In the repository, `cargo xtask emulate` builds the firmware first.
+
+Examples:
+  agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
+  agv emulate --image vehicle --scenario host-sim/scenarios/warehouse_hall.toml --seconds 30 --json
+  agv emulate --image vehicle --untold --seconds 10
+  agv emulate --image vehicle --folder /tmp/vehicle && defmt-print -e vehicle < /tmp/vehicle/defmt.bin";
+
+/// Drive a vehicle whose controller runs the firmware in emulation
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Emulate {
+    /// Firmware image of the emulated board.
+    #[arg(long, value_name = "ELF")]
+    image: PathBuf,
+    /// Scenario to drive; the standard hall if absent.
+    #[arg(long)]
+    scenario: Option<PathBuf>,
+    /// How long to drive, s; to the end of the scenario if absent.
+    #[arg(long)]
+    seconds: Option<f64>,
+    /// Folder for the board's files: flash.bin, defmt.bin, stream.agvlog. A temporary one if absent.
+    #[arg(long)]
+    folder: Option<PathBuf>,
+    /// Do not tell the vehicle where it is: it finds itself by its reflectors.
+    #[arg(long)]
+    untold: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Outcome {
+    #[serde(flatten)]
+    errors: Errors,
+    records: usize,
+    damages: usize,
+    events: usize,
+    is_bit_equal: bool,
+}
+
+impl Emulate {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let scenario = match &self.scenario {
+            Some(path) => Scenario::read(path)?,
+            None => toml::from_str(include_str!("../../../host-sim/scenarios/warehouse_hall.toml"))
+                .context("standard hall")?,
+        };
+        let recording = simulate(&scenario)?.recording;
+        let image = self.image.canonicalize().with_context(|| self.image.display().to_string())?;
+        let temporary = std::env::temp_dir().join(format!("agv-emulate-{}", std::process::id()));
+        let folder = self.folder.clone().unwrap_or_else(|| temporary.clone());
+        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let folder = folder.canonicalize()?;
+        let options =
+            VehicleOptions { image: &image, folder: &folder, key: None, provision: true, is_told: !self.untold };
+        let outcome = self.drive(&recording, &options);
+        if self.folder.is_none() {
+            // What cannot be removed is left to the system.
+            let _ = std::fs::remove_dir_all(&temporary);
+        }
+        let outcome = outcome?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&outcome)?);
+        } else {
+            let Outcome { errors, records, events, is_bit_equal, damages } = &outcome;
+            print_rows(&[
+                ["poses".to_owned(), errors.poses.to_string()],
+                ["with reflectors".to_owned(), format!("{:.1} %", 100.0 * errors.localised_share)],
+                ["position, 95 %".to_owned(), format!("{:.1} mm", 1e3 * errors.position_p95_m)],
+                ["position, largest".to_owned(), format!("{:.1} mm", 1e3 * errors.position_max_m)],
+                ["heading, 95 %".to_owned(), format!("{:.3} deg", errors.heading_p95_deg)],
+                ["heading, largest".to_owned(), format!("{:.3} deg", errors.heading_max_deg)],
+                ["longest gap of poses".to_owned(), format!("{:.0} ms", 1e3 * errors.longest_gap_s)],
+                ["records streamed".to_owned(), records.to_string()],
+                ["damages".to_owned(), damages.to_string()],
+                ["events replayed".to_owned(), events.to_string()],
+                ["the same bits".to_owned(), if *is_bit_equal { "yes" } else { "no" }.to_owned()],
+            ]);
+        }
+        if !outcome.is_bit_equal {
+            bail!("the replay of the log stream differs from what the firmware said");
+        }
+        Ok(())
+    }
+
+    fn drive(
+        &self,
+        recording: &agv_host_sim::recording::Recording,
+        options: &VehicleOptions,
+    ) -> anyhow::Result<Outcome> {
+        let seconds = self.seconds.unwrap_or(f64::MAX);
+        let driven = vehicle::drive(recording, options, seconds, look)?;
+        let errors = vehicle::errors(&driven, recording).context("the controller has said no pose")?;
+        let contents = log::read_contents(&driven.log, |_| ())?;
+        let again = replay::replay(&contents.recording, |_| ())?;
+        let comparison = replay::compare(&contents.outputs, &again);
+        Ok(Outcome {
+            errors,
+            records: driven.stream.records,
+            damages: driven.stream.damages,
+            events: contents.recording.events.len(),
+            is_bit_equal: comparison.first_difference.is_none() && comparison.compared > 0,
+        })
+    }
+}
+
+/// Says where the drive can be seen, and shows the pose while the vehicle drives, on a terminal only.
+fn look(watch: &Watch) {
+    note(&format!("see it live: agv view --live 127.0.0.1:{}", watch.stream_port));
+    let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let progress = progress::spinner().with_style(style);
+    while !watch.is_over() {
+        let driven = watch.driven().map_or(0.0, |time| time.as_secs_f64());
+        let line = watch.pose().map_or_else(
+            || "the board starts".to_owned(),
+            |heard| {
+                let pose = heard.pose.pose;
+                format!(
+                    "{driven:6.1} s  x {:8.3} m  y {:8.3} m  heading {:8.2} deg  {:?}  laser {:?}",
+                    pose.x,
+                    pose.y,
+                    pose.theta.to_degrees(),
+                    heard.pose.mode,
+                    heard.pose.health.laser
+                )
+            },
+        );
+        progress.set_message(line);
+        progress.tick();
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    progress.finish_and_clear();
+}

@@ -1,0 +1,42 @@
+//! Which nodes of a bus are a vehicle's encoders.
+
+use agv_controller::EncoderNodes;
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::encoder::Reporting;
+
+/// Time between positions, ms.
+const PERIOD: u16 = 10;
+
+/// Options of the commands that listen to encoders.
+#[derive(clap::Args)]
+pub struct EncoderArguments {
+    /// Node of the driving wheel's encoder.
+    #[arg(long, value_name = "NODE", default_value = "1", value_parser = node)]
+    pub drive: NodeId,
+    /// Node of the steering's encoder.
+    #[arg(long, value_name = "NODE", default_value = "2", value_parser = node)]
+    pub steering: NodeId,
+    /// Positions are read at SYNC instead of by the encoders' own timers.
+    #[arg(long)]
+    pub sync: bool,
+    /// Node of the controller, whose orders are heard.
+    #[arg(long, value_name = "NODE", default_value = "16", value_parser = node)]
+    pub controller: NodeId,
+}
+
+impl EncoderArguments {
+    /// The nodes.
+    pub fn nodes(&self) -> EncoderNodes {
+        EncoderNodes {
+            drive: self.drive,
+            steering: self.steering,
+            controller: self.controller,
+            reporting: if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: PERIOD } },
+        }
+    }
+}
+
+/// A number of a node.
+pub fn node(text: &str) -> Result<NodeId, String> {
+    text.parse().ok().and_then(NodeId::new).ok_or_else(|| "a node is a number from 1 to 127".to_owned())
+}

@@ -1,0 +1,82 @@
+//! `agv evaluate`.
+
+mod calibration;
+mod carpark;
+mod falko;
+mod features;
+mod halting_points;
+mod kidnapping;
+mod lidar3d_calibration;
+mod lidar3d_places;
+mod lidar3d_sharpness;
+mod places;
+mod slam;
+mod trust;
+mod warehouse;
+mod windows;
+
+pub use lidar3d_places::Lidar3dPlaces;
+pub use places::Places;
+
+/// A log of the thesis.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Set {
+    Fr079,
+    Intel,
+}
+
+impl From<Set> for agv_lab::evaluate::falko::Set {
+    fn from(set: Set) -> Self {
+        match set {
+            Set::Fr079 => Self::Fr079,
+            Set::Intel => Self::Intel,
+        }
+    }
+}
+
+/// Measure on recordings and in simulation how good it is.
+#[derive(clap::Args)]
+pub struct Evaluate {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(clap::Subcommand)]
+enum Experiment {
+    Calibration(calibration::Calibration),
+    Carpark(carpark::Carpark),
+    Falko(falko::Falko),
+    HaltingPoints(halting_points::HaltingPoints),
+    Features(features::Features),
+    Kidnapping(kidnapping::Kidnapping),
+    Places(places::Places),
+    Slam(slam::Slam),
+    Trust(trust::Trust),
+    Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
+    Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
+    Lidar3dSharpness(lidar3d_sharpness::Lidar3dSharpness),
+    Warehouse(warehouse::Warehouse),
+    Windows(windows::Windows),
+}
+
+impl Evaluate {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        match self.experiment {
+            Experiment::Calibration(experiment) => experiment.run(),
+            Experiment::Carpark(experiment) => experiment.run(),
+            Experiment::Falko(experiment) => experiment.run(),
+            Experiment::HaltingPoints(experiment) => experiment.run(),
+            Experiment::Features(experiment) => experiment.run(),
+            Experiment::Kidnapping(experiment) => experiment.run(),
+            Experiment::Places(experiment) => experiment.run(),
+            Experiment::Slam(experiment) => experiment.run(),
+            Experiment::Trust(experiment) => experiment.run(),
+            Experiment::Lidar3dCalibration(experiment) => experiment.run(),
+            Experiment::Lidar3dPlaces(experiment) => experiment.run(),
+            Experiment::Lidar3dSharpness(experiment) => experiment.run(),
+            Experiment::Warehouse(experiment) => experiment.run(),
+            Experiment::Windows(experiment) => experiment.run(),
+        }
+    }
+}

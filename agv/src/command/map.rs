@@ -1,0 +1,164 @@
+//! `agv map`.
+
+use std::path::PathBuf;
+
+use agv_core::maps::{Landmark, LandmarkKind};
+use agv_host_sim::log;
+use agv_host_sim::mapping::{
+    Clustering, map_features, map_features_at, map_file, map_reflectors_at, reflector_clustering, slam::SlamParameters,
+    slam_poses,
+};
+use anyhow::{Context, bail, ensure};
+use clap::ValueEnum;
+use serde::Serialize;
+
+use super::{output, progress};
+
+const HELP: &str = "\
+Examples:
+  agv map drive.agvlog --output features.csv
+  agv map drive.agvlog --output features.csv --poses truth
+  agv map drive.agvlog --output reflectors.csv --kind reflectors
+  agv map drive.agvlog --output features.csv --slam
+
+A map is a text file whose first line is 'id,kind,x_m,y_m,deviation_m', with one landmark a line.
+Keys of --json: reflectors, corners, end_points, largest_deviation_mm; with --slam also key_scans, loops.";
+
+/// Build a map from a log with known poses.
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Map {
+    /// The log.
+    log: PathBuf,
+    /// Where the map goes; an older one is replaced.
+    #[arg(short, long, value_name = "MAP")]
+    output: PathBuf,
+    /// What to map.
+    #[arg(long, default_value = "features")]
+    kind: Kind,
+    /// Where the poses come from; for reflectors the truth if there is any, else the references.
+    #[arg(long)]
+    poses: Option<Poses>,
+    /// Find the poses too, from odometry, scans and the loops that are recognised; nothing is known of the hall.
+    #[arg(long, conflicts_with = "poses")]
+    slam: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Kind {
+    /// Natural features.
+    Features,
+    /// Reflectors.
+    Reflectors,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Poses {
+    /// Localise the drive by the reflectors of its log.
+    Localiser,
+    /// The true poses in the log.
+    Truth,
+    /// The reference poses in the log, as far as they have a heading.
+    References,
+}
+
+#[derive(Serialize)]
+struct Summary {
+    reflectors: usize,
+    corners: usize,
+    end_points: usize,
+    largest_deviation_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    key_scans: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loops: Option<usize>,
+}
+
+impl Map {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let size = std::fs::metadata(&self.log).map_or(0, |metadata| metadata.len());
+        let reading = progress::bar("reading", size);
+        let (recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
+            .map(|read| (read.recording, read.damages))?;
+        reading.finish_and_clear();
+        let mut slam = None;
+        let default = match self.kind {
+            Kind::Features => Poses::Localiser,
+            Kind::Reflectors if recording.truth.is_empty() => Poses::References,
+            Kind::Reflectors => Poses::Truth,
+        };
+        let poses = match self.poses.unwrap_or(default) {
+            _ if self.slam => {
+                let bar = progress::spinner().with_message("finding the poses");
+                let found = slam_poses(&recording, &SlamParameters::all(), || bar.tick())
+                    .with_context(|| self.log.display().to_string())?;
+                bar.finish_and_clear();
+                ensure!(!found.1.keys.is_empty(), "{}: the log has no scans", self.log.display());
+                slam = Some((found.1.keys.len(), found.1.closures.len()));
+                Some((found.0, "poses"))
+            }
+            Poses::Localiser => None,
+            Poses::Truth => Some((recording.truth.clone(), "true poses")),
+            Poses::References => Some((recording.referenced_poses(), "reference poses with a heading")),
+        };
+        if let Some((poses, name)) = &poses {
+            ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());
+        }
+        let looking = progress::spinner().with_message("looking for landmarks");
+        looking.tick();
+        let landmarks = match (self.kind, &poses) {
+            (Kind::Reflectors, None) => {
+                bail!("reflectors cannot be mapped from poses that rest on them; choose --poses truth or references")
+            }
+            (Kind::Reflectors, Some((poses, _))) => map_reflectors_at(&recording, poses, &reflector_clustering()),
+            (Kind::Features, None) => map_features(&recording, &Clustering::default()),
+            (Kind::Features, Some((poses, _))) => map_features_at(&recording, poses, &Clustering::default()),
+        }
+        .with_context(|| self.log.display().to_string())?;
+        looking.finish_and_clear();
+        ensure!(!landmarks.is_empty(), "{}: no landmark was seen often enough from known poses", self.log.display());
+        map_file::write(&self.output, &landmarks)?;
+        for damage in &damages {
+            output::note(&format!("{}: {damage}", self.log.display()));
+        }
+        let summary =
+            Summary { key_scans: slam.map(|slam| slam.0), loops: slam.map(|slam| slam.1), ..Summary::of(&landmarks) };
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+            return Ok(());
+        }
+        let mut rows = vec![
+            ["reflectors".to_owned(), summary.reflectors.to_string()],
+            ["corners".to_owned(), summary.corners.to_string()],
+            ["end points".to_owned(), summary.end_points.to_string()],
+            ["largest deviation".to_owned(), format!("{:.1} mm", summary.largest_deviation_mm.unwrap_or_default())],
+        ];
+        if let Some((keys, loops)) = slam {
+            rows.push(["key scans".to_owned(), keys.to_string()]);
+            rows.push(["loops".to_owned(), loops.to_string()]);
+        }
+        output::print_rows(&rows);
+        Ok(())
+    }
+}
+
+impl Summary {
+    fn of(landmarks: &[Landmark]) -> Self {
+        let count = |kind| landmarks.iter().filter(|landmark| landmark.kind == kind).count();
+        Self {
+            reflectors: count(LandmarkKind::Reflector),
+            corners: count(LandmarkKind::Corner),
+            end_points: count(LandmarkKind::EndPoint),
+            largest_deviation_mm: landmarks
+                .iter()
+                .map(|landmark| 1e3 * f64::from(landmark.deviation))
+                .max_by(f64::total_cmp),
+            key_scans: None,
+            loops: None,
+        }
+    }
+}

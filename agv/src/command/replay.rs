@@ -1,0 +1,267 @@
+//! `agv replay`.
+
+use std::path::{Path, PathBuf};
+
+use agv_core::geometry::Pose;
+use agv_core::localizer::{MapUse, PoseFix};
+use agv_core::maps::{Landmark, LandmarkKind};
+use agv_core::record::Damage;
+use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
+use agv_host_sim::log::{self, Contents};
+use agv_host_sim::mapping::map_file;
+use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
+use agv_host_sim::replay::{Comparison, compare, replay};
+use agv_host_sim::report::Page;
+use anyhow::{Context, ensure};
+use clap::ValueEnum;
+use serde::Serialize;
+
+use super::lidar3d::relocalise::Relocalisation;
+use super::{output, pose_argument, progress};
+
+const HELP: &str = "\
+Examples:
+  agv replay drive.agvlog
+  agv replay drive.agvlog --report drive-report
+  agv replay drive.agvlog --map features.csv --json
+  agv replay drive.agvlog --vehicle vehicle.toml
+  agv replay intel.agvlog --start recorded --landmarks dynamic
+  agv replay drive.agvlog --landmarks none --output odometry.agvlog
+  agv replay drive.agvlog --relocalise reflectors
+  agv replay drive.agvlog --relocalise lidar3d --places street.places3d --scans drive.pcap
+
+Keys of --json:
+  software, duration_s, way_m, events, poses, realtime_factor,
+  modes [mode, duration_s], mode_changes [time_s, mode, reason],
+  observations [kind, accepted, gated, ambiguous, unknown, out_of_time],
+  innovations [kind, rms_first_mm, rms_second_mm, rms_bearing_deg, mean_normalised_square],
+  accuracy {against, compared, position_mm, position_end_mm, heading_deg, heading_end_deg, nees, ok_share},
+  outputs {compared, first_difference}, damage [offset, skipped, reason].
+accuracy is null if nobody knows where the vehicle was, outputs if the log holds none that can be compared.";
+
+/// Run the localiser on a log.
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Replay {
+    /// The log.
+    log: PathBuf,
+    /// Write a page with pictures to DIR/index.html.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Write a log with the same events and the outputs of this replay.
+    #[arg(long, value_name = "LOG2")]
+    output: Option<PathBuf>,
+    /// Map to use; its reflectors replace those of the log, its features the log's features.
+    #[arg(long, value_name = "MAP")]
+    map: Vec<PathBuf>,
+    /// Parameters of the vehicle, instead of those of the log; as `agv calibrate --apply` writes them.
+    #[arg(long, value_name = "FILE")]
+    vehicle: Option<PathBuf>,
+    /// Which landmarks correct the pose, instead of what the log states.
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',')]
+    landmarks: Vec<Landmarks>,
+    /// Where the vehicle is at the start, for logs that do not say it: X,Y,HEADING of the logical point in m, m and deg,
+    /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose.
+    #[arg(long, value_name = "POSE", value_parser = start, allow_hyphen_values = true)]
+    start: Option<Start>,
+    #[command(flatten)]
+    relocalisation: Relocalisation,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Landmarks {
+    /// Odometry alone.
+    None,
+    /// The map's reflectors.
+    Reflectors,
+    /// The map's natural features.
+    Features,
+    /// Natural features that are found while driving.
+    Dynamic,
+    /// Natural features that are found on the way, in the state of the filter.
+    Slam,
+}
+
+/// Where the vehicle is at the start.
+#[derive(Clone, Copy, Debug)]
+enum Start {
+    Recorded,
+    Given(Pose),
+}
+
+fn start(text: &str) -> Result<Start, String> {
+    if text == "recorded" {
+        return Ok(Start::Recorded);
+    }
+    let problem = || "three numbers X,Y,HEADING, or 'recorded', are expected".to_owned();
+    pose_argument::pose(text).map(Start::Given).map_err(|_| problem())
+}
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    /// Program that wrote the log.
+    software: &'a str,
+    #[serde(flatten)]
+    figures: &'a Figures,
+    outputs: Option<Comparison>,
+    damage: Vec<DamageEntry>,
+}
+
+#[derive(Serialize)]
+struct DamageEntry {
+    offset: u64,
+    skipped: u64,
+    reason: String,
+}
+
+impl Replay {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        if let Some(output) = &self.output {
+            let is_same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+            ensure!(!is_same(output, &self.log), "{}: the output would replace the log", output.display());
+        }
+        let size = std::fs::metadata(&self.log).map_or(0, |metadata| metadata.len());
+        let reading = progress::bar("reading", size);
+        let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
+        reading.finish_and_clear();
+        let Contents { software, mut recording, outputs, damages } = contents;
+        let is_as_recorded = self.map.is_empty()
+            && self.landmarks.is_empty()
+            && self.start.is_none()
+            && self.vehicle.is_none()
+            && !self.relocalisation.is_wanted();
+        self.relocalisation.apply(&mut recording).with_context(|| self.log.display().to_string())?;
+        if let Some(start) = self.start {
+            set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
+        }
+        if let Some(path) = &self.vehicle {
+            let is_tricycle = VehicleFile::read(path)?.apply(&mut recording.parameters);
+            ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
+        }
+        for path in &self.map {
+            use_map(&mut recording, map_file::read(path)?);
+        }
+        if !self.landmarks.is_empty() {
+            recording.parameters.maps = self.maps()?;
+        }
+
+        let running = progress::bar("replaying", recording.events.len() as u64);
+        let replay = replay(&recording, |events| running.set_position(events as u64))
+            .with_context(|| self.log.display().to_string())?;
+        running.finish_and_clear();
+        let comparison = (is_as_recorded && !outputs.is_empty()).then(|| compare(&outputs, &replay));
+        if let Some(path) = &self.output {
+            log::write_with_outputs(path, &recording, |event| replay.output(event))?;
+        }
+        let track = Track::new(&recording, &replay);
+        let figures = Figures::new(&recording, &replay, &track);
+        let mut remarks = self.remarks(&software, comparison, &damages);
+        if figures.poses == 0 {
+            remarks.push(["start".to_owned(), "no pose is given in the log; --start gives one".to_owned()]);
+        }
+        if let Some(folder) = &self.report {
+            let name = self.log.file_name().unwrap_or_default().to_string_lossy();
+            let mut page = Page::new(&format!("Replay of {name}"));
+            add_drive(&mut page, &remarks, &recording, &replay, &track, &figures)?;
+            let path = folder.join("index.html");
+            page.write(&path).with_context(|| path.display().to_string())?;
+        }
+        if self.json {
+            let damage = damages.iter().map(|damage| DamageEntry {
+                offset: damage.offset,
+                skipped: damage.skipped,
+                reason: damage.reason.to_string(),
+            });
+            let summary =
+                Summary { software: &software, figures: &figures, outputs: comparison, damage: damage.collect() };
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+            return Ok(());
+        }
+        let mut rows = remarks;
+        rows.extend(figure_rows(&figures));
+        if let Some(folder) = &self.report {
+            rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
+        }
+        output::print_rows(&rows);
+        Ok(())
+    }
+
+    fn maps(&self) -> anyhow::Result<MapUse> {
+        let has = |wanted| self.landmarks.contains(&wanted);
+        ensure!(!has(Landmarks::None) || self.landmarks.len() == 1, "--landmarks: 'none' goes with nothing else");
+        Ok(MapUse {
+            reflectors: has(Landmarks::Reflectors),
+            features: has(Landmarks::Features),
+            dynamic: has(Landmarks::Dynamic),
+            slam: has(Landmarks::Slam),
+        })
+    }
+
+    /// What there is to say about the log itself.
+    fn remarks(&self, software: &str, comparison: Option<Comparison>, damages: &[Damage]) -> Vec<[String; 2]> {
+        let mut rows =
+            vec![["log".to_owned(), self.log.display().to_string()], ["written by".to_owned(), software.to_owned()]];
+        rows.extend(self.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
+        for map in &self.map {
+            rows.push(["map".to_owned(), map.display().to_string()]);
+        }
+        let listed = damages.iter().take(LISTED_DAMAGES);
+        rows.extend(listed.map(|damage| ["damage".to_owned(), damage.to_string()]));
+        if damages.len() > LISTED_DAMAGES {
+            rows.push(["damage".to_owned(), format!("in {} more places", damages.len() - LISTED_DAMAGES)]);
+        }
+        if let Some(Comparison { compared, first_difference }) = comparison {
+            let verdict = match first_difference {
+                None => format!("equal to the {compared} recorded ones, bit for bit"),
+                Some(event) => format!("differ from the recorded ones, first at event {event}"),
+            };
+            rows.push(["outputs".to_owned(), verdict]);
+        }
+        rows
+    }
+}
+
+/// Standard deviations of a start pose that somebody states, m and rad.
+const STATED_DEVIATIONS: (f64, f64) = (0.3, 5.0 * std::f64::consts::PI / 180.0);
+
+/// Standard deviations of a start pose that has been measured, m and rad.
+const RECORDED_DEVIATIONS: (f64, f64) = (0.05, 1.0 * std::f64::consts::PI / 180.0);
+
+/// Puts a start pose before all events; other poses that the log gives stay.
+fn set_start(recording: &mut Recording, start: Start) -> anyhow::Result<()> {
+    let known = || recording.truth.first().copied().or_else(|| recording.referenced_poses().first().copied());
+    let (time, pose, (position_deviation, heading_deviation)) = match start {
+        Start::Given(pose) => {
+            let first = recording.events.iter().filter_map(RecordedEvent::time).min();
+            (first.context("the log has no events")?, pose, STATED_DEVIATIONS)
+        }
+        Start::Recorded => {
+            let Truth { time, pose } = known().context("there is no pose with a heading in the log")?;
+            (time, pose, RECORDED_DEVIATIONS)
+        }
+    };
+    let fix = PoseFix { time, pose, position_deviation, heading_deviation };
+    recording.events.insert(0, RecordedEvent::SetPose(fix));
+    Ok(())
+}
+
+/// Places of damage that are listed at the most.
+const LISTED_DAMAGES: usize = 10;
+
+/// Replaces the landmarks of the groups that the map holds, and switches these groups on.
+fn use_map(recording: &mut Recording, map: Vec<Landmark>) {
+    let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
+    for group in [true, false] {
+        if map.iter().any(|landmark| is_reflector(landmark) == group) {
+            recording.landmarks.retain(|landmark| is_reflector(landmark) != group);
+            let maps = &mut recording.parameters.maps;
+            *(if group { &mut maps.reflectors } else { &mut maps.features }) = true;
+        }
+    }
+    recording.landmarks.extend(map);
+}

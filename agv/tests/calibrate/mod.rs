@@ -1,0 +1,8 @@
+//! Calibration from logs: simulated drives whose truth is known, and logs that are not good enough.
+
+mod bad_logs;
+mod command;
+mod counters;
+mod drives;
+mod model;
+mod truth;

@@ -1,0 +1,8 @@
+//! Multi-beam lidars, on recordings of real ones and in simulation.
+
+mod calibration;
+mod command;
+mod manual;
+mod range_images;
+mod refinement;
+mod velodyne_decoder;

@@ -1,0 +1,9 @@
+//! The NAV350: recorded telegrams, the emulated sensor, and what is recorded from it.
+
+mod capture;
+mod commands;
+mod layout;
+mod live;
+mod minute;
+mod recorded;
+mod turns;

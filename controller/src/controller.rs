@@ -1,0 +1,178 @@
+//! All parts as one value.
+
+use agv_core::localizer::{Event, Localize, Localizer, Outputs, PoseFix};
+use agv_core::measurement::Time;
+use agv_core::state::PoseOutput;
+use agv_settings::Settings;
+use agv_wire::can::frame::Frame;
+use agv_wire::nav350::{Configuration, Revolution, Step};
+
+use super::bus::{Bus, BusOutput, Troubles};
+use super::encoders::BusEvent;
+use super::laser::Laser;
+use super::localization::Localization;
+
+/// Room for the longest telegram of a revolution with 1440 beams, in either dialect.
+pub const TELEGRAM: usize = 18 * 1024;
+
+/// Slices of the search that there is time for in a millisecond.
+const SLICES: usize = 8;
+
+/// What the controller wants of its laser.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LaserOrder<'a> {
+    /// A connection.
+    Connect,
+    /// No connection any more.
+    Disconnect,
+    /// These bytes sent.
+    Send(&'a [u8]),
+}
+
+/// A controller that does one thing after the other: that of a desktop, in simulated time. A board runs its parts at three
+/// priorities.
+///
+/// `observe` is told each event that was handled and what came of it, for a log.
+#[derive(Debug)]
+pub struct Controller<L = Localizer> {
+    laser: Laser<TELEGRAM>,
+    revolution: Revolution,
+    bus: Bus,
+    localization: Localization<L>,
+}
+
+impl<L: Localize> Controller<L> {
+    /// A controller that is switched on at `now`, with a localiser that has its maps.
+    #[must_use]
+    pub fn new(settings: &Settings, localizer: L, now: Time) -> Self {
+        Self {
+            laser: Laser::new(Configuration::default()),
+            revolution: Revolution::new(),
+            bus: Bus::new(settings, Troubles::default(), now),
+            localization: Localization::new(localizer, settings),
+        }
+    }
+
+    /// The connection to the laser is open.
+    pub fn connected(&mut self, now: Time) {
+        self.laser.connected(now);
+    }
+
+    /// The connection to the laser cannot be opened, or is broken.
+    pub fn unreachable(&mut self) {
+        self.laser.unreachable();
+    }
+
+    /// Takes bytes of the laser.
+    pub fn hear_laser(
+        &mut self,
+        bytes: &[u8],
+        now: Time,
+        mut order: impl FnMut(LaserOrder),
+        mut observe: impl FnMut(&Event, &Outputs),
+    ) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            // A telegram is shorter than the session's room, so it always takes some.
+            let taken = self.laser.receive(rest, now);
+            rest = rest.get(taken..).unwrap_or_default();
+            self.poll_laser(now, &mut order, &mut observe);
+        }
+    }
+
+    /// Does what there is to do with the laser.
+    pub fn poll_laser(
+        &mut self,
+        now: Time,
+        mut order: impl FnMut(LaserOrder),
+        mut observe: impl FnMut(&Event, &Outputs),
+    ) {
+        loop {
+            match self.laser.poll(now, &mut self.revolution) {
+                Step::Wait(_) => return,
+                Step::Connect => return order(LaserOrder::Connect),
+                Step::Disconnect(_) => order(LaserOrder::Disconnect),
+                Step::Send(bytes) => order(LaserOrder::Send(bytes)),
+                Step::Report(_) => {}
+                Step::Revolution => {
+                    self.localization.revolution(&self.revolution, &mut observe);
+                    self.bus.update(&self.localization.estimate());
+                }
+            }
+        }
+    }
+
+    /// Takes a frame of the bus.
+    pub fn hear_bus(
+        &mut self,
+        frame: &Frame,
+        now: Time,
+        mut send: impl FnMut(&Frame),
+        mut observe: impl FnMut(&Event, &Outputs),
+    ) {
+        let Self { bus, localization, .. } = self;
+        let mut has_spoken = false;
+        bus.hear(frame, now, |output| match output {
+            BusOutput::Send(frame) => send(&frame),
+            BusOutput::Event(event) => {
+                has_spoken = true;
+                localization.handle(&event.event(), &mut observe);
+            }
+        });
+        if has_spoken {
+            bus.update(&localization.estimate());
+        }
+    }
+
+    /// Does what there is to do on the bus.
+    pub fn poll_bus(&mut self, now: Time, mut send: impl FnMut(&Frame), mut observe: impl FnMut(&Event, &Outputs)) {
+        let Self { bus, localization, laser, .. } = self;
+        let mut has_spoken = false;
+        bus.poll(now, laser.health(now), |output| match output {
+            BusOutput::Send(frame) => send(&frame),
+            BusOutput::Event(event) => {
+                has_spoken = true;
+                localization.handle(&event.event(), &mut observe);
+            }
+        });
+        if has_spoken {
+            bus.update(&localization.estimate());
+        }
+    }
+
+    /// Somebody tells where the vehicle is.
+    pub fn tell(&mut self, fix: PoseFix, observe: impl FnOnce(&Event, &Outputs)) {
+        self.localization.handle(&BusEvent::SetPose(fix).event(), observe);
+        self.bus.update(&self.localization.estimate());
+    }
+
+    /// Searches a pose if there is none, as long as a millisecond allows.
+    pub fn search(&mut self, mut observe: impl FnMut(&Event, &Outputs)) {
+        for _ in 0..SLICES {
+            let mut has_spoken = false;
+            let is_busy = self.localization.search(|event, outputs| {
+                has_spoken = true;
+                observe(event, outputs);
+            });
+            if has_spoken {
+                self.bus.update(&self.localization.estimate());
+            }
+            if !is_busy {
+                break;
+            }
+        }
+        self.bus.set_relocalization(self.localization.relocalization());
+    }
+
+    /// The pose for now. None before the localiser has said anything.
+    #[must_use]
+    pub fn output(&self) -> Option<PoseOutput> {
+        self.bus.output()
+    }
+
+    /// Its localiser.
+    #[must_use]
+    pub fn localizer(&self) -> &L {
+        self.localization.localizer()
+    }
+}

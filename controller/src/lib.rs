@@ -1,0 +1,28 @@
+//! The vehicle's controller without its hardware: frames of the bus and bytes of the laser go in; frames, bytes and poses
+//! come out. Times are passed in.
+//!
+//! | part | what it does | on a vehicle |
+//! |---|---|---|
+//! | [`Encoders`] | sets the encoders up, watches them, and makes events of what they and other controllers say | in the bus's task |
+//! | [`Bus`] | all that the bus hears and says: [`Encoders`], the controller's own node, the pose for now | the bus's task |
+//! | [`Laser`] | the session with the laser, and whether it can be used | the network's task |
+//! | [`Localization`] | the localiser, and the search for a pose that it does not have | the main loop |
+//! | [`Controller`] | all of them as one value, one after the other | a desktop, in simulated time |
+//!
+//! A board runs the parts at three priorities and passes [`BusEvent`]s, revolutions and [`Estimate`]s between them.
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod bus;
+mod controller;
+mod encoders;
+mod laser;
+mod localization;
+mod standstill;
+
+pub use bus::{Bus, BusOutput, MOTIONS, Troubles};
+pub use controller::{Controller, LaserOrder, TELEGRAM};
+pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels};
+pub use laser::Laser;
+pub use localization::{Estimate, Localization};
+pub use standstill::Standstill;

@@ -1,0 +1,38 @@
+//! A localiser of any capacities.
+
+use super::{Event, Outputs};
+use crate::maps::MapView;
+use crate::odometry::OdometryBias;
+
+/// What a controller wants of its localiser, whatever the localiser has room for.
+pub trait Localize {
+    /// See [`super::Localizer::handle`].
+    fn handle(&mut self, event: &Event) -> &Outputs;
+
+    /// See [`super::Localizer::outputs`].
+    fn outputs(&self) -> &Outputs;
+
+    /// See [`super::Localizer::odometry_bias`].
+    fn odometry_bias(&self) -> OdometryBias;
+
+    /// See [`super::Localizer::reflectors`].
+    fn reflectors(&self) -> MapView<'_>;
+}
+
+impl<L: Localize> Localize for &mut L {
+    fn handle(&mut self, event: &Event) -> &Outputs {
+        (**self).handle(event)
+    }
+
+    fn outputs(&self) -> &Outputs {
+        (**self).outputs()
+    }
+
+    fn odometry_bias(&self) -> OdometryBias {
+        (**self).odometry_bias()
+    }
+
+    fn reflectors(&self) -> MapView<'_> {
+        (**self).reflectors()
+    }
+}

@@ -1,0 +1,13 @@
+//! Points of the world that the vehicle can recognise.
+
+mod association;
+mod dynamic_map;
+mod fixed_map;
+mod grid;
+mod landmark;
+
+pub use association::{Match, NearestNeighbour, Verdict};
+pub use dynamic_map::{DynamicLandmark, DynamicMap, DynamicMapParameters};
+pub use fixed_map::{FixedMap, MapError, MapView};
+pub use grid::{Grid, GridView};
+pub use landmark::{Landmark, LandmarkKind};

@@ -1,0 +1,80 @@
+//! Faults of what is believed before the vehicle drives.
+
+use agv_core::geometry::Pose;
+use agv_core::odometry::Vehicle;
+
+use super::{Fault, FaultKind};
+use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::simulate::random::Random;
+
+impl Fault {
+    /// Makes what the localiser is told before the drive wrong.
+    pub(crate) fn mislead(&self, recording: &mut Recording, random: &mut Random) {
+        match self.what {
+            FaultKind::ReflectorsMoved { share, metres } => {
+                for landmark in &mut recording.landmarks {
+                    let (is_moved, angle) = (random.happens(share), random.between(0.0, std::f64::consts::TAU));
+                    if is_moved {
+                        let (sine, cosine) = libm::sincos(angle);
+                        landmark.x += metres * cosine;
+                        landmark.y += metres * sine;
+                    }
+                }
+            }
+            FaultKind::WallMoved { metres } => {
+                let low = recording.landmarks.iter().map(|landmark| landmark.y).fold(f64::INFINITY, f64::min);
+                for landmark in recording.landmarks.iter_mut().filter(|landmark| landmark.y < low + NEAR_WALL) {
+                    landmark.x += metres;
+                }
+            }
+            FaultKind::LayoutMirrored => {
+                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.x));
+                for landmark in &mut recording.landmarks {
+                    landmark.x = 2.0 * middle - landmark.x;
+                }
+            }
+            FaultKind::LayoutOfAnotherHall => {
+                let mean_y = mean(recording.landmarks.iter().map(|landmark| landmark.y));
+                for landmark in &mut recording.landmarks {
+                    landmark.x += random.between(-3.0, 3.0);
+                    landmark.y = 2.0 * mean_y - landmark.y + random.between(-3.0, 3.0);
+                }
+            }
+            FaultKind::LayoutStretched { share } => {
+                for landmark in &mut recording.landmarks {
+                    landmark.x *= 1.0 + share;
+                }
+            }
+            FaultKind::MountingWrong { deg, x } => {
+                let laser = &mut recording.parameters.laser;
+                *laser = Pose::new(laser.x + x, laser.y, laser.theta + deg.to_radians());
+            }
+            FaultKind::WheelbaseWrong { metres } => {
+                if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {
+                    tricycle.wheelbase += metres;
+                }
+            }
+            FaultKind::DriveScaleWrong { share } => {
+                if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {
+                    tricycle.drive_scale *= 1.0 + share;
+                }
+            }
+            FaultKind::StartWrong { x, y, deg } => {
+                for event in &mut recording.events {
+                    if let RecordedEvent::SetPose(fix) = event {
+                        fix.pose = fix.pose.compose(&Pose::new(x, y, deg.to_radians()));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Reflectors no further than this from the lowest of the map, m, are on one wall.
+const NEAR_WALL: f64 = 1.0;
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+    sum / f64::max(count, 1.0)
+}

@@ -1,0 +1,245 @@
+//! Faults of what the sensors measure and of the vehicle itself.
+
+use agv_core::geometry::{Point, wrap};
+use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
+use agv_core::odometry::{CounterRange, Tricycle};
+
+use super::{Fault, FaultKind};
+use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::simulate::START;
+use agv_host_sim::simulate::random::Random;
+
+impl Fault {
+    /// Makes what the sensors have seen on a drive wrong.
+    pub(crate) fn spoil(&self, recording: &mut Recording, tricycle: &Tricycle, random: &mut Random) {
+        if let FaultKind::Kidnapped { seconds } = self.what {
+            kidnap(recording, self.from, seconds, tricycle.drive_range);
+        }
+        let mut encoders = EncoderFaultState::default();
+        let walkers = Walkers::new(self.what, random);
+        for event in &mut recording.events {
+            match event {
+                RecordedEvent::Encoders(sample) => {
+                    let time = sample.time.since(START);
+                    self.spoil_encoders(sample, time, tricycle, &mut encoders);
+                }
+                RecordedEvent::Reflectors(seen) => {
+                    let Some(first) = seen.first() else { continue };
+                    let time = first.time.since(START);
+                    if self.is_active(time) {
+                        self.spoil_reflectors(seen, time, &walkers, random);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn spoil_encoders(
+        &self,
+        sample: &mut EncoderSample,
+        time: f64,
+        tricycle: &Tricycle,
+        state: &mut EncoderFaultState,
+    ) {
+        let true_drive = sample.drive;
+        let moved = state.true_drive.map_or(0, |before| tricycle.drive_range.step(before, true_drive));
+        state.true_drive = Some(true_drive);
+        let is_active = self.is_active(time);
+        let begins = is_active && !std::mem::replace(&mut state.was_active, is_active);
+        match self.what {
+            FaultKind::DriveFrozen if is_active => {
+                sample.drive = *state.frozen_drive.get_or_insert(sample.drive);
+            }
+            FaultKind::SteeringFrozen if is_active => {
+                sample.steering = *state.frozen_steering.get_or_insert(sample.steering);
+            }
+            FaultKind::DriveJumps { ticks } => state.drive += if begins { ticks as f64 } else { 0.0 },
+            FaultKind::DriveReversed if is_active => state.drive -= 2.0 * moved as f64,
+            FaultKind::WheelSpins { share } if is_active => state.drive += share * moved as f64,
+            FaultKind::WheelSlides { share } if is_active => state.drive -= share * moved as f64,
+            FaultKind::SteeringReversed if is_active => {
+                sample.steering = sample.steering.wrapping_neg() & last_value(tricycle.steering_range);
+            }
+            FaultKind::SteeringJumps { deg } | FaultKind::SteeringBent { deg } if is_active => {
+                let ticks = libm::round(deg.to_radians() / tricycle.steering_scale) as i64;
+                sample.steering = shifted(sample.steering, ticks, tricycle.steering_range);
+            }
+            _ => {}
+        }
+        sample.drive = shifted(sample.drive, libm::round(state.drive) as i64, tricycle.drive_range);
+    }
+
+    fn spoil_reflectors(
+        &self,
+        seen: &mut Vec<ReflectorObservation>,
+        time: f64,
+        walkers: &Walkers,
+        random: &mut Random,
+    ) {
+        match self.what {
+            FaultKind::LaserTurned { deg } => turn(seen, -deg.to_radians()),
+            FaultKind::LaserTurns { deg, seconds } => turn(seen, -deg.to_radians() * self.grown(time, seconds)),
+            FaultKind::LaserShaken { deg } => turn(seen, deg.to_radians() * random.normal()),
+            FaultKind::LaserShifted { x, y } => {
+                for observation in seen.iter_mut() {
+                    set_position(observation, &(position(observation) - Point::new(x, y)));
+                }
+            }
+            FaultKind::WindowDirty { from_deg, to_deg, share } => seen.retain(|observation| {
+                let bearing = f64::from(observation.bearing).to_degrees();
+                let is_behind = (bearing - from_deg).rem_euclid(360.0) <= (to_deg - from_deg).rem_euclid(360.0);
+                !(is_behind && random.happens(share))
+            }),
+            FaultKind::PeopleAround { share } => seen.retain(|_| !random.happens(share)),
+            FaultKind::FalseReflectors { count } => {
+                for _ in 0..count {
+                    let (bearing, range) = (random.between(-3.1, 3.1), random.between(1.0, 25.0));
+                    add(seen, bearing, range);
+                }
+            }
+            FaultKind::Mirror { deg, distance } => {
+                let (sine, cosine) = libm::sincos(deg.to_radians());
+                let normal = Point::new(cosine, sine);
+                let images: Vec<Point> = seen
+                    .iter()
+                    .map(position)
+                    .filter(|point| point.dot(&normal) < distance)
+                    .map(|point| point + normal * (2.0 * (distance - point.dot(&normal))))
+                    .filter(|image| image.norm() < FARTHEST)
+                    .collect();
+                for image in images {
+                    add(seen, libm::atan2(image.y, image.x), image.norm());
+                }
+            }
+            FaultKind::RangesLong { metres } => {
+                for observation in seen.iter_mut() {
+                    observation.range += metres as f32;
+                }
+            }
+            FaultKind::RangesNoisy { metres } => {
+                for observation in seen.iter_mut() {
+                    observation.range = (observation.range + (metres * random.normal()) as f32).max(0.1);
+                }
+            }
+            FaultKind::PeopleShine { .. } => {
+                for point in walkers.at(time) {
+                    add(seen, libm::atan2(point.y, point.x), point.norm());
+                }
+            }
+            FaultKind::ReflectorsGone { share } => seen.retain(|_| !random.happens(share)),
+            _ => {}
+        }
+        seen.sort_by_key(|observation| observation.time);
+    }
+}
+
+/// What the encoders' faults remember.
+#[derive(Default)]
+struct EncoderFaultState {
+    true_drive: Option<u32>,
+    frozen_drive: Option<u32>,
+    frozen_steering: Option<u32>,
+    was_active: bool,
+    /// What the counter of the driving wheel has too much, ticks.
+    drive: f64,
+}
+
+/// A laser sees no reflector farther away, m.
+const FARTHEST: f64 = 30.0;
+
+fn last_value(range: CounterRange) -> u32 {
+    (range.values() - 1) as u32
+}
+
+fn shifted(counter: u32, ticks: i64, range: CounterRange) -> u32 {
+    (i64::from(counter) + ticks).rem_euclid(range.values() as i64) as u32
+}
+
+fn turn(seen: &mut [ReflectorObservation], angle: f64) {
+    for observation in seen {
+        observation.bearing = wrap(f64::from(observation.bearing) + angle) as f32;
+    }
+}
+
+fn position(observation: &ReflectorObservation) -> Point {
+    let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
+    Point::new(cosine, sine) * f64::from(observation.range)
+}
+
+fn set_position(observation: &mut ReflectorObservation, point: &Point) {
+    observation.bearing = libm::atan2(point.y, point.x) as f32;
+    observation.range = point.norm() as f32;
+}
+
+/// Adds an observation at the time at which the beam of this revolution looks there.
+fn add(seen: &mut Vec<ReflectorObservation>, bearing: f64, range: f64) {
+    let Some(first) = seen.first().copied() else { return };
+    let time = first.time.offset((bearing - f64::from(first.bearing)).max(0.0) / std::f64::consts::TAU * REVOLUTION);
+    seen.push(ReflectorObservation { time, bearing: wrap(bearing) as f32, range: range as f32 });
+}
+
+/// Time of a revolution, s.
+const REVOLUTION: f64 = 0.125;
+
+/// People that go around the vehicle, seen from it.
+struct Walkers(Vec<[f64; 4]>);
+
+impl Walkers {
+    fn new(what: FaultKind, random: &mut Random) -> Self {
+        let count = if let FaultKind::PeopleShine { count } = what { count } else { 0 };
+        let mut walker = || {
+            let start = random.between(-3.1, 3.1);
+            [start, random.between(2.0, 12.0), random.between(-0.3, 0.3), random.between(-0.8, 0.8)]
+        };
+        Self((0..count).map(|_| walker()).collect())
+    }
+
+    fn at(&self, time: f64) -> impl Iterator<Item = Point> + '_ {
+        self.0.iter().map(move |[bearing, range, turn, speed]| {
+            let range = (range + speed * libm::sin(time)).max(1.0);
+            let (sine, cosine) = libm::sincos(bearing + turn * time);
+            Point::new(cosine, sine) * range
+        })
+    }
+}
+
+/// Cuts `seconds` out of a drive: the vehicle is set down where it would have been later, and its wheel has not turned.
+fn kidnap(recording: &mut Recording, from: f64, seconds: f64, range: CounterRange) {
+    let (begin, end) = (START.offset(from), START.offset(from + seconds));
+    let earlier = |time: Time| time.offset(-seconds);
+    let mut last_before = None;
+    let mut ticks = 0;
+    recording.events.retain_mut(|event| {
+        let Some(time) = event.time() else { return true };
+        let is_before = time < begin;
+        match event {
+            RecordedEvent::Encoders(sample) if is_before => last_before = Some(*sample),
+            RecordedEvent::Encoders(sample) if time < end => {
+                if let Some(last) = last_before {
+                    ticks += range.step(last.drive, sample.drive);
+                    last_before = Some(*sample);
+                }
+            }
+            RecordedEvent::Encoders(sample) => {
+                sample.time = earlier(sample.time);
+                sample.drive = shifted(sample.drive, -ticks, range);
+            }
+            RecordedEvent::Reflectors(seen) if time >= end => {
+                for observation in seen {
+                    observation.time = earlier(observation.time);
+                }
+            }
+            RecordedEvent::Scan(scan) if time >= end => scan.start = earlier(scan.start),
+            _ => {}
+        }
+        is_before || time >= end
+    });
+    recording.truth.retain_mut(|truth| {
+        let is_kept = truth.time < begin || truth.time >= end;
+        if truth.time >= end {
+            truth.time = earlier(truth.time);
+        }
+        is_kept
+    });
+}

@@ -1,0 +1,193 @@
+//! A vehicle with everything on it, in simulated time: sensors that see a simulated drive, lines with faults, and the
+//! controller.
+
+use agv_controller::{Controller, LaserOrder};
+use agv_core::geometry::Pose;
+use agv_core::localizer::Localizer;
+use agv_core::maps::MapError;
+use agv_core::measurement::Time;
+use agv_core::state::PoseOutput;
+use agv_settings::Settings;
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::frame::Frame;
+use agv_wire::nav350::SensorFrame;
+
+use super::fault::{Fault, FaultKind, Line};
+use agv_host_sim::emulate::encoder_pair::{EmulatedPair, PairError};
+use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
+use agv_host_sim::serve::nav350::{Connection, Drive, DriveError, Sensor, SensorClockOptions};
+use agv_host_sim::simulate::START;
+use agv_host_sim::simulate::random::{Random, Stream};
+
+/// Why a run cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RigError {
+    /// The laser has nothing to see.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// The vehicle has no encoders.
+    #[error(transparent)]
+    Pair(#[from] PairError),
+    /// The map does not fit.
+    #[error("the map has more reflectors than the controller has room for, or one that is not finite")]
+    Map(MapError),
+}
+
+/// When the vehicle drives off, s after everything was switched on.
+const BEGIN: f64 = 5.0;
+/// Step of the simulated time, us: what the firmware's bus task sleeps at most.
+const STEP: u64 = 1_000;
+/// Steps between two poses that are judged.
+const STEPS_A_POSE: u64 = 10;
+/// Time that a telegram and a frame take, s.
+const LASER_LATENCY: f64 = 0.001;
+const BUS_LATENCY: f64 = 0.000_3;
+/// Largest value of the laser's clock, ms.
+const CLOCK_RANGE: f64 = 4_294_967_296.0;
+
+/// Drives a recorded drive with faults for `seconds`. `recording` has what the sensors see, faults of measurements
+/// included. `hear` is told a hundred times a second what time it is, how long the vehicle has driven, s, what the
+/// controller publishes, and where the vehicle is at any time.
+///
+/// # Errors
+/// See [`RigError`].
+pub fn drive(
+    recording: &Recording,
+    faults: &[&Fault],
+    seconds: f64,
+    seed: u64,
+    mut hear: impl FnMut(Time, f64, Option<&PoseOutput>, &dyn Fn(Time) -> Option<Pose>),
+) -> Result<(), RigError> {
+    let settings = Settings::of(recording.parameters);
+    let node = |number| NodeId::new(number).ok_or(RigError::Pair(PairError::NoEncoders));
+    let mut pair =
+        EmulatedPair::new(recording, node(settings.nodes.drive)?, node(settings.nodes.steering)?)?.standing();
+    let drive = Drive::new(recording, SensorFrame::default())?;
+    let mut sensor = Sensor::new(drive, clock(faults), None, true);
+    let mut connection: Option<Connection> = None;
+    let mut from_laser: Line<Vec<u8>> = Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams));
+    let mut to_laser: Line<Vec<u8>> = Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams));
+    let mut from_bus: Line<Frame> = Line::new(BUS_LATENCY, Random::new(seed, Stream::Frames));
+    let new_controller = |now| {
+        let mut localizer = <Localizer>::new(settings.parameters);
+        localizer.add_landmarks(&recording.landmarks).map_err(RigError::Map)?;
+        Ok::<_, RigError>(Box::new(Controller::new(&settings, localizer, now)))
+    };
+    let mut controller = Some(new_controller(Time::default())?);
+    let begin = Time::from_seconds(BEGIN);
+    let steps = ((BEGIN + seconds) * 1e6) as u64 / STEP;
+    for step in 1..=steps {
+        let now = Time::from_micros(step * STEP);
+        let (sensor_time, time) = (now.since(Time::default()), now.since(begin));
+        let is = |what: FaultKind| faults.iter().any(|fault| fault.what == what && fault.is_active(time));
+        if now == begin {
+            pair.begin(now);
+            sensor.begin(sensor_time);
+            if let (Some(controller), Some(RecordedEvent::SetPose(fix))) = (&mut controller, recording.events.first()) {
+                let mut fix = *fix;
+                fix.time = now;
+                controller.tell(fix, |_, _| ());
+            }
+        }
+        if is(FaultKind::PowerCut) {
+            (controller, connection) = (None, None);
+            from_laser.clear();
+            to_laser.clear();
+        } else if controller.is_none() {
+            controller = Some(new_controller(now)?);
+        }
+        let is_unreachable = is(FaultKind::LaserUnreachable);
+        if is_unreachable && connection.take().is_some() {
+            from_laser.clear();
+            to_laser.clear();
+            if let Some(controller) = &mut controller {
+                controller.unreachable();
+            }
+        }
+        if let Some(controller) = &mut controller {
+            // The controller and its laser.
+            let mut wishes = Vec::new();
+            while let Some(bytes) = from_laser.receive(now) {
+                controller.hear_laser(&bytes, now, |order| wishes.push(Wish::of(order)), |_, _| ());
+            }
+            controller.poll_laser(now, |order| wishes.push(Wish::of(order)), |_, _| ());
+            for wish in wishes {
+                match wish {
+                    Wish::Connect if is_unreachable => controller.unreachable(),
+                    Wish::Connect => {
+                        connection = Some(Connection::default());
+                        controller.connected(now);
+                    }
+                    Wish::Disconnect => {
+                        connection = None;
+                        from_laser.clear();
+                        to_laser.clear();
+                    }
+                    Wish::Send(bytes) if is(FaultKind::LaserSilent) => drop(bytes),
+                    Wish::Send(bytes) => to_laser.send_telegram(now, time, bytes, &[]),
+                }
+            }
+            // The controller and its bus.
+            while let Some(frame) = from_bus.receive(now) {
+                controller.hear_bus(&frame, now, |_| (), |_, _| ());
+            }
+            let answer = |frame: &Frame| {
+                for answer in pair.handle(frame) {
+                    from_bus.send_frame(now, time, answer, faults);
+                }
+            };
+            controller.poll_bus(now, answer, |_, _| ());
+            controller.search(|_, _| ());
+        }
+        if let Some(connection) = &mut connection {
+            let mut answers = Vec::new();
+            while let Some(bytes) = to_laser.receive(now) {
+                answers.push(connection.receive(&mut sensor, &bytes, sensor_time));
+            }
+            answers.extend(connection.poll(&sensor, sensor_time));
+            for answer in answers {
+                from_laser.send_telegram(now, time, answer, faults);
+            }
+        }
+        for frame in pair.poll(now) {
+            from_bus.send_frame(now, time, frame, faults);
+        }
+        if time >= 0.0 && step % STEPS_A_POSE == 0 {
+            let output = controller.as_ref().and_then(|controller| controller.output());
+            let truth = |at: Time| truth_at(&recording.truth, START.offset(at.since(begin).max(0.0)));
+            hear(now, time, output.as_ref(), &truth);
+        }
+    }
+    Ok(())
+}
+
+/// What the controller wants of its laser, for later.
+enum Wish {
+    Connect,
+    Disconnect,
+    Send(Vec<u8>),
+}
+
+impl Wish {
+    fn of(order: LaserOrder) -> Self {
+        match order {
+            LaserOrder::Connect => Self::Connect,
+            LaserOrder::Disconnect => Self::Disconnect,
+            LaserOrder::Send(bytes) => Self::Send(bytes.to_vec()),
+        }
+    }
+}
+
+/// What the laser's clock shows.
+fn clock(faults: &[&Fault]) -> SensorClockOptions {
+    let mut clock = SensorClockOptions { start: 1_000_000, ..SensorClockOptions::default() };
+    for fault in faults {
+        match fault.what {
+            FaultKind::LaserClockJumps { milliseconds } => clock.jumps.push((BEGIN + fault.from, milliseconds)),
+            FaultKind::LaserClockDrifts { share } => clock.drift = share,
+            FaultKind::LaserClockWraps => clock.start = (CLOCK_RANGE - (BEGIN + fault.from) * 1e3) as u32,
+            _ => {}
+        }
+    }
+    clock
+}

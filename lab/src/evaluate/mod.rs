@@ -1,0 +1,21 @@
+//! Experiments: how good it is, one file an experiment.
+
+pub mod calibration;
+pub mod carpark;
+pub mod carpark_starts;
+pub mod demonstration;
+pub mod falko;
+pub mod features;
+pub mod halting_points;
+pub mod kidnapping;
+pub mod lidar3d_calibration;
+pub mod lidar3d_places;
+pub mod lidar3d_sharpness;
+pub mod places;
+pub mod repeatability;
+pub mod slam;
+pub mod trust;
+pub mod warehouse;
+pub mod warehouse_disturbance;
+pub mod warehouse_page;
+pub mod windows;

@@ -1,0 +1,6 @@
+//! What measures the localiser: [`evaluate`] has one experiment a file, [`campaign`] has faults and their verdicts.
+//!
+//! It stands on `agv-host-sim`; nothing but the command `agv` stands on it.
+
+pub mod campaign;
+pub mod evaluate;
