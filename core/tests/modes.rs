@@ -289,6 +289,53 @@ fn a_pose_that_is_given_far_beside_the_one_that_was_contradicted_tells_of_a_knoc
     assert_eq!(said(&stage.look()), fine);
 }
 
+fn fail_encoders(stage: &mut Stage) {
+    let faults = EncoderFaults { time: stage.time(), drive: Some(EncoderFault::Missing), ..EncoderFaults::default() };
+    stage.localizer.handle(&Event::EncoderFaults(faults));
+}
+
+#[test]
+fn an_odometry_that_failed_is_no_reason_to_doubt_the_laser() {
+    let fine = (Mode::Reflectors, Reason::None);
+    // It was somewhere else when it could tell again, and was put right by a pose that is given.
+    let mut stage = Stage::told(parameters());
+    drive(&mut stage, 10, by_reflectors);
+    fail_encoders(&mut stage);
+    drive(&mut stage, 30, with_ghosts(12));
+    assert_eq!(said(&stage.said()).0, Mode::Lost);
+    stage.truth = stage.said().pose.compose(&Pose::new(0.4, 0.3, 0.1));
+    stage.tell(stage.truth, 0.02, 0.003);
+    assert_eq!(drive(&mut stage, 3, by_reflectors), fine);
+    // And so if the first pose that was given was wrong, and the reflectors pulled it away before they were rejected.
+    let mut stage = Stage::told(parameters());
+    drive(&mut stage, 10, by_reflectors);
+    fail_encoders(&mut stage);
+    stage.truth = stage.truth.compose(&Pose::new(0.4, 0.3, 0.1));
+    stage.tell(stage.truth.compose(&Pose::new(-0.13, 0.0, 0.0)), 0.02, 0.003);
+    drive(&mut stage, 1, by_reflectors);
+    drive(&mut stage, 30, with_ghosts(12));
+    assert_eq!(said(&stage.said()).0, Mode::Lost);
+    stage.tell(stage.truth, 0.02, 0.003);
+    assert_eq!(drive(&mut stage, 3, by_reflectors), fine);
+}
+
+#[test]
+fn who_coasts_goes_on_as_of_late_and_not_as_in_one_interval() {
+    let mut stage = Stage::told(parameters());
+    // Of two samples the first has all the way, and the second has none.
+    for number in 0..30_u8 {
+        stage.sample += 1;
+        let step = Pose::new(if number % 2 == 0 { 0.02 } else { 0.0 }, 0.0, 0.0);
+        stage.truth = stage.truth.compose(&step);
+        stage.report(&step);
+    }
+    stage.sample += 30;
+    fail_encoders(&mut stage);
+    let way = stage.said().pose;
+    let off = stage.truth.between(&way);
+    assert!((off.x - 0.3).abs() < 0.02 && off.y.abs() < 1e-9, "{off:?}");
+}
+
 #[test]
 fn of_a_motion_during_which_a_pose_is_given_the_rest_counts() {
     for late in [0.0, 0.004, 0.01] {

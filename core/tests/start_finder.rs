@@ -87,6 +87,55 @@ proptest! {
         prop_assert!(false, "the pose is not found");
     }
 
+    /// A revolution that was under way when the odometry spoke again tells nothing of where the vehicle was before.
+    #[test]
+    fn what_was_seen_before_the_odometry_spoke_again_is_not_placed(
+        positions in positions(), pose in poses(), before in 0.03..0.12,
+    ) {
+        let mut search = Search::new(&positions);
+        let place = |time: f64| pose.compose(&Pose::new(time - 10.0, 0.0, 0.0));
+        let increment = |time: f64| {
+            let displacement = Pose::new(0.01, 0.0, 0.0);
+            Event::Increment(PoseIncrement { time: Time::from_seconds(time), displacement })
+        };
+        search.tell(&increment(9.99));
+        search.tell(&increment(10.0));
+        let time = Time::from_seconds(10.0);
+        search.tell(&Event::EncoderFaults(EncoderFaults { time, drive: Some(EncoderFault::Missing), ..EncoderFaults::default() }));
+        // Nobody says how far it goes meanwhile.
+        let found_blindly = found(search.revolution(10.5, place));
+        prop_assert!(found_blindly.is_none(), "{found_blindly:?}");
+        for number in 0..=10_u8 {
+            search.tell(&increment(11.0 + 0.01 * f64::from(number)));
+        }
+        let fix = found(search.revolution(11.0 - before, place)).or_else(|| found(search.tell(&increment(11.11))));
+        if let Some(fix) = fix {
+            let there = place(fix.time.seconds());
+            prop_assert!((fix.pose.x - there.x).hypot(fix.pose.y - there.y) < 0.02, "{fix:?} {there:?}");
+        }
+    }
+
+    /// What was seen before the last sample is placed by the pace of the last tenth of a second: one interval may be told
+    /// late, and the next one early.
+    #[test]
+    fn samples_that_come_unevenly_do_not_displace_what_is_seen(positions in positions(), pose in poses()) {
+        let mut search = Search::new(&positions);
+        let place = |time: f64| pose.compose(&Pose::new(time - 10.0, 0.0, 0.0));
+        let mut driven = 9.0;
+        for number in 1..=100_u8 {
+            let time = 9.0 + 0.01 * f64::from(number);
+            // Of two samples the first has all the way, and the second has none.
+            let told = if number % 2 == 1 { time + 0.01 } else { time };
+            let displacement = Pose::new(told - driven, 0.0, 0.0);
+            driven = told;
+            search.tell(&Event::Increment(PoseIncrement { time: Time::from_seconds(time), displacement }));
+        }
+        let fix = found(search.revolution(10.0 - REVOLUTION, place));
+        let Some(fix) = fix else { return Err(TestCaseError::fail("the pose is not found")) };
+        let there = place(fix.time.seconds());
+        prop_assert!((fix.pose.x - there.x).hypot(fix.pose.y - there.y) < 0.02, "{fix:?} {there:?}");
+    }
+
     /// A vehicle drives straight on, its encoders fail for a while, and it drives on.
     #[test]
     fn after_a_fault_what_was_before_is_not_carried_on(positions in positions(), pose in poses(), silence in 0.02..2.0) {

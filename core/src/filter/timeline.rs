@@ -243,6 +243,14 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         &self.last_motion
     }
 
+    /// The last motion that the odometry reported, at the mean velocity of the last `span`, s, as far as it is remembered.
+    #[must_use]
+    pub fn recent_motion(&self, span: f64) -> Motion {
+        let end = self.last_motion.end;
+        let recent = self.motions(end.offset(-span), end).reduce(|sum, motion| sum.then(&motion));
+        recent.filter(|recent| recent.end > recent.start).unwrap_or(self.last_motion)
+    }
+
     /// The pose that only the odometry has moved since the beginning, at the time of the newest entry. What lies between it
     /// and the pose of the state is the correction by landmarks, so a controller that steers by it feels no step.
     #[must_use]

@@ -138,7 +138,10 @@ impl<
                 }
             }
         }
-        self.corrected_at = Some(Corrected { smooth: after.smooth, is_sure: after.is_sure });
+        // What is contradicted at once has not put the pose right, and without an odometry nothing tells what will.
+        if self.lost.is_none() && self.blindness.is_none() {
+            self.corrected_at = Some(Corrected { smooth: after.smooth, is_sure: after.is_sure });
+        }
     }
 
     /// Whether the reflectors of a revolution are where those before have been, as the odometry says.

@@ -45,7 +45,7 @@ pub struct Localizer<
     pub(super) drift_check: DriftCheck,
     pub(super) corrected_at: Option<Corrected>,
     pub(super) lost: Option<Reason>,
-    blindness: Option<Blindness>,
+    pub(super) blindness: Option<Blindness>,
     /// Samples of the odometry in a row that were not later than the one before.
     repeated: u8,
     pub(super) distance: DistanceSince,
@@ -55,7 +55,7 @@ pub struct Localizer<
 
 /// The odometry is not believed, or not heard.
 #[derive(Clone, Copy, Debug)]
-struct Blindness {
+pub(super) struct Blindness {
     reason: Reason,
     coasting: Coasting,
     /// What was seen until this time raised the doubt; nothing that was seen, if it is the beginning of time.
@@ -360,9 +360,11 @@ impl<
 
     /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
     fn doubt_odometry(&mut self, reason: Reason, since: Time) -> Coasting {
-        let last = self.timeline.last_motion();
-        let coasting = self.blindness.map_or_else(|| Coasting::new(*last), |blindness| blindness.coasting);
+        let recent = || Coasting::new(self.timeline.recent_motion(Coasting::SPAN));
+        let coasting = self.blindness.map_or_else(recent, |blindness| blindness.coasting);
         self.blindness = Some(Blindness { reason, coasting, since });
+        // Where it is found again says nothing of the laser.
+        self.corrected_at = None;
         coasting
     }
 

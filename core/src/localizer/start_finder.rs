@@ -8,7 +8,7 @@ use heapless::Vec;
 use super::{Event, Parameters, PoseFix};
 use crate::geometry::{Point, Pose};
 use crate::measurement::{ReflectorObservation, Time};
-use crate::odometry::{Motion, Odometer, OdometryError};
+use crate::odometry::{Motion, Odometer, OdometryError, RecentMotion};
 use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
@@ -49,7 +49,11 @@ const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 pub struct StartFinder<const SEEN: usize = 64> {
     parameters: Parameters,
     odometer: Odometer,
-    last_motion: Motion,
+    recent: RecentMotion,
+    /// Nothing that was seen before is placed, as nobody knows how the vehicle moved.
+    known_from: Option<Time>,
+    /// Whether an encoder fails: then nobody knows how the vehicle moves.
+    is_blind: bool,
     /// Reflectors in R as it was at the end of the last motion.
     snapshot: ReflectorSnapshot<SEEN>,
     relocalizer: ReflectorRelocalizer<SEEN>,
@@ -74,7 +78,9 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 parameters.limits.fastest,
                 parameters.limits.longest_interval(),
             ),
-            last_motion: Motion::none(Time::default()),
+            recent: RecentMotion::standing(Time::default()),
+            known_from: None,
+            is_blind: false,
             snapshot: ReflectorSnapshot::new(),
             relocalizer: ReflectorRelocalizer::new(search),
             since: None,
@@ -111,7 +117,11 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                     self.found = found;
                 }
             }
-            Event::EncoderFaults(_) | Event::SetPose(_) => self.forget(),
+            Event::EncoderFaults(faults) => {
+                self.forget();
+                self.is_blind = faults.drive.is_some() || faults.steering.is_some();
+            }
+            Event::SetPose(_) => self.forget(),
         }
     }
 
@@ -120,6 +130,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         self.odometer.restart();
         self.has_spoken = false;
         self.stand(Time::default());
+        self.known_from = None;
     }
 
     /// Begins with a vehicle that stands at `time`, as nobody says otherwise.
@@ -127,11 +138,13 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         self.snapshot.clear();
         self.since = None;
         self.way = 0.0;
-        self.last_motion = Motion::none(time);
+        self.recent = RecentMotion::standing(time);
+        self.known_from = Some(time);
     }
 
     fn travel(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
         self.has_spoken = true;
+        self.is_blind = false;
         match motion {
             Ok(motion) => {
                 let covariance = &motion.covariance;
@@ -139,7 +152,8 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
                 self.since = self.since.map(|since| since.compose(&motion.displacement));
                 self.way += motion.distance;
-                self.last_motion = motion;
+                self.recent.add(&motion);
+                self.known_from.get_or_insert(motion.start);
                 if self.way > LONGEST_WAY {
                     self.forget();
                 }
@@ -151,8 +165,11 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     }
 
     fn revolution(&mut self, observations: &[ReflectorObservation], reflectors: &IndexedReflectors) {
+        if self.is_blind {
+            return;
+        }
         if let Some(first) = observations.first()
-            && first.time.since(self.last_motion.end) > LONGEST_SILENCE
+            && first.time.since(self.recent.end()) > LONGEST_SILENCE
         {
             // An odometry that speaks tells the time; the clock of the laser does not.
             if core::mem::take(&mut self.has_spoken) {
@@ -196,15 +213,13 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             bearing: believed.bearing_deviation as f32,
             ..ReflectorNoise::default()
         };
-        let duration = self.last_motion.end.since(self.last_motion.start);
-        for observation in observations {
+        let Some(known_from) = self.known_from else { return };
+        for observation in observations.iter().filter(|observation| observation.time >= known_from) {
             let range = f64::from(observation.range);
             let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
             let in_robot = self.parameters.laser.transform(&Point::new(range * cosine, range * sine));
-            // The vehicle goes on, or has come here, as in its last motion.
-            let late = observation.time.since(self.last_motion.end);
-            let share = if duration > 0.0 { (late / duration).clamp(-LONGEST_SHARE, LONGEST_SHARE) } else { 0.0 };
-            let position = self.last_motion.displacement.fraction(share).transform(&in_robot);
+            // The vehicle goes on, or has come here, as it has moved of late.
+            let position = self.recent.pose_at(observation.time).transform(&in_robot);
             self.snapshot.see(&position, range, &noise);
         }
     }
@@ -213,13 +228,10 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         let covariance = &fix.covariance;
         let position = libm::sqrt(covariance.m11.max(covariance.m22));
         PoseFix {
-            time: self.last_motion.end,
+            time: self.recent.end(),
             pose: fix.pose.compose(since),
             position_deviation: position.max(LEAST_DEVIATION.0),
             heading_deviation: libm::sqrt(covariance.m33).max(LEAST_DEVIATION.1),
         }
     }
 }
-
-/// An observation is carried over at most so many intervals of the odometry.
-const LONGEST_SHARE: f64 = 32.0;

@@ -17,6 +17,10 @@ pub struct Coasting {
 }
 
 impl Coasting {
+    /// Whoever begins to coast takes the mean velocity of this time, s: samples come unevenly, so that one interval may hold
+    /// the way of two, and the next one none.
+    pub const SPAN: f64 = 0.1;
+
     /// Coasting behind the last motion that was believed.
     #[must_use]
     pub const fn new(believed: Motion) -> Self {

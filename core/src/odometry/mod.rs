@@ -7,6 +7,7 @@ mod integration;
 mod motion;
 mod noise;
 mod odometer;
+mod recent_motion;
 mod vehicle;
 
 pub use bias::{BiasJacobian, OdometryBias};
@@ -16,4 +17,5 @@ pub use integration::{Control, Integration};
 pub use motion::Motion;
 pub use noise::OdometryNoise;
 pub use odometer::{Odometer, OdometryError};
+pub use recent_motion::RecentMotion;
 pub use vehicle::{Ackermann, Tricycle, Vehicle};
