@@ -8,11 +8,13 @@
 //!
 //! | floor | rooms |
 //! |---|---|
-//! | 5 | [`record`] |
-//! | 4 | [`localizer`] |
-//! | 3 | [`calibration`], [`filter`], [`relocalization`] |
-//! | 2 | [`maps`], [`odometry`], [`sensing`] |
-//! | 1 | [`geometry`], [`measurement`], [`order`], [`state`] |
+//! | 7 | [`record`] |
+//! | 6 | [`localizer`] |
+//! | 5 | [`integrity`] |
+//! | 4 | [`calibration`], [`filter`], [`relocalization`], [`state`] |
+//! | 3 | [`maps`], [`odometry`], [`sensing`] |
+//! | 2 | [`measurement`] |
+//! | 1 | [`geometry`], [`order`] |
 //!
 //! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.
 //! Units: SI and radians. Poses and covariances are f64, scans and features f32.
@@ -24,6 +26,7 @@
 pub mod calibration;
 pub mod filter;
 pub mod geometry;
+pub mod integrity;
 pub mod localizer;
 pub mod maps;
 pub mod measurement;

@@ -1,10 +1,11 @@
 //! What watches over the pose: motion of the laser against the odometry, corrections, and the protection level.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_core::filter::{DriftCheck, MotionCheck, Suspect};
 use agv_core::geometry::{Point, Pose};
+use agv_core::integrity::ProtectionLevel;
+use agv_core::integrity::{MountingCheck, SlipCheck, Suspect};
 use agv_core::measurement::Time;
-use agv_core::state::{Mode, PoseOutput, ProtectionLevel, Reason};
+use agv_core::state::{Mode, PoseOutput, Reason};
 use proptest::prelude::*;
 
 /// Reflectors of a hall, in W.
@@ -27,7 +28,7 @@ fn verdicts(
     is_seen: impl Fn(u32, usize) -> bool,
     extra: impl Fn(u32) -> Vec<Point>,
 ) -> Vec<bool> {
-    let mut check = MotionCheck::new();
+    let mut check = SlipCheck::new();
     (0..count)
         .map(|revolution| {
             check.begin(Time::from_micros(u64::from(revolution) * 125_000 + 1_000_000));
@@ -109,7 +110,7 @@ fn motions() -> impl Iterator<Item = Pose> {
 
 /// What is suspected after a drive whose corrections follow from the motion.
 fn suspected(correction: impl Fn(&Pose) -> Pose) -> Option<Suspect> {
-    let mut check = DriftCheck::new();
+    let mut check = MountingCheck::new();
     for motion in motions() {
         check.add(&motion, &correction(&motion));
     }
@@ -137,7 +138,7 @@ fn corrections_tell_which_is_wrong() {
 
 #[test]
 fn a_suspicion_of_the_laser_lasts_until_the_vehicle_has_driven_and_turned() {
-    let mut check = DriftCheck::new();
+    let mut check = MountingCheck::new();
     check.suspect_laser();
     check.restart();
     assert_eq!(check.suspect(), Some(Suspect::Laser));
@@ -161,7 +162,7 @@ fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_fo
         let in_memory = libm::log(1.0 - 0.45 * (1.0 - remaining) / motion.theta) / libm::log(remaining);
         let turned = in_memory.min(1.35 / motion.theta);
         let expected = (1.2 / step).max(turned);
-        let mut check = DriftCheck::new();
+        let mut check = MountingCheck::new();
         check.suspect_laser();
         let ended = (1..100).find(|_| {
             check.add(&motion, &Pose::default());
@@ -183,7 +184,7 @@ fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_fo
 #[test]
 fn the_heading_s_trend_holds_four_times_what_the_laser_looks_askew_by() {
     let trend = |correction: Pose| {
-        let mut check = DriftCheck::new();
+        let mut check = MountingCheck::new();
         for _ in 0..200 {
             check.add(&Pose::new(0.15, 0.0, 0.0), &correction);
         }
@@ -220,7 +221,7 @@ pub fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> 
 fn the_bounds_hold_with_the_stated_probability() {
     let level = |deviation: f64| {
         let variance = deviation * deviation;
-        output([variance, 0.0, variance, 0.0, 0.0, variance], 2.0, [0.0; 2]).protection_level()
+        ProtectionLevel::of(&output([variance, 0.0, variance, 0.0, 0.0, variance], 2.0, [0.0; 2]))
     };
     // What is added for each metre and radian of deviation.
     let (one, two) = (level(1.0), level(2.0));
@@ -242,10 +243,10 @@ proptest! {
         let xx = cosine * cosine * long + sine * sine * short;
         let yy = sine * sine * long + cosine * cosine * short;
         let xy = sine * cosine * (long - short);
-        let level = |square, drift| output([xx, xy, yy, 0.0, 0.0, 1e-6], square, [drift, drift]).protection_level();
+        let level = |square, drift| ProtectionLevel::of(&output([xx, xy, yy, 0.0, 0.0, 1e-6], square, [drift, drift]));
         let plain = level(2.0, 0.0);
         // The direction in which it is least sure decides, wherever it points.
-        let across = output([long, 0.0, short, 0.0, 0.0, 1e-6], 2.0, [0.0; 2]).protection_level();
+        let across = ProtectionLevel::of(&output([long, 0.0, short, 0.0, 0.0, 1e-6], 2.0, [0.0; 2]));
         prop_assert!((plain.position - across.position).abs() < 1e-9);
         prop_assert!(plain.position > 5.0 * deviation);
         prop_assert!(level(square, drift).position >= plain.position - 1e-12);

@@ -1,7 +1,8 @@
 //! What a controller reads off a pose: whether it is good, whether it has jumped, and how wrong it may be.
 
 use agv_core::geometry::Pose;
-use agv_core::state::{Mode, PoseOutput, ProtectionLevel};
+use agv_core::integrity::ProtectionLevel;
+use agv_core::state::{Mode, PoseOutput};
 
 fn output(covariance: [f64; 6]) -> PoseOutput {
     let (pose, smooth) = (Pose::new(1.0, 2.0, 0.5), Pose::new(0.5, 2.5, 0.3));
@@ -79,7 +80,7 @@ fn bounds_grow_with_surprise_and_drift_as_stated() {
                     drift: [drift, heading_drift],
                     ..output(turned(0.02, 0.01, angle, 0.003))
                 };
-                let level = output.protection_level();
+                let level = ProtectionLevel::of(&output);
                 let position = position_factor * surprise * 0.02 + 0.3 * drift + 0.060;
                 let heading = heading_factor * surprise * 0.003 + 0.3 * heading_drift + 0.0175;
                 assert!((level.position - position).abs() < 1e-3, "{} {position}", level.position);

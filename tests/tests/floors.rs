@@ -36,8 +36,9 @@ const HOUSES: [House; 7] = [
         floors: &[
             &["geometry", "order"],
             &["measurement"],
-            &["maps", "odometry", "sensing", "state"],
-            &["calibration", "filter", "relocalization"],
+            &["maps", "odometry", "sensing"],
+            &["calibration", "filter", "relocalization", "state"],
+            &["integrity"],
             &["localizer"],
             &["record"],
         ],

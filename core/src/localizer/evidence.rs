@@ -2,8 +2,9 @@
 
 use super::sighting::Sighting;
 use super::{LandmarkSource, LandmarkUse, Outputs, Reason};
-use crate::filter::{Consistency, Innovation};
+use crate::filter::Innovation;
 use crate::geometry::Point;
+use crate::integrity::InnovationMonitor;
 use crate::maps::{LandmarkKind, Verdict};
 
 /// What became of something that was seen.
@@ -101,11 +102,11 @@ impl<'a> Evidence<'a> {
     }
 
     /// Adds the event to the evidence of those before, and says why the vehicle is lost if they are against the pose.
-    pub fn judge(self, consistency: &mut Consistency) -> Option<Reason> {
+    pub fn judge(self, consistency: &mut InnovationMonitor) -> Option<Reason> {
         consistency.add(self.expected, self.accepted, self.used, self.square_sum);
         if consistency.is_rejecting() {
             Some(Reason::LandmarksRejected)
-        } else if consistency.is_surprised() {
+        } else if consistency.has_large_innovations() {
             Some(Reason::InnovationsTooLarge)
         } else {
             None

@@ -45,7 +45,7 @@ impl<
             let fate = Fate { verdict: association.verdict, landmark, located };
             evidence.add(sighting, &fate, is_accepted);
         }
-        self.lost = evidence.judge(&mut self.consistency);
+        self.lost = evidence.judge(&mut self.integrity.innovations);
     }
 
     /// Algorithm 1 (K 5.4.1) for the natural features of one scan, at the poses that the whole scan has led to. A vehicle

@@ -3,13 +3,14 @@
 use heapless::Vec;
 
 use super::evidence::DistanceSince;
-use super::integrity::{Corrected, Estimate};
 use super::maps::Maps;
 use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
+use super::supervisor::{Support, supervise};
 use super::{Capacities, Event, Localize, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
-use crate::filter::{Consistency, DriftCheck, Ekf, MotionCheck, Suspect, Timeline};
+use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
+use crate::integrity::{Estimate, Integrity, Replacement, is_sure};
 use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView};
 use crate::measurement::{EncoderFaults, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
@@ -40,12 +41,9 @@ pub struct Localizer<
     pub(super) maps: Maps<REFLECTORS, FEATURES, DYNAMIC>,
     pub(super) timeline: Timeline<PAST>,
     pub(super) slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
-    pub(super) consistency: Consistency,
-    pub(super) motion_check: MotionCheck,
-    pub(super) drift_check: DriftCheck,
-    pub(super) corrected_at: Option<Corrected>,
+    pub(super) integrity: Integrity,
     pub(super) lost: Option<Reason>,
-    pub(super) blindness: Option<Blindness>,
+    outage: Option<Outage>,
     /// Samples of the odometry in a row that were not later than the one before.
     repeated: u8,
     pub(super) distance: DistanceSince,
@@ -55,7 +53,7 @@ pub struct Localizer<
 
 /// The odometry is not believed, or not heard.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Blindness {
+struct Outage {
     reason: Reason,
     coasting: Coasting,
     /// What was seen until this time raised the doubt; nothing that was seen, if it is the beginning of time.
@@ -121,12 +119,9 @@ impl<
             },
             timeline: Timeline::new(parameters.laser, parameters.limits.longest_extrapolation),
             slam: Slam::new(),
-            consistency: Consistency::new(parameters.consistency),
-            motion_check: MotionCheck::new(),
-            drift_check: DriftCheck::new(),
-            corrected_at: None,
+            integrity: Integrity::new(parameters.consistency),
             lost: None,
-            blindness: None,
+            outage: None,
             repeated: 0,
             distance: DistanceSince::NEVER,
             workspace: Workspace {
@@ -240,10 +235,49 @@ impl<
             Event::SetPose(fix) => self.set_pose(fix),
         }
         if let Some(before) = before {
-            self.check_motion(&before, is_revolution);
+            self.check(&before, is_revolution);
         }
         self.publish(sees);
         &self.outputs
+    }
+
+    /// The pose for now, and that by odometry alone.
+    fn estimate(&mut self) -> Option<Estimate> {
+        let timeline = self.timeline.begun_mut()?;
+        let state = timeline.state();
+        let odometry_pose = *timeline.odometry_pose();
+        Some(Estimate { pose: state.pose, odometry_pose, is_sure: is_sure(&state), distance: self.distance.any() })
+    }
+
+    /// Lets the checks compare what an event has shown with what the odometry says; `before` is the estimate before it was
+    /// used, and `is_revolution` says whether the event tells the reflectors of a revolution: one that tells none
+    /// contradicts none.
+    fn check(&mut self, before: &Estimate, is_revolution: bool) {
+        let Some(after) = self.estimate() else { return };
+        let uses = &self.outputs.uses;
+        if is_revolution {
+            let to_odometry = before.odometry_pose.compose(&before.pose.inverse());
+            let slips = self.integrity.see_reflectors(self.timeline.now(), &to_odometry, uses);
+            if slips && self.lost.is_none() {
+                self.lost = Some(Reason::MotionDisagrees);
+            }
+        }
+        let is_right = self.lost.is_none() && self.outage.is_none();
+        self.integrity.correct(before, &after, uses, is_right);
+    }
+
+    /// What a given pose replaces, if it was contradicted.
+    fn replaced_by(&mut self, fix: &PoseFix) -> Option<Replacement> {
+        let contradictions =
+            [Reason::MotionDisagrees, Reason::LandmarksRejected, Reason::InnovationsTooLarge].map(Some);
+        if !contradictions.contains(&self.lost) {
+            return None;
+        }
+        let distance = self.distance.any();
+        let timeline = self.timeline.begun_mut()?;
+        let before = timeline.state_at(fix.time).unwrap_or_else(|_| timeline.state()).pose;
+        let deviations = (fix.position_deviation, fix.heading_deviation);
+        Some(Replacement { jump: before.between(&fix.pose), distance, deviations })
     }
 
     /// Whether an event tells which reflectors one revolution has seen, be it none. Not every scan does: the laser may have
@@ -267,14 +301,14 @@ impl<
         }
         let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
         let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
-        self.restart_checks(fix);
+        let replacement = self.replaced_by(fix);
+        self.integrity.restart(self.parameters.consistency, replacement.as_ref());
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state, &self.parameters.slam);
-        self.consistency = Consistency::new(self.parameters.consistency);
         self.lost = None;
         if !is_past {
             let standing = Coasting::new(Motion::none(fix.time));
-            self.blindness = self.blindness.map(|blindness| Blindness { coasting: standing, ..blindness });
+            self.outage = self.outage.map(|outage| Outage { coasting: standing, ..outage });
         }
         let since = self.timeline.motions(fix.time, self.timeline.now()).fold(0.0, |way, motion| way + motion.distance);
         self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
@@ -303,7 +337,7 @@ impl<
                 } else {
                     motion
                 };
-                self.blindness = None;
+                self.outage = None;
                 self.repeated = 0;
                 self.go_on(&motion);
             }
@@ -311,8 +345,8 @@ impl<
             Err(OdometryError::Pause) => self.coast(time, Reason::OdometrySilent),
             // The first sample behind a fault: the next one says how the vehicle moves.
             Err(OdometryError::First) => {
-                if let Some(blindness) = self.blindness {
-                    self.coast(time, blindness.reason);
+                if let Some(outage) = self.outage {
+                    self.coast(time, outage.reason);
                 }
             }
             // What the odometry should say does not come.
@@ -339,7 +373,7 @@ impl<
             return;
         };
         let now = timeline.now();
-        let Some(Blindness { reason, since, .. }) = self.blindness else {
+        let Some(Outage { reason, since, .. }) = self.outage else {
             self.doubt_odometry(Reason::OdometrySilent, time);
             return;
         };
@@ -361,10 +395,9 @@ impl<
     /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
     fn doubt_odometry(&mut self, reason: Reason, since: Time) -> Coasting {
         let recent = || Coasting::new(self.timeline.recent_motion(Coasting::SPAN));
-        let coasting = self.blindness.map_or_else(recent, |blindness| blindness.coasting);
-        self.blindness = Some(Blindness { reason, coasting, since });
-        // Where it is found again says nothing of the laser.
-        self.corrected_at = None;
+        let coasting = self.outage.map_or_else(recent, |outage| outage.coasting);
+        self.outage = Some(Outage { reason, coasting, since });
+        self.integrity.doubt_odometry();
         coasting
     }
 
@@ -389,7 +422,7 @@ impl<
         let reason = match (faults.drive, faults.steering) {
             (Some(_), _) => Reason::DriveEncoder,
             (None, Some(_)) => Reason::SteeringEncoder,
-            // Samples follow, and end the blindness.
+            // Samples follow, and end the outage.
             (None, None) => return,
         };
         // What the counters did meanwhile is not to be taken for a motion.
@@ -406,7 +439,7 @@ impl<
         if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
             self.go_on(&motion);
         }
-        self.blindness = Some(Blindness { reason, coasting, since: Time::default() });
+        self.outage = Some(Outage { reason, coasting, since: Time::default() });
     }
 
     fn scan(&mut self, scan: &Scan) {
@@ -455,21 +488,12 @@ impl<
                 self.lost = Some(Reason::NoLandmarks);
             }
         }
-        let by_reflectors = distance.reflector <= limits.dead_reckoning_from;
-        let by_features = distance.feature <= limits.dead_reckoning_from;
-        let suspect = self.drift_check.suspect();
-        let remark = if suspect == Some(Suspect::Odometry) { Reason::OdometryDisagrees } else { Reason::None };
-        let acceptance = self.consistency.acceptance();
-        let (mode, reason) = match (self.lost, self.blindness, by_reflectors, by_features) {
-            (Some(reason), ..) => (Mode::Lost, reason),
-            (None, Some(blindness), ..) => (Mode::WithoutOdometry, blindness.reason),
-            (None, None, false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
-            (None, None, ..) if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
-            (None, None, ..) if self.consistency.is_doubtful() => (Mode::Degraded, Reason::LandmarksRejected),
-            (None, None, true, true) => (Mode::Mixed, remark),
-            (None, None, true, false) => (Mode::Reflectors, remark),
-            (None, None, false, true) => (Mode::Features, remark),
+        let support = Support {
+            by_reflectors: distance.reflector <= limits.dead_reckoning_from,
+            by_features: distance.feature <= limits.dead_reckoning_from,
         };
+        let outage = self.outage.map(|outage| outage.reason);
+        let (mode, reason) = supervise(self.lost, outage, support, &self.integrity);
         self.outputs.pose = PoseOutput {
             time: timeline.now(),
             pose: state.pose,
@@ -479,9 +503,9 @@ impl<
             dead_reckoning_distance: distance.any(),
             correction,
             smooth,
-            drift: self.drift_check.trend(),
-            acceptance,
-            normalised_square: self.consistency.mean_normalised_square(),
+            drift: self.integrity.correction_trend(),
+            acceptance: self.integrity.innovations.acceptance(),
+            normalised_square: self.integrity.innovations.mean_normalised_square(),
             ..self.outputs.pose
         };
         if self.outputs.pose.has_jumped() {

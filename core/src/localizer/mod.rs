@@ -4,7 +4,6 @@ mod capacities;
 mod event;
 mod evidence;
 mod fusion;
-mod integrity;
 mod localize;
 mod machine;
 mod maps;
@@ -16,12 +15,13 @@ mod slam;
 mod slam_fusion;
 mod start_finder;
 mod start_search;
+mod supervisor;
 
 pub use capacities::Capacities;
 pub use event::Event;
 pub use localize::Localize;
 pub use machine::Localizer;
-pub use output::{LandmarkSource, LandmarkUse, OBSERVATIONS, Outputs};
+pub use output::{OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
 
@@ -30,4 +30,4 @@ pub use start_finder::{StartFinder, StartState};
 pub use start_search::{EFFORT_A_REVOLUTION, StartSearch};
 
 pub use crate::measurement::PoseFix;
-pub use crate::state::{Mode, PoseOutput, Reason};
+pub use crate::state::{LandmarkSource, LandmarkUse, Mode, PoseOutput, Reason};

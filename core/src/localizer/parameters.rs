@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::slam::SlamParameters;
-use crate::filter::ConsistencyParameters;
 use crate::geometry::Pose;
+use crate::integrity::InnovationMonitorParameters;
 use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
 use crate::odometry::{Integration, OdometryNoise, Vehicle};
@@ -34,7 +34,7 @@ pub struct Parameters {
     /// The map that is part of the filter's state.
     pub slam: SlamParameters,
     /// When the evidence is against the pose.
-    pub consistency: ConsistencyParameters,
+    pub consistency: InnovationMonitorParameters,
     /// When the vehicle is dead reckoning, and when it is lost.
     pub limits: Limits,
 }
@@ -54,7 +54,7 @@ impl Parameters {
             association: AssociationParameters::default(),
             dynamic_map: DynamicMapParameters::default(),
             slam: SlamParameters::default(),
-            consistency: ConsistencyParameters::default(),
+            consistency: InnovationMonitorParameters::default(),
             limits: Limits::default(),
         }
     }

@@ -102,7 +102,7 @@ impl<
             sighting.verdict = fate.verdict;
             evidence.add(sighting, &fate, fate.verdict == Verdict::Accepted);
         }
-        let lost = evidence.judge(&mut self.consistency);
+        let lost = evidence.judge(&mut self.integrity.innovations);
         // What fits no landmark is new, once the whole scan has corrected the pose.
         for sighting in &self.workspace.sightings {
             let may_be_new = sighting.kind != LandmarkKind::Reflector || !reflectors_are_given;

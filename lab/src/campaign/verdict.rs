@@ -1,8 +1,9 @@
 //! Whether the controller was right, and said so when it was not.
 
 use agv_core::geometry::{Pose, difference};
+use agv_core::integrity::ProtectionLevel;
 use agv_core::measurement::Time;
-use agv_core::state::{Mode, PoseOutput, ProtectionLevel};
+use agv_core::state::{Mode, PoseOutput};
 use serde::{Deserialize, Serialize};
 
 use super::fault::{Fault, window};
@@ -140,7 +141,7 @@ impl Judge {
         self.seconds += step;
         let judged = output.and_then(|output| {
             let error = error(output, &truth(output.time)?);
-            Some((self.claim(now, output), error, output.protection_level()))
+            Some((self.claim(now, output), error, ProtectionLevel::of(&output)))
         });
         let (claim, (position, heading), level) =
             judged.unwrap_or((Claim::Degraded, (0.0, 0.0), ProtectionLevel { position: 0.0, heading: 0.0 }));
@@ -170,7 +171,7 @@ impl Judge {
     }
 
     fn claim(&self, now: Time, output: &PoseOutput) -> Claim {
-        let level = output.protection_level();
+        let level = ProtectionLevel::of(&output);
         // In dead reckoning nothing watches over the odometry.
         let is_localised = matches!(output.mode, Mode::Reflectors | Mode::Features | Mode::Mixed);
         let is_fresh = now.since(output.time) <= STALE;

@@ -3,6 +3,7 @@
 use core::hint::black_box;
 
 use agv_core::geometry::Pose;
+use agv_core::integrity::ProtectionLevel;
 use agv_core::localizer::{self, Event, Outputs, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
@@ -86,5 +87,5 @@ impl Localization {
 fn log(frame: &mut [u8], event: &Event, outputs: &Outputs) {
     let _ = black_box(encode(&Record::Event(*event), any(0), frame));
     let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), frame));
-    black_box(outputs.pose.protection_level());
+    black_box(ProtectionLevel::of(&outputs.pose));
 }

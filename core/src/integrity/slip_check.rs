@@ -50,7 +50,7 @@ impl Remembered {
 
 /// The memory, and how often it was contradicted.
 #[derive(Clone, Debug)]
-pub struct MotionCheck {
+pub struct SlipCheck {
     remembered: Vec<Remembered, REMEMBERED>,
     last: Time,
     expected: u8,
@@ -60,7 +60,7 @@ pub struct MotionCheck {
     contradictions: u8,
 }
 
-impl MotionCheck {
+impl SlipCheck {
     /// A check that has seen nothing.
     #[must_use]
     pub const fn new() -> Self {
@@ -133,7 +133,7 @@ impl MotionCheck {
     }
 }
 
-impl Default for MotionCheck {
+impl Default for SlipCheck {
     fn default() -> Self {
         Self::new()
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// When the evidence is against the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct ConsistencyParameters {
+pub struct InnovationMonitorParameters {
     /// How many observations the evidence reaches back, at least one.
     pub memory: f64,
     /// How much of the evidence remains at least after each scan, 0 to 1: however many observations it has, one scan
@@ -19,7 +19,7 @@ pub struct ConsistencyParameters {
     pub largest_normalised_square: f64,
 }
 
-impl Default for ConsistencyParameters {
+impl Default for InnovationMonitorParameters {
     fn default() -> Self {
         Self {
             memory: 10.0,
@@ -33,8 +33,8 @@ impl Default for ConsistencyParameters {
 
 /// Evidence of the last scans, with exponential forgetting.
 #[derive(Clone, Copy, Debug)]
-pub struct Consistency {
-    parameters: ConsistencyParameters,
+pub struct InnovationMonitor {
+    parameters: InnovationMonitorParameters,
     expected: f64,
     accepted: f64,
     used: f64,
@@ -53,10 +53,10 @@ const DOUBTFUL: f64 = 0.75;
 const PROBATION: f64 = 0.13;
 const PROBATION_SCANS: f64 = 24.0;
 
-impl Consistency {
+impl InnovationMonitor {
     /// No evidence yet.
     #[must_use]
-    pub fn new(parameters: ConsistencyParameters) -> Self {
+    pub fn new(parameters: InnovationMonitorParameters) -> Self {
         Self {
             parameters,
             expected: 0.0,
@@ -119,7 +119,7 @@ impl Consistency {
 
     /// Whether the innovations are larger than the filter believes.
     #[must_use]
-    pub fn is_surprised(&self) -> bool {
+    pub fn has_large_innovations(&self) -> bool {
         self.used >= self.parameters.least_observations
             && self.mean_normalised_square() > self.parameters.largest_normalised_square
     }

@@ -1,8 +1,8 @@
 //! What corrections say of odometry and laser, against weighted least squares over all of them at once.
 #![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_core::filter::{DriftCheck, Suspect};
 use agv_core::geometry::Pose;
+use agv_core::integrity::{MountingCheck, Suspect};
 use nalgebra::{Matrix2, Vector2};
 
 use super::falko::scene::Random;
@@ -78,7 +78,7 @@ fn verdicts_and_trends_are_those_of_all_corrections_at_once() {
         let size = random.uniform(-1.5, 1.5);
         let which = (random.unit() * 5.0) as usize;
         wrong[which] = size * [0.02, 0.15, 0.15, 0.06, 0.03][which];
-        let mut check = DriftCheck::new();
+        let mut check = MountingCheck::new();
         let (mut revolutions, mut before, mut askew) = (Vec::new(), None, 0.0);
         let mut sound = (0.0, 0.0);
         let (mut way, mut turn) = (0.0, 0.0);
@@ -123,7 +123,7 @@ fn verdicts_and_trends_are_those_of_all_corrections_at_once() {
 #[test]
 fn a_new_pose_forgets_the_corrections_and_a_suspicion_of_the_odometry_alone() {
     let after = |correction: Pose| {
-        let mut check = DriftCheck::new();
+        let mut check = MountingCheck::new();
         for _ in 0..40 {
             check.add(&Pose::new(0.15, 0.0, 0.0), &correction);
         }
@@ -134,6 +134,6 @@ fn a_new_pose_forgets_the_corrections_and_a_suspicion_of_the_odometry_alone() {
     };
     assert_eq!(after(Pose::new(0.01, 0.0, 0.0)), (Some(Suspect::Odometry), None));
     assert_eq!(after(Pose::new(0.0, 0.01, 0.0)), (Some(Suspect::Laser), Some(Suspect::Laser)));
-    assert_eq!(DriftCheck::default().suspect(), None);
-    assert_eq!(DriftCheck::default().trend(), [0.0; 2]);
+    assert_eq!(MountingCheck::default().suspect(), None);
+    assert_eq!(MountingCheck::default().trend(), [0.0; 2]);
 }

@@ -1,6 +1,6 @@
 //! Evidence for and against the pose, against sums in which the weight of each scan is written out.
 
-use agv_core::filter::{Consistency, ConsistencyParameters};
+use agv_core::integrity::{InnovationMonitor, InnovationMonitorParameters};
 
 use super::falko::scene::Random;
 
@@ -12,8 +12,8 @@ struct Scan {
     square_sum: f64,
 }
 
-fn consistency(parameters: ConsistencyParameters, scans: &[Scan]) -> Consistency {
-    let mut consistency = Consistency::new(parameters);
+fn consistency(parameters: InnovationMonitorParameters, scans: &[Scan]) -> InnovationMonitor {
+    let mut consistency = InnovationMonitor::new(parameters);
     for scan in scans {
         consistency.add(scan.expected, scan.accepted, scan.used, scan.square_sum);
     }
@@ -31,10 +31,10 @@ fn verdicts_are_those_of_weighted_means() {
     let mut random = Random::new(1);
     let mut verdicts = [0; 6];
     for _ in 0..400 {
-        let parameters = ConsistencyParameters {
+        let parameters = InnovationMonitorParameters {
             memory: random.uniform(3.0, 20.0),
             least_remaining: random.uniform(0.3, 0.9),
-            ..ConsistencyParameters::default()
+            ..InnovationMonitorParameters::default()
         };
         let share = random.unit();
         let square = random.uniform(1.0, 9.0);
@@ -61,9 +61,10 @@ fn verdicts_are_those_of_weighted_means() {
             assert!((told.acceptance() - acceptance).abs() < 1e-9, "{} {acceptance}", told.acceptance());
             assert!((told.mean_normalised_square() - mean).abs() < 1e-9);
             let is_rejecting = expected >= parameters.least_observations && acceptance < parameters.least_acceptance;
-            let is_surprised = used >= parameters.least_observations && mean > parameters.largest_normalised_square;
+            let has_large_innovations =
+                used >= parameters.least_observations && mean > parameters.largest_normalised_square;
             assert_eq!(told.is_rejecting(), is_rejecting);
-            assert_eq!(told.is_surprised(), is_surprised);
+            assert_eq!(told.has_large_innovations(), has_large_innovations);
             // The longer memory: a twelfth is forgotten with each scan that tells something.
             let telling: Vec<_> = scans.iter().copied().filter(|scan| scan.expected > 0).collect();
             let long = |number: fn(&Scan) -> f64| sum(&telling, number, |_| 11.0 / 12.0);
@@ -77,8 +78,8 @@ fn verdicts_are_those_of_weighted_means() {
             for (count, verdict) in verdicts.iter_mut().zip([
                 is_rejecting,
                 !is_rejecting,
-                is_surprised,
-                !is_surprised,
+                has_large_innovations,
+                !has_large_innovations,
                 is_doubtful,
                 !is_doubtful,
             ]) {
@@ -91,11 +92,12 @@ fn verdicts_are_those_of_weighted_means() {
 
 #[test]
 fn without_evidence_nothing_is_wrong() {
-    let told = consistency(ConsistencyParameters::default(), &[]);
+    let told = consistency(InnovationMonitorParameters::default(), &[]);
     assert_eq!((told.acceptance(), told.mean_normalised_square()), (1.0, 2.0));
-    assert!(!told.is_rejecting() && !told.is_surprised() && !told.is_doubtful());
+    assert!(!told.is_rejecting() && !told.has_large_innovations() && !told.is_doubtful());
     // Nor does a scan that tells nothing, or a memory of less than one observation, divide by zero.
-    let parameters = ConsistencyParameters { memory: 0.0, least_remaining: 0.0, ..ConsistencyParameters::default() };
+    let parameters =
+        InnovationMonitorParameters { memory: 0.0, least_remaining: 0.0, ..InnovationMonitorParameters::default() };
     let scan = |accepted: usize| Scan { expected: 4, accepted, used: 0, square_sum: 0.0 };
     let told = consistency(parameters, &[scan(4), Scan { expected: 0, ..scan(0) }, scan(1)]);
     assert_eq!((told.acceptance(), told.mean_normalised_square()), (0.25, 2.0));
@@ -103,7 +105,7 @@ fn without_evidence_nothing_is_wrong() {
 
 #[test]
 fn the_limits_themselves_are_allowed() {
-    let parameters = ConsistencyParameters {
+    let parameters = InnovationMonitorParameters {
         memory: 1.0,
         least_remaining: 0.0,
         least_observations: 8.0,
@@ -113,7 +115,7 @@ fn the_limits_themselves_are_allowed() {
     let told = |expected, accepted, square: f64| {
         let scan = Scan { expected, accepted, used: expected, square_sum: square * expected as f64 };
         let told = consistency(parameters, &[scan]);
-        (told.is_rejecting(), told.is_surprised())
+        (told.is_rejecting(), told.has_large_innovations())
     };
     assert_eq!(told(8, 4, 4.0), (false, false));
     assert_eq!(told(8, 3, 4.5), (true, true));

@@ -50,7 +50,7 @@ pub enum Suspect {
 
 /// Sums over the corrections, with exponential forgetting.
 #[derive(Clone, Debug)]
-pub struct DriftCheck {
+pub struct MountingCheck {
     /// Of the way, of both, of the turn.
     information: [f64; 3],
     along: Vector2<f64>,
@@ -82,7 +82,7 @@ fn is_below(rate: Option<f64>, limit: f64) -> bool {
     rate.is_some_and(|rate| libm::fabs(rate) < HEALED * limit)
 }
 
-impl DriftCheck {
+impl MountingCheck {
     /// A check that has seen nothing.
     #[must_use]
     pub fn new() -> Self {
@@ -185,7 +185,7 @@ impl DriftCheck {
 /// Information, m^2 and rad^2.
 const FLOOR: (f64, f64) = (0.01, 0.003);
 
-impl Default for DriftCheck {
+impl Default for MountingCheck {
     fn default() -> Self {
         Self::new()
     }

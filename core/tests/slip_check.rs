@@ -1,8 +1,8 @@
 //! Whether the laser has moved as the odometry says, held against the history of each place.
 #![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_core::filter::MotionCheck;
 use agv_core::geometry::Point;
+use agv_core::integrity::SlipCheck;
 use agv_core::measurement::Time;
 
 use super::falko::scene::Random;
@@ -38,7 +38,7 @@ fn verdicts_follow_from_the_history_of_each_place() {
     let mut random = Random::new(7);
     let (mut wrong, mut right) = (0, 0);
     for _ in 0..400 {
-        let mut check = MotionCheck::new();
+        let mut check = SlipCheck::new();
         let mut history: Vec<Vec<bool>> = Vec::new();
         let mut contradictions = 0;
         let mut share = [0.0; PLACES];
@@ -79,7 +79,7 @@ fn verdicts_follow_from_the_history_of_each_place() {
 /// Three revolutions in one place and two in another that is `shift` (m) beside it, both seen from `range` (m), with `pause`
 /// (s) between the two.
 fn is_move_seen(count: usize, shift: f64, range: f64, pause: f64) -> bool {
-    let mut check = MotionCheck::new();
+    let mut check = SlipCheck::new();
     let mut now = time(0);
     let mut last = false;
     for revolution in 0..5 {
@@ -111,7 +111,7 @@ fn two_landmarks_and_a_long_pause_tell_nothing() {
 
 #[test]
 fn what_is_cleared_contradicts_nothing() {
-    let mut check = MotionCheck::default();
+    let mut check = SlipCheck::default();
     for revolution in 0..8 {
         if revolution == 5 {
             check.clear();
@@ -133,7 +133,7 @@ fn more_landmarks_than_there_is_room_for_still_tell_a_move() {
 
 #[test]
 fn landmarks_that_are_passed_make_room_for_those_that_come() {
-    let mut check = MotionCheck::new();
+    let mut check = SlipCheck::new();
     for revolution in 0..8 {
         check.begin(time(revolution));
         // 32 of them, then 8 others, which then seem to jump.
@@ -149,7 +149,7 @@ fn landmarks_that_are_passed_make_room_for_those_that_come() {
 #[test]
 fn neighbours_of_one_revolution_are_two_landmarks() {
     // One that has been seen in one revolution only need not be seen again, however many are near it.
-    let mut check = MotionCheck::new();
+    let mut check = SlipCheck::new();
     for revolution in 0..3 {
         check.begin(time(revolution));
         for index in 0..8 {
@@ -164,7 +164,7 @@ fn neighbours_of_one_revolution_are_two_landmarks() {
 #[test]
 fn a_fifth_of_the_landmarks_is_enough() {
     for (seen, expected) in [(1, false), (0, true)] {
-        let mut check = MotionCheck::new();
+        let mut check = SlipCheck::new();
         for revolution in 0..5 {
             check.begin(time(revolution));
             for index in 0..10 {

@@ -1,6 +1,6 @@
 //! How wrong a pose may be.
 
-use super::PoseOutput;
+use crate::state::PoseOutput;
 
 /// Bounds that the errors of a pose exceed with a small probability (the protection levels of satellite navigation,
 /// RTCA DO-229, appendix J).
@@ -10,11 +10,6 @@ pub struct ProtectionLevel {
     pub position: f64,
     /// Of the heading, rad.
     pub heading: f64,
-}
-
-impl ProtectionLevel {
-    /// Probability that one of the bounds is exceeded although nothing is wrong with vehicle, sensors and map.
-    pub const RISK: f64 = 1e-7;
 }
 
 /// Deviations in the bound of the position: a distance in the plane exceeds them with half of the risk,
@@ -28,16 +23,19 @@ const HEADING_ALLOWANCE: f64 = 0.0175;
 /// The filter lags behind a steady drift by at most so many times what it corrects in its trend.
 const LAG: f64 = 0.3;
 
-impl PoseOutput {
-    /// How wrong the pose may be: from its covariance, made larger by as much as the innovations are larger
+impl ProtectionLevel {
+    /// Probability that one of the bounds is exceeded although nothing is wrong with vehicle, sensors and map.
+    pub const RISK: f64 = 1e-7;
+
+    /// How wrong a pose may be: from its covariance, made larger by as much as the innovations are larger
     /// than expected, from the trend of the corrections, and from what no check tells soon.
     #[must_use]
-    pub fn protection_level(&self) -> ProtectionLevel {
-        let [xx, xy, yy, _, _, heading] = self.covariance;
+    pub fn of(output: &PoseOutput) -> Self {
+        let [xx, xy, yy, _, _, heading] = output.covariance;
         let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);
-        let [drift, heading_drift] = self.drift;
-        let surprise = libm::sqrt((0.5 * self.normalised_square).max(1.0));
-        ProtectionLevel {
+        let [drift, heading_drift] = output.drift;
+        let surprise = libm::sqrt((0.5 * output.normalised_square).max(1.0));
+        Self {
             position: POSITION_FACTOR * surprise * libm::sqrt(worst) + LAG * drift + POSITION_ALLOWANCE,
             heading: HEADING_FACTOR * surprise * libm::sqrt(heading) + LAG * heading_drift + HEADING_ALLOWANCE,
         }

@@ -1,0 +1,114 @@
+//! Whether the pose is to be believed: one check a file. What they find is turned into mode and reason by the localiser's
+//! supervisor alone.
+//!
+//! | check | what it is told | what it finds |
+//! |---|---|---|
+//! | [`InnovationMonitor`] | how many observations fit, and how well | a wrong pose, or a map that looks alike |
+//! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
+//! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
+//! | [`MountingCheck`] | corrections with the motion since the last one | a laser mounted elsewhere, an odometry of another scale |
+
+mod innovation_monitor;
+mod jump_check;
+mod mounting_check;
+mod protection_level;
+mod slip_check;
+
+pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
+pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
+pub use mounting_check::{MountingCheck, Suspect};
+pub use protection_level::ProtectionLevel;
+pub use slip_check::SlipCheck;
+
+use crate::geometry::{Point, Pose};
+use crate::maps::{LandmarkKind, Verdict};
+use crate::measurement::Time;
+use crate::state::LandmarkUse;
+
+/// All checks of one vehicle.
+#[derive(Clone, Debug)]
+pub struct Integrity {
+    /// What observations say of the pose.
+    pub innovations: InnovationMonitor,
+    slip: SlipCheck,
+    jumps: JumpCheck,
+    mounting: MountingCheck,
+}
+
+/// A pose that replaces one which was contradicted.
+#[derive(Clone, Copy, Debug)]
+pub struct Replacement {
+    /// From the pose that was contradicted to the given one, in R.
+    pub jump: Pose,
+    /// Distance since a landmark last corrected the pose, m.
+    pub distance: f64,
+    /// Standard deviations of the given position, m, and heading, rad.
+    pub deviations: (f64, f64),
+}
+
+impl Integrity {
+    /// Checks that have seen nothing.
+    #[must_use]
+    pub fn new(parameters: InnovationMonitorParameters) -> Self {
+        Self {
+            innovations: InnovationMonitor::new(parameters),
+            slip: SlipCheck::new(),
+            jumps: JumpCheck::new(),
+            mounting: MountingCheck::new(),
+        }
+    }
+
+    /// Begins anew for a pose that is given. A suspicion of the laser remains.
+    pub fn restart(&mut self, parameters: InnovationMonitorParameters, replacement: Option<&Replacement>) {
+        if replacement.is_some_and(|given| self.jumps.is_knock(&given.jump, given.distance, given.deviations)) {
+            self.mounting.suspect_laser();
+        }
+        self.innovations = InnovationMonitor::new(parameters);
+        self.slip.clear();
+        self.mounting.restart();
+        self.jumps.forget();
+    }
+
+    /// The odometry is not believed.
+    pub fn doubt_odometry(&mut self) {
+        self.jumps.forget();
+    }
+
+    /// Takes the reflectors of a revolution that ended at `now`, be it none; `to_odometry` is the pose of W in the frame of the
+    /// odometry. True if the laser has moved otherwise than the odometry says.
+    pub fn see_reflectors(&mut self, now: Time, to_odometry: &Pose, uses: &[LandmarkUse]) -> bool {
+        self.slip.begin(now);
+        for seen in uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector) {
+            let [x, y] = seen.position.map(f64::from);
+            let place = to_odometry.transform(&Point::from(seen.located));
+            self.slip.see(&place, libm::hypot(x, y));
+        }
+        self.slip.disagrees()
+    }
+
+    /// Takes what an event has made of the estimate; see [`JumpCheck::correct`]. What corrects nothing tells nothing.
+    pub fn correct(&mut self, before: &Estimate, after: &Estimate, uses: &[LandmarkUse], is_right: bool) {
+        if !uses.iter().any(|seen| seen.verdict == Verdict::Accepted) {
+            return;
+        }
+        let Some(jump) = self.jumps.correct(before, after, is_right) else { return };
+        if let Some(motion) = &jump.motion {
+            self.mounting.add(motion, &jump.correction);
+        }
+        if jump.is_knock {
+            self.mounting.suspect_laser();
+        }
+    }
+
+    /// Which of laser and odometry is wrong, if one is.
+    #[must_use]
+    pub fn suspect(&self) -> Option<Suspect> {
+        self.mounting.suspect()
+    }
+
+    /// See [`MountingCheck::trend`].
+    #[must_use]
+    pub fn correction_trend(&self) -> [f64; 2] {
+        self.mounting.trend()
+    }
+}

@@ -1,0 +1,38 @@
+//! What the vehicle says of its pose: verdicts become a mode and a reason here and nowhere else.
+
+use crate::integrity::{Integrity, Suspect};
+use crate::state::{Mode, Reason};
+
+/// What the pose rests on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Support {
+    /// Whether reflectors have corrected the pose lately.
+    pub by_reflectors: bool,
+    /// Whether natural features have.
+    pub by_features: bool,
+}
+
+/// The mode, and why it is so. `lost` and `outage` say why there is no pose, and why there is no odometry.
+pub(super) fn supervise(
+    lost: Option<Reason>,
+    outage: Option<Reason>,
+    support: Support,
+    integrity: &Integrity,
+) -> (Mode, Reason) {
+    if let Some(reason) = lost {
+        return (Mode::Lost, reason);
+    }
+    if let Some(reason) = outage {
+        return (Mode::WithoutOdometry, reason);
+    }
+    let suspect = integrity.suspect();
+    let remark = if suspect == Some(Suspect::Odometry) { Reason::OdometryDisagrees } else { Reason::None };
+    match (support.by_reflectors, support.by_features) {
+        (false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
+        _ if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
+        _ if integrity.innovations.is_doubtful() => (Mode::Degraded, Reason::LandmarksRejected),
+        (true, true) => (Mode::Mixed, remark),
+        (true, false) => (Mode::Reflectors, remark),
+        (false, true) => (Mode::Features, remark),
+    }
+}
