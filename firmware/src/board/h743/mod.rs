@@ -7,6 +7,7 @@
 mod caches;
 mod can;
 mod flash;
+mod memory_clocks;
 
 pub use can::FdCanPort as Can;
 pub use flash::SettingsFlash as Flash;
@@ -101,6 +102,7 @@ fn clocks() -> Config {
 /// Starts everything but the tasks.
 #[must_use]
 pub fn start(mut core: cortex_m::Peripherals) -> Board {
+    memory_clocks::enable();
     caches::enable(&mut core);
     let peripherals = embassy_stm32::init(clocks());
     // Drivers above the bus, the bus above the network, the network above everything else.
