@@ -14,20 +14,30 @@ use agv_settings::encoders::{SYNC_PERIOD, channels, node};
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
 
-use super::can_port::CanPort;
+use super::can_port::{BusChange, CanPort};
 use super::exchange::{self, BusEvent, now};
 use super::supervision::{self, Task};
 
 /// How often state machines are asked what is due.
 const STEP: Duration = Duration::from_millis(1);
 
+/// What is to be told of the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Troubles {
+    /// The program has failed before.
+    pub has_failed: bool,
+    /// A part of the board does not work.
+    pub is_board_damaged: bool,
+}
+
 /// Takes part in the bus for ever.
-pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool) -> ! {
+pub async fn run(mut port: impl CanPort, settings: &Settings, found: Troubles) -> ! {
     let start = now();
     let [drive, steering] = channels(settings);
     let controller = node(settings.nodes.controller);
     let mut pair = EncoderPair::new(&drive, &steering, SYNC_PERIOD, start);
     let mut node = ControllerNode::new(controller, start);
+    port.listen_to(&[controller, drive.encoder.node, steering.encoder.node]);
     let mut orders = OrderReceiver::new(controller);
     let mut publisher = PosePublisher::new(controller, start);
     let mut faults = EncoderFaults::default();
@@ -49,6 +59,9 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
             }
         }
         let time = now();
+        if let Some(emergency) = port.supervise(time).and_then(emergency) {
+            port.send(&Message::Emergency { node: controller, emergency }.encode());
+        }
         if orders.is_standstill(time) {
             pair.expect_standstill();
         }
@@ -66,7 +79,7 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
             continue;
         }
         if !core::mem::replace(&mut has_reported, true) {
-            for emergency in troubles(has_panicked) {
+            for emergency in troubles(found) {
                 port.send(&Message::Emergency { node: controller, emergency }.encode());
             }
         }
@@ -82,10 +95,24 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
     }
 }
 
-/// What was wrong at the start, in the codes of CiA 301, table 26.
-fn troubles(has_panicked: bool) -> impl Iterator<Item = Emergency> {
-    let internal_software = has_panicked.then_some(0x6100);
+/// An error or its end, in the codes of CiA 301, table 26.
+const fn generic(code: u16) -> Emergency {
+    Emergency { code, register: 1, details: [0; 5] }
+}
+
+/// What was wrong at the start.
+fn troubles(found: Troubles) -> impl Iterator<Item = Emergency> {
+    let hardware = found.is_board_damaged.then_some(0x5000);
+    let internal_software = found.has_failed.then_some(0x6100);
     let data_set = (!exchange::are_settings_sound()).then_some(0x6300);
-    let generic = |code| Emergency { code, register: 1, details: [0; 5] };
-    internal_software.into_iter().chain(data_set).map(generic)
+    hardware.into_iter().chain(internal_software).chain(data_set).map(generic)
+}
+
+/// What is told of a change of the bus.
+const fn emergency(change: BusChange) -> Option<Emergency> {
+    match change {
+        BusChange::Overrun => Some(generic(0x8110)),
+        BusChange::Off => None,
+        BusChange::BackFromOff => Some(generic(0x8140)),
+    }
 }

@@ -8,7 +8,6 @@ use embassy_net::{IpAddress, IpEndpoint, Stack};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 
 use super::exchange::{self, RevolutionSender, now};
-use super::supervision::{self, Task};
 
 /// How long a connection may take.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -73,7 +72,6 @@ async fn next(
     revolution: &mut Revolution,
 ) {
     loop {
-        supervision::check_in(Task::Network);
         match session.poll(now(), revolution) {
             Step::Revolution => return,
             Step::Connect => {
