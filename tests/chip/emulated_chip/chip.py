@@ -216,6 +216,7 @@ class Chip:
 
     def on_protection_change(self):
         """What the memory protection unit forbids stops the processor before the access."""
+        self.data_flash.on_protection_change()
         engine = self.processor.engine
         for base, size in self._forbidden:
             engine.mem_protect(base, size, UC_PROT_ALL)

@@ -6,17 +6,18 @@ import json
 class Register:
     def __init__(self, offset, fields):
         self.offset = offset
-        self._fields = fields
+        self._fields = {name: (place["bit"], (1 << place["size"]) - 1) for name, place in fields.items()}
 
-    def mask(self, field):
-        place = self._fields[field]
-        return ((1 << place["size"]) - 1) << place["bit"]
+    def fields(self):
+        return list(self._fields)
 
     def get(self, value, field):
-        return (value & self.mask(field)) >> self._fields[field]["bit"]
+        bit, mask = self._fields[field]
+        return value >> bit & mask
 
     def put(self, value, field, part):
-        return value & ~self.mask(field) | part << self._fields[field]["bit"] & self.mask(field)
+        bit, mask = self._fields[field]
+        return value & ~(mask << bit) | (part & mask) << bit
 
 
 class Description:
@@ -26,11 +27,17 @@ class Description:
         self.memory = {region["name"]: (region["address"], region["size"]) for region in raw["memory"]}
         self.interrupts = raw["interrupts"]
         self.peripherals = {one["name"]: one for one in raw["peripherals"]}
-        self._kinds = raw["kinds"]
+        self._kinds = {
+            kind: {name: Register(one["offset"], one["fields"]) for name, one in registers.items()}
+            for kind, registers in raw["kinds"].items()
+        }
 
     def register(self, kind, name):
-        found = self._kinds[kind][name]
-        return Register(found["offset"], found["fields"])
+        return self._kinds[kind][name]
+
+    def registers(self, kind):
+        """All registers of a kind of peripheral, by their names; none if the description has no such kind."""
+        return self._kinds.get(kind, {})
 
     def base(self, name):
         return self.peripherals[name]["address"]

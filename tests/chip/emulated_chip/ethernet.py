@@ -68,7 +68,7 @@ class Ethernet(RegisterFile):
         if now >= self._reset_until:
             self._reset_until = None
             return 0
-        self.chip.clock.spin_until(min(self._reset_until, now + 100 * MICROSECOND))
+        self.chip.clock.spin_until(min(self._reset_until, now + MICROSECOND))
         return 1
 
     # Management of the PHY

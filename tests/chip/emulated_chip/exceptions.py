@@ -23,7 +23,9 @@ FRAME = [
     arm.UC_ARM_REG_R12,
     arm.UC_ARM_REG_LR,
 ]
-FLOATS = [arm.UC_ARM_REG_S0 + number for number in range(16)]
+STATE = [arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_CONTROL]
+FLOATS = [arm.UC_ARM_REG_S0 + number for number in range(16)] + [arm.UC_ARM_REG_FPSCR]
+MASKS = [arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_FAULTMASK, arm.UC_ARM_REG_BASEPRI]
 FPCA = 1 << 2
 PADDED = 1 << 9
 THUMB = 1 << 24
@@ -37,6 +39,8 @@ class Exceptions:
         self.taken = []
         self.pending = set()
         self.levels = set()
+        # Interrupts that never come, for tests in which somebody stands still.
+        self.blocked = set()
 
     def reset(self):
         self.active = []
@@ -89,7 +93,7 @@ class Exceptions:
 
     def _candidate(self):
         """What would be taken if nothing were masked."""
-        ready = [number for number in self.pending if self._is_enabled(number)]
+        ready = [number for number in self.pending - self.blocked if self._is_enabled(number)]
         best = min(ready, key=lambda number: (self.priority(number), number), default=None)
         if best is None or self.priority(best) >= self.current_priority():
             return None
@@ -104,9 +108,11 @@ class Exceptions:
         processor = self.chip.processor
         best = self._candidate()
         processor.progress.is_pending = int(best is not None)
-        if best is None or processor.get(arm.UC_ARM_REG_PRIMASK) & 1 or processor.get(arm.UC_ARM_REG_FAULTMASK) & 1:
+        if best is None:
             return
-        base = processor.get(arm.UC_ARM_REG_BASEPRI) & 0xFF
+        primask, faultmask, base = processor.get_all(MASKS)
+        if primask & 1 or faultmask & 1:
+            return
         if base and self.priority(best) >= base:
             return
         self.pending.discard(best)
@@ -116,26 +122,21 @@ class Exceptions:
 
     def _enter(self, number, return_address):
         processor, system = self.chip.processor, self.chip.system
-        has_floats = bool(processor.get(arm.UC_ARM_REG_CONTROL) & FPCA)
-        stack = processor.get(arm.UC_ARM_REG_SP)
-        status = processor.get(arm.UC_ARM_REG_XPSR)
+        *words, stack, status, control = processor.get_all(FRAME + STATE)
+        has_floats = bool(control & FPCA)
         pad = stack & 4
-        words = [processor.get(register) for register in FRAME]
-        words += [return_address, status & ~PADDED | (PADDED if pad else 0) | THUMB]
+        words = list(words) + [return_address, status & ~PADDED | (PADDED if pad else 0) | THUMB]
         if has_floats:
-            words += [processor.get(register) for register in FLOATS]
-            words += [processor.get(arm.UC_ARM_REG_FPSCR), 0]
+            words += list(processor.get_all(FLOATS)) + [0]
         stack = (stack - pad - 4 * len(words)) & 0xFFFF_FFFF
         if not self.chip.is_stack(stack, 4 * len(words)):
             self._on_stacking_error(stack)
             return
         data = b"".join((word & 0xFFFF_FFFF).to_bytes(4, "little") for word in words)
         processor.engine.mem_write(stack, data)
-        processor.set(arm.UC_ARM_REG_SP, stack)
         link = 0xFFFF_FFF1 if self.active else 0xFFFF_FFF9
+        processor.set_all(STATE, [stack, THUMB | number, control & ~FPCA])
         processor.set(arm.UC_ARM_REG_LR, link & ~0x10 if has_floats else link)
-        processor.set(arm.UC_ARM_REG_CONTROL, processor.get(arm.UC_ARM_REG_CONTROL) & ~FPCA)
-        processor.set(arm.UC_ARM_REG_XPSR, THUMB | number)
         self.active.append(number)
         if number < FIRST_INTERRUPT:
             self.taken.append((self.chip.clock.now(), number, return_address))
@@ -160,17 +161,12 @@ class Exceptions:
         stack += 4 * count + (4 if status & PADDED else 0)
         # Returning lifts FAULTMASK, unless from a non-maskable interrupt.
         processor.set(arm.UC_ARM_REG_FAULTMASK, 0)
-        processor.set(arm.UC_ARM_REG_XPSR, status & ~PADDED)
-        processor.set(arm.UC_ARM_REG_SP, stack)
-        for register, word in zip(FRAME, words):
-            processor.set(register, word)
         control = processor.get(arm.UC_ARM_REG_CONTROL) & ~FPCA
         if has_floats:
-            for register, word in zip(FLOATS, words[8:]):
-                processor.set(register, word)
-            processor.set(arm.UC_ARM_REG_FPSCR, words[24])
+            processor.set_all(FLOATS, words[8:25])
             control |= FPCA
-        processor.set(arm.UC_ARM_REG_CONTROL, control)
+        processor.set_all(STATE, [stack, status & ~PADDED, control])
+        processor.set_all(FRAME, words)
         processor.pc = words[6] & ~1
         if number in self.levels:
             self.pend(number)

@@ -72,10 +72,21 @@ class DataFlash:
         self.size = len(flash.bytes)
         self.reads = 0
         self._apart = {}
+        self._cached = {}
         chip.processor.engine.mmio_map(base, self.size, self._read, None, self._write, None)
 
     def covers(self, address):
         return self.base <= address < self.base + self.size
+
+    def _is_cached(self, offset):
+        """Whether the cache may hold an offset; protection is of whole sectors here."""
+        sector = offset >> 17
+        if sector not in self._cached:
+            self._cached[sector] = self.chip.system.is_cached(self.base + offset)
+        return self._cached[sector]
+
+    def on_protection_change(self):
+        self._cached = {}
 
     def seen(self, offset, size):
         """The bytes at an offset, as the processor sees them."""
@@ -84,7 +95,7 @@ class DataFlash:
             line = offset & ~31
             count = min(size, line + 32 - offset)
             memory = self.flash.bytes[line : line + 32]
-            if self.chip.system.is_cached(self.base + line):
+            if self._is_cached(line):
                 memory = self.chip.cache.read_lines.read(self.base + line, memory)
             data += bytes(memory[offset - line : offset - line + count])
             offset, size = offset + count, size - count
@@ -92,6 +103,8 @@ class DataFlash:
 
     def _read(self, engine, offset, size, _):
         self.reads += 1
+        if not self._is_cached(offset):
+            return int.from_bytes(self.flash.bytes[offset : offset + size], "little")
         return int.from_bytes(self.seen(offset, size), "little")
 
     def _write(self, engine, offset, size, value, _):

@@ -28,7 +28,7 @@ class Progress(ctypes.Structure):
         ("limit", ctypes.c_uint64),
         ("block", ctypes.c_uint64),
         ("is_pending", ctypes.c_uint32),
-        ("primask", ctypes.c_int32),
+        ("masks", ctypes.c_int32 * 3),
         ("stop", ctypes.c_void_p),
         ("read", ctypes.c_void_p),
     ]
@@ -41,7 +41,7 @@ class Processor:
         self.chip = chip
         self.engine = Uc(UC_ARCH_ARM, UC_MODE_THUMB)
         self.engine.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M7)
-        self.progress = Progress(primask=arm.UC_ARM_REG_PRIMASK)
+        self.progress = Progress(masks=(arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_FAULTMASK, arm.UC_ARM_REG_BASEPRI))
         self._hook = ctypes.CDLL(str(hook_library))
         self._count_blocks()
         self.engine.hook_add(UC_HOOK_INTR, self._on_interrupt)
@@ -81,6 +81,12 @@ class Processor:
 
     def set(self, register, value):
         self.engine.reg_write(register, value)
+
+    def get_all(self, registers):
+        return self.engine.reg_read_batch(registers)
+
+    def set_all(self, registers, values):
+        self.engine.reg_write_batch(list(zip(registers, values)))
 
     @property
     def pc(self):

@@ -31,9 +31,8 @@ class Rcc(RegisterFile):
         self.has_hse = True
         # Bits that the chip ignores, for tests that take a clock away: pairs of register and field.
         self.ignored = set()
-        # Every clock bit that was ever set.
-        self.ever_set = set()
         self._running = set()
+        self._timer_clock = None
         self.on_write("CR", self._write_control)
         self.on_write("CFGR", self._write_configuration)
         self.on_write("PLLCKSELR", self._write_pll_source)
@@ -97,6 +96,7 @@ class Rcc(RegisterFile):
     def _become_ready(self, name, on, ready):
         if self.get("CR", on):
             self.put("CR", ready, 1)
+            self._timer_clock = None
 
     def _write_pll_source(self, word):
         # Protected while a PLL runs (8.7.11).
@@ -166,8 +166,10 @@ class Rcc(RegisterFile):
 
     def timer_clock(self):
         """Of the timers on APB 1 (8.5.6, table 56): twice that of the bus, unless that is not divided."""
-        bus, peripheral = self.bus_clock(), self.peripheral_clock("D2CFGR", "D2PPRE1")
-        return bus if peripheral == bus else 2 * peripheral
+        if self._timer_clock is None:
+            bus, peripheral = self.bus_clock(), self.peripheral_clock("D2CFGR", "D2PPRE1")
+            self._timer_clock = bus if peripheral == bus else 2 * peripheral
+        return self._timer_clock
 
     def can_clock(self):
         """Kernel clock of the FDCAN (8.7.18)."""
@@ -180,19 +182,25 @@ class Rcc(RegisterFile):
         hsi48 = self._oscillator("HSI48") if self.get("CR", "HSI48RDY") else 0
         return {0: hsi48, 1: self.pll(0, "q")}.get(selected, 0)
 
+    def write_word(self, offset, word):
+        super().write_word(offset, word)
+        self._timer_clock = None
+
     def _tell(self):
+        self._timer_clock = None
         self.chip.clock.set_processor_clock(max(1, self.processor_clock()))
 
     # Who is clocked
+
+    def enabled(self):
+        """Every clock bit that is set: pairs of register and field."""
+        return sorted((name, field) for name in ENABLES for field in self.register(name).fields() if self.get(name, field))
 
     def is_on(self, register, field):
         return bool(self.get(register, field))
 
     def _enable(self, name, word):
         register = self.register(name)
-        for field in register._fields:
-            if register.get(word, field):
-                self.ever_set.add((name, field))
         for ignored_register, field in self.ignored:
             if ignored_register == name:
                 word = register.put(word, field, 0)

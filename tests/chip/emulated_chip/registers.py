@@ -7,6 +7,7 @@ class RegisterFile:
     def __init__(self, chip, kind, resets=None):
         self.chip = chip
         self.kind = kind
+        self._registers = chip.description.registers(kind)
         self._resets = dict(resets or {})
         self.words = dict(self._resets)
         self._readers = {}
@@ -17,7 +18,7 @@ class RegisterFile:
         self.words = dict(self._resets)
 
     def register(self, name):
-        return self.chip.description.register(self.kind, name)
+        return self._registers[name]
 
     def on_read(self, name, reader):
         self._readers[self.register(name).offset] = reader
@@ -26,7 +27,7 @@ class RegisterFile:
         self._writers[self.register(name).offset] = writer
 
     def get(self, name, field=None):
-        register = self.register(name)
+        register = self._registers[name]
         word = self.words.get(register.offset, 0)
         return word if field is None else register.get(word, field)
 

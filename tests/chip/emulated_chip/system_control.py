@@ -198,6 +198,8 @@ class SystemControl:
             self.chip.cache.maintain(offset, value)
         else:
             self.words[offset] = value
+            if offset == CCR:
+                self.chip.data_flash.on_protection_change()
         self.chip.processor.stop_soon()
 
     def _protect(self, offset, value):
