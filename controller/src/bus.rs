@@ -21,6 +21,8 @@ pub const MOTIONS: usize = 16;
 /// What was wrong when the controller started, told once on the bus in the codes of CiA 301, table 26.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Troubles {
+    /// A part of the board does not work (5000h).
+    pub is_board_damaged: bool,
     /// The program ended by itself the last time (6100h).
     pub has_panicked: bool,
     /// Not everything that was set was found (6300h).
@@ -28,11 +30,11 @@ pub struct Troubles {
 }
 
 impl Troubles {
-    fn emergencies(self) -> impl Iterator<Item = Emergency> {
+    fn codes(self) -> impl Iterator<Item = u16> {
+        let hardware = self.is_board_damaged.then_some(0x5000);
         let internal_software = self.has_panicked.then_some(0x6100);
         let data_set = self.are_settings_lost.then_some(0x6300);
-        let generic = |code| Emergency { code, register: 1, details: [0; 5] };
-        internal_software.into_iter().chain(data_set).map(generic)
+        hardware.into_iter().chain(internal_software).chain(data_set)
     }
 }
 
@@ -48,7 +50,7 @@ pub enum BusOutput {
 /// The encoders, the controller's own node, and the pose for now.
 #[derive(Clone, Debug)]
 pub struct Bus {
-    controller: NodeId,
+    nodes: EncoderNodes,
     encoders: Encoders,
     node: ControllerNode,
     publisher: PosePublisher,
@@ -66,7 +68,7 @@ impl Bus {
     pub fn new(settings: &Settings, troubles: Troubles, start: Time) -> Self {
         let nodes = EncoderNodes::of(settings);
         Self {
-            controller: nodes.controller,
+            nodes,
             encoders: Encoders::new(&nodes, &settings.parameters, start),
             node: ControllerNode::new(nodes.controller, start),
             publisher: PosePublisher::new(nodes.controller, start),
@@ -126,8 +128,8 @@ impl Bus {
             return;
         }
         if !core::mem::replace(&mut self.has_told_troubles, true) {
-            for emergency in self.troubles.emergencies() {
-                take(BusOutput::Send(Message::Emergency { node: self.controller, emergency }.encode()));
+            for code in self.troubles.codes() {
+                take(BusOutput::Send(self.emergency(code)));
             }
         }
         let Some(output) = self.predictor.output() else { return };
@@ -136,6 +138,19 @@ impl Bus {
         for frame in self.publisher.poll(now, &output, &health).iter().flatten() {
             take(BusOutput::Send(*frame));
         }
+    }
+
+    /// The nodes whose frames mean something here: the controller and its encoders.
+    #[must_use]
+    pub fn nodes(&self) -> [NodeId; 3] {
+        [self.nodes.controller, self.nodes.drive, self.nodes.steering]
+    }
+
+    /// An error or its end, in the codes of CiA 301, table 26, as the controller's frame.
+    #[must_use]
+    pub fn emergency(&self, code: u16) -> Frame {
+        let emergency = Emergency { code, register: 1, details: [0; 5] };
+        Message::Emergency { node: self.nodes.controller, emergency }.encode()
     }
 
     /// The pose for now. None before the localiser has said anything.

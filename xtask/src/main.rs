@@ -1,6 +1,7 @@
 //! The project's own commands: `cargo xtask --help`.
 
 mod audit;
+mod chip;
 mod emulate;
 mod firmware;
 mod fuzz;
@@ -23,6 +24,7 @@ struct Xtask {
 #[derive(Subcommand)]
 enum Command {
     Audit(audit::Audit),
+    Chip(chip::Chip),
     Emulate(emulate::Emulate),
     Firmware(firmware::Firmware),
     Fuzz(fuzz::Fuzz),
@@ -33,6 +35,7 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
         Command::Audit(audit) => audit.run(),
+        Command::Chip(chip) => chip.run(),
         Command::Emulate(emulate) => emulate.run(),
         Command::Firmware(firmware) => firmware.run(),
         Command::Fuzz(fuzz) => fuzz.run(),

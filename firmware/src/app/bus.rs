@@ -7,7 +7,7 @@ use agv_settings::Settings;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
 
-use super::can_port::CanPort;
+use super::can_port::{BusChange, CanPort};
 use super::exchange::{self, now};
 use super::supervision::{self, Task};
 
@@ -15,13 +15,16 @@ use super::supervision::{self, Task};
 const STEP: Duration = Duration::from_millis(1);
 
 /// Takes part in the bus for ever.
-pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool) -> ! {
-    let troubles = Troubles { has_panicked, are_settings_lost: !exchange::are_settings_sound() };
+pub async fn run(mut port: impl CanPort, settings: &Settings, troubles: Troubles) -> ! {
     let mut bus = Bus::new(settings, troubles, now());
+    port.listen_to(&bus.nodes());
     let mut ticker = Ticker::every(STEP);
     loop {
         let woken = select(port.receive(), ticker.next()).await;
         supervision::check_in(Task::Bus);
+        if let Some(code) = port.supervise(now()).and_then(code) {
+            port.send(&bus.emergency(code));
+        }
         if let Some(estimate) = exchange::newest_estimate() {
             bus.update(&estimate);
         }
@@ -37,5 +40,14 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, has_panicked: bool
         }
         bus.poll(now(), exchange::laser_health(), &mut take);
         exchange::set_standing(bus.is_standing(now()));
+    }
+}
+
+/// What is told of a change of the bus, in the codes of CiA 301, table 26.
+const fn code(change: BusChange) -> Option<u16> {
+    match change {
+        BusChange::Overrun => Some(0x8110),
+        BusChange::Off => None,
+        BusChange::BackFromOff => Some(0x8140),
     }
 }

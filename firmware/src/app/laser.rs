@@ -9,7 +9,6 @@ use embassy_net::{IpAddress, IpEndpoint, Stack};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 
 use super::exchange::{self, RevolutionSender, now};
-use super::supervision::{self, Task};
 
 /// How long a connection may take.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -72,7 +71,6 @@ async fn next(
     revolution: &mut Revolution,
 ) {
     loop {
-        supervision::check_in(Task::Network);
         exchange::set_laser(laser.watch());
         match laser.poll(now(), revolution) {
             Step::Revolution => {

@@ -1,5 +1,7 @@
 //! Whether every task still runs: the watchdog is fed only then.
+#![allow(unsafe_code, reason = "what was seen before the restart is in memory of its own")]
 
+use embassy_time::{Duration, Instant, Ticker};
 use portable_atomic::{AtomicU32, Ordering};
 
 /// What must run. Each is a bit.
@@ -16,6 +18,12 @@ pub enum Task {
 
 const ALL: u32 = Task::Bus as u32 | Task::Network as u32 | Task::Localizer as u32;
 
+/// Least time between two meals of the watchdog, and how often the network's executor says that it runs.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// What has run since the last meal. A reset leaves it, so that what stood still can be told.
+// SAFETY: any word is a value of it.
+#[unsafe(link_section = ".retained")]
 static SEEN: AtomicU32 = AtomicU32::new(0);
 
 /// A task has run.
@@ -23,8 +31,49 @@ pub fn check_in(task: Task) {
     SEEN.fetch_or(task as u32, Ordering::Relaxed);
 }
 
-/// Whether all tasks have run since this was last true.
+/// Says for ever that the executor of the network runs.
+pub async fn watch_network() -> ! {
+    let mut ticker = Ticker::every(PERIOD / 2);
+    loop {
+        check_in(Task::Network);
+        ticker.next().await;
+    }
+}
+
+/// When the watchdog is fed.
+pub struct Supervisor {
+    last_meal: Instant,
+}
+
+impl Supervisor {
+    /// The watchdog was fed just now. What was seen before counts no more: [`stood_still`] comes first.
+    #[must_use]
+    pub fn start() -> Self {
+        SEEN.store(0, Ordering::Relaxed);
+        Self { last_meal: Instant::now() }
+    }
+
+    /// Whether to feed it: all tasks have run since it was fed last, which was not just now.
+    #[must_use]
+    pub fn is_due(&mut self) -> bool {
+        let now = Instant::now();
+        let is_due = now - self.last_meal >= PERIOD
+            && SEEN.compare_exchange(ALL, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok();
+        if is_due {
+            self.last_meal = now;
+        }
+        is_due
+    }
+}
+
+/// After the watchdog has bitten: what had stood still.
 #[must_use]
-pub fn have_all_run() -> bool {
-    SEEN.compare_exchange(ALL, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok()
+pub fn stood_still() -> &'static str {
+    match ALL & !SEEN.load(Ordering::Relaxed) {
+        1 => "the watchdog: the bus stood still",
+        2 => "the watchdog: the network stood still",
+        4 => "the watchdog: the localiser stood still",
+        7 => "the watchdog: everything stood still",
+        _ => "the watchdog: more than one task stood still",
+    }
 }

@@ -4,6 +4,7 @@
 
 use core::panic::PanicInfo;
 
+use agv_controller::Troubles;
 use agv_core::localizer::Parameters;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
@@ -11,10 +12,11 @@ use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::room::Localizer;
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
+use agv_firmware::app::supervision::Supervisor;
 use agv_firmware::app::throttle::Throttle;
 use agv_firmware::app::{bus, exchange, laser, log_stream, service, settings, supervision};
 use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, Watchdog};
-use agv_firmware::board::{retained, stack};
+use agv_firmware::board::{RestartCause, retained, stack};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
 use agv_wire::nav350::Revolution;
@@ -58,13 +60,18 @@ struct Shared {
 }
 
 #[embassy_executor::task]
-async fn bus_task(can: Can, settings: &'static Settings, has_panicked: bool) -> ! {
-    bus::run(can, settings, has_panicked).await
+async fn bus_task(can: Can, settings: &'static Settings, troubles: Troubles) -> ! {
+    bus::run(can, settings, troubles).await
 }
 
 #[embassy_executor::task]
 async fn network_task(mut runner: Runner<'static, Throttle<Ethernet>>) -> ! {
     runner.run().await
+}
+
+#[embassy_executor::task]
+async fn watch_task() -> ! {
+    supervision::watch_network().await
 }
 
 #[embassy_executor::task]
@@ -97,7 +104,8 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
         dns_servers: heapless::Vec::new(),
     });
     let resources = RESOURCES.init_with(StackResources::new);
-    let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, 0x5eed);
+    let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, board::seed());
+    spawner.spawn(watch_task().expect("the task runs once"));
     spawner.spawn(network_task(runner).expect("the task runs once"));
     spawner.spawn(laser_task(stack, revolutions, shared.settings).expect("the task runs once"));
     spawner.spawn(log_task(stack, shared).expect("the task runs once"));
@@ -111,6 +119,7 @@ struct Vehicle {
     localization: &'static mut Localization,
     revolutions: RevolutionReceiver,
     watchdog: Watchdog,
+    supervisor: Supervisor,
 }
 
 // Large values are built in functions of their own: on the stack they have room one after the other, not all at once.
@@ -136,12 +145,21 @@ fn share(controller: Controller<Flash>) -> (&'static Settings, &'static SharedCo
     (settings, CONTROLLER.init_with(|| SharedController::new(controller)))
 }
 
+/// What has brought this start about, if it was no good; empty if nothing was wrong.
+fn failure(cause: RestartCause) -> &'static str {
+    match (retained::read(), cause) {
+        ("", RestartCause::Watchdog) => supervision::stood_still(),
+        (said, _) => said,
+    }
+}
+
 #[inline(never)]
 fn start() -> Vehicle {
     let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let Board { can, ethernet, flash, mut watchdog } = board::start(core);
-    let panic = retained::read();
-    let controller = settings::read(flash, panic);
+    let Board { can, ethernet, flash, watchdog, restart_cause, troubles } = board::start(core);
+    let failure = failure(restart_cause);
+    let supervisor = Supervisor::start();
+    let controller = settings::read(flash, failure);
     let landmarks = controller.landmarks;
     let (settings, controller) = share(controller);
     let localizer = build_localizer(&settings.parameters);
@@ -154,29 +172,33 @@ fn start() -> Vehicle {
     let log = LogWriter::new(FRAME.take(), landmarks.len());
     let localization = build_localization(localizer, settings, log);
     exchange::publish(localization.localization.estimate());
-    watchdog.unleash();
-    let has_panicked = !panic.is_empty();
-    board::bus_tasks().spawn(bus_task(can, settings, has_panicked).expect("the task runs once"));
+    let troubles = Troubles {
+        has_panicked: !failure.is_empty(),
+        is_board_damaged: troubles.are_there(),
+        are_settings_lost: !exchange::are_settings_sound(),
+    };
+    board::bus_tasks().spawn(bus_task(can, settings, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
     board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
-    Vehicle { localization, revolutions, watchdog }
+    Vehicle { localization, revolutions, watchdog, supervisor }
 }
 
 #[inline(never)]
 fn run(vehicle: Vehicle) -> ! {
-    let Vehicle { localization, mut revolutions, mut watchdog } = vehicle;
+    let Vehicle { localization, mut revolutions, mut watchdog, mut supervisor } = vehicle;
     let mut deepest = 0;
     loop {
-        if localization.step(&mut revolutions) {
-            continue;
-        }
-        if supervision::have_all_run() {
+        let is_busy = localization.step(&mut revolutions);
+        if supervisor.is_due() {
             watchdog.feed();
             let depth = stack::deepest();
             if depth > deepest {
                 deepest = depth;
                 defmt::info!("stack: {} of {} bytes", deepest, stack::RESERVED);
             }
+        }
+        if is_busy {
+            continue;
         }
         // An interrupt that comes between looking and sleeping ends the sleep at once.
         cortex_m::interrupt::free(|_| {

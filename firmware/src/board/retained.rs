@@ -1,10 +1,13 @@
-//! What the last panic said: memory that a reset does not clear.
+//! What was said before the last restart: memory that a reset does not clear.
+//!
+//! It is not cached, as a reset throws the lines of a cache away that were not written back. It is written in whole words,
+//! with one behind them that means nothing: RAM with error correction keeps the last word that is not whole back, and a
+//! reset loses it (RM0433, 3.3.1).
 #![allow(unsafe_code, reason = "this memory is set by an earlier run of the program")]
 
 use core::cell::UnsafeCell;
-use core::fmt::{self, Write};
+use core::fmt::{self, Display, Write};
 use core::mem::MaybeUninit;
-use core::panic::PanicInfo;
 
 /// Longest message, bytes.
 const LONGEST: usize = 400;
@@ -15,7 +18,9 @@ struct Message {
     magic: u32,
     length: u32,
     checksum: u32,
-    text: [u8; LONGEST],
+    text: [u32; LONGEST / 4],
+    /// Means nothing.
+    behind: u32,
 }
 
 struct Retained(UnsafeCell<MaybeUninit<Message>>);
@@ -23,7 +28,7 @@ struct Retained(UnsafeCell<MaybeUninit<Message>>);
 // SAFETY: it is read before tasks run and written when nothing else does, or in a critical section.
 unsafe impl Sync for Retained {}
 
-#[unsafe(link_section = ".uninit.panic")]
+#[unsafe(link_section = ".retained")]
 static RETAINED: Retained = Retained(UnsafeCell::new(MaybeUninit::uninit()));
 
 fn message() -> *mut Message {
@@ -52,24 +57,37 @@ impl Write for Text<'_> {
     }
 }
 
-/// Keeps what a panic says over the reset that follows.
-pub fn keep(info: &PanicInfo) {
+/// Keeps what a panic says, or a fault is, over the reset that follows.
+pub fn keep(said: &dyn Display) {
     let mut text = [0; LONGEST];
     let mut writer = Text { text: &mut text, length: 0 };
-    let _ = write!(writer, "{info}");
+    let _ = write!(writer, "{said}");
     let length = writer.length;
     let checksum = checksum(text.get(..length).unwrap_or_default());
-    // SAFETY: after a panic nothing else runs; any bytes are a message.
-    unsafe { message().write_volatile(Message { magic: MAGIC, length: length as u32, checksum, text }) };
+    let place = message();
+    // SAFETY: after a panic or fault nothing else runs; any words are a message.
+    unsafe {
+        for (bytes, number) in text.as_chunks().0.iter().zip(0..) {
+            (&raw mut (*place).text).cast::<u32>().add(number).write_volatile(u32::from_le_bytes(*bytes));
+        }
+        (&raw mut (*place).length).write_volatile(length as u32);
+        (&raw mut (*place).checksum).write_volatile(checksum);
+        (&raw mut (*place).magic).write_volatile(MAGIC);
+        (&raw mut (*place).behind).write_volatile(0);
+    }
+    cortex_m::asm::dsb();
 }
 
-/// What the last panic said; empty if there was none. Call once, before tasks run.
+/// What was said before this start; empty if nothing was. Call once, before tasks run.
 #[must_use]
 pub fn read() -> &'static str {
     // SAFETY: any bytes are a message, and nobody writes to it but `keep`, after which nothing is read, and `forget`,
     // which leaves the text.
-    let message = unsafe { &*message() };
-    let text = message.text.get(..message.length as usize).unwrap_or_default();
+    let (message, text) = unsafe {
+        let message = &*message();
+        (message, core::slice::from_raw_parts((&raw const message.text).cast::<u8>(), LONGEST))
+    };
+    let text = text.get(..message.length as usize).unwrap_or_default();
     if message.magic == MAGIC && message.checksum == checksum(text) {
         core::str::from_utf8(text).unwrap_or_default()
     } else {
@@ -80,5 +98,8 @@ pub fn read() -> &'static str {
 /// Forgets it, from the next start on.
 pub fn forget() {
     // SAFETY: the text, which may be referred to, is not touched.
-    unsafe { (&raw mut (*message()).magic).write_volatile(0) };
+    unsafe {
+        (&raw mut (*message()).magic).write_volatile(0);
+        (&raw mut (*message()).behind).write_volatile(0);
+    }
 }

@@ -85,6 +85,12 @@ pub fn emulated_vehicle() -> anyhow::Result<PathBuf> {
     AN500.image("vehicle")
 }
 
+/// The image that is flashed to the vehicle's board, built.
+pub fn flashed_vehicle() -> anyhow::Result<PathBuf> {
+    build_board(&image::H743, &[])?;
+    image::H743.image("vehicle")
+}
+
 /// Fails if an image is larger than its budget.
 pub fn check_sizes() -> anyhow::Result<()> {
     size::print()

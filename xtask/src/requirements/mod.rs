@@ -8,6 +8,7 @@ mod python;
 use std::process::{Command, Stdio};
 
 pub use programs::prepare_emulator;
+pub use python::{interpreter as python, prepare_chip};
 
 /// Installs whatever is missing, each apart, so that one that cannot be had keeps no other from being installed. Returns
 /// what is still missing, one line each.

@@ -6,8 +6,20 @@ use std::process::Command;
 use super::{debian, install, succeeds};
 use crate::repository;
 
-/// Packages, and the modules that they bring.
-const PACKAGES: [(&str, &str); 11] = [
+/// A package, and the module that it brings.
+type Package = (&'static str, &'static str);
+
+/// What the emulated chip stands on.
+const CHIP: [Package; 2] = [
+    // The processor; under the GPL, so in a process of its own.
+    ("unicorn>=2.1.4,<2.2", "unicorn"),
+    // The file that is flashed.
+    ("pyelftools>=0.31,<1", "elftools"),
+];
+
+const PACKAGES: [Package; 13] = [
+    CHIP[0],
+    CHIP[1],
     ("numpy>=1.24,<3", "numpy"),
     ("scipy>=1.10,<2", "scipy"),
     ("shapely>=2,<3", "shapely"),
@@ -24,12 +36,29 @@ const PACKAGES: [(&str, &str); 11] = [
 /// Debian's own, for machines whose first `python3` cannot make environments.
 const DEBIAN: &str = "/usr/bin/python3";
 
+fn folder() -> PathBuf {
+    repository().join("target/python")
+}
+
+/// The Python of the environment.
+pub fn interpreter() -> PathBuf {
+    folder().join("bin/python3")
+}
+
 /// Makes the environment. Returns what is still missing, one line each.
 pub fn prepare() -> Vec<String> {
-    let folder = repository().join("target/python");
-    let python = folder.join("bin/python3");
-    let is_missing = |(_, module): &(&str, &str)| !has(&python, module);
-    let missing: Vec<&str> = PACKAGES.into_iter().filter(is_missing).map(|(package, _)| package).collect();
+    install_all(&PACKAGES)
+}
+
+/// The same for the emulated chip alone.
+pub fn prepare_chip() -> Vec<String> {
+    install_all(&CHIP)
+}
+
+fn install_all(packages: &[Package]) -> Vec<String> {
+    let (folder, python) = (folder(), interpreter());
+    let is_missing = |(_, module): &&Package| !has(&python, module);
+    let missing: Vec<&str> = packages.iter().filter(is_missing).map(|(package, _)| *package).collect();
     if missing.is_empty() {
         return Vec::new();
     }
@@ -41,7 +70,7 @@ pub fn prepare() -> Vec<String> {
     eprintln!("installing {} into {}", missing.join(" "), folder.display());
     // Installed together they agree about what they share. If one cannot be had, the others are installed all the same.
     let _ = pip(&python, &missing);
-    let still_missing = PACKAGES.into_iter().filter(is_missing);
+    let still_missing = packages.iter().filter(is_missing);
     still_missing
         .filter_map(|package @ (name, _)| {
             let why = pip(&python, &[name]).err().unwrap_or_else(|| "it cannot be imported".to_owned());

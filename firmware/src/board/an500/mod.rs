@@ -17,6 +17,7 @@ pub use lan9118::Lan9118 as Ethernet;
 pub use uart::SlcanPort as Can;
 pub use watchdog::Watchdog;
 
+use super::{RestartCause, Troubles};
 use defmt_semihosting as _;
 use embassy_executor::SendSpawner;
 use interrupts::{BUS_TASKS, Interrupt, NETWORK_TASKS};
@@ -29,19 +30,43 @@ pub struct Board {
     pub ethernet: Ethernet,
     /// Where settings are kept.
     pub flash: Flash,
-    /// The watchdog, not started.
+    /// The watchdog, which runs.
     pub watchdog: Watchdog,
+    /// Why the program has started.
+    pub restart_cause: RestartCause,
+    /// What does not work.
+    pub troubles: Troubles,
 }
+
+/// Where the stack begins.
+pub const STACK_TOP: u32 = 0x2040_0000;
+/// Bytes at its end that nobody may touch.
+pub const STACK_GUARD: usize = 0;
 
 /// Starts everything but the tasks.
 #[must_use]
 pub fn start(mut core: cortex_m::Peripherals) -> Board {
+    let mut watchdog = Watchdog::new();
+    watchdog.unleash();
     time_driver::start();
     uart::start();
     // Before its interrupt is let through, which it holds active until it is set up.
     let ethernet = Ethernet::start([2, 0, 0, 0, 0, 1]);
     interrupts::enable(&mut core.NVIC);
-    Board { can: uart::SlcanPort, ethernet, flash: Flash::open(), watchdog: Watchdog::new() }
+    Board {
+        can: uart::SlcanPort,
+        ethernet,
+        flash: Flash::open(),
+        watchdog,
+        restart_cause: RestartCause::Other,
+        troubles: Troubles::NONE,
+    }
+}
+
+/// The same in every run, so that runs can be repeated.
+#[must_use]
+pub const fn seed() -> u64 {
+    0x5eed
 }
 
 /// Starts the tasks of the bus. Call once.

@@ -1,64 +1,191 @@
 //! FDCAN1 at 500 kbit/s, with queues behind those of the controller, which hold three frames.
 //!
 //! What is known of the released driver and kept away from here: its compensation of the transceiver's delay (needed only
-//! with bit rate switching, which is off), its range filters (none is set: everything is heard), and its receive time,
-//! which it computes from the controller's counter in the mode for classic frames alone, and can then lie before the start.
-//! In the mode that takes other frames, too, it states the time of the interrupt.
+//! with bit rate switching, which is off), and its receive time, which it computes from the controller's counter in the mode
+//! for classic frames alone, and can then lie before the start. In the mode that takes other frames, too, it states the time
+//! of the interrupt. It leaves bus-off at once, and it goes on to send what has waited for as long as nobody has listened.
+
+use core::num::{NonZeroU8, NonZeroU16};
 
 use agv_core::measurement::Time;
+use agv_wire::can::canopen::NodeId;
 use agv_wire::can::frame::Frame;
 use embassy_stm32::Peri;
-use embassy_stm32::can::config::FrameTransmissionConfig;
-use embassy_stm32::can::{BufferedCan, BufferedCanSender, CanConfigurator, RxBuf, RxPin, TxBuf, TxPin};
+use embassy_stm32::can::config::{FrameTransmissionConfig, GlobalFilter, NominalBitTiming, NonMatchingFilter};
+use embassy_stm32::can::filter::{Action, FilterType, StandardFilter, StandardFilterSlot};
+use embassy_stm32::can::{BufferedCan, BufferedCanSender, CanConfigurator, OperatingMode, RxBuf, RxPin, TxBuf, TxPin};
+use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_stm32::pac::FDCAN1 as REGISTERS;
 use embassy_stm32::peripherals::FDCAN1;
 use portable_atomic::{AtomicU32, Ordering};
 use static_cell::ConstStaticCell;
 
 use super::Interrupts;
-use crate::app::can_port::CanPort;
+use crate::app::can_port::{BusChange, CanPort};
 
 /// Frames that wait to be sent.
 const SENT: usize = 32;
-/// Frames that wait for the bus task: 10 ms of a full bus.
-const RECEIVED: usize = 48;
+/// Frames that wait for the bus task: 10 ms of a bus that is full of what is meant for the controller.
+const RECEIVED: usize = 40;
+/// Buffers of the controller.
+const BUFFERS: u32 = 0b111;
 
-const BIT_RATE: u32 = 500_000;
+/// 500 kbit/s from 80 MHz: sixteen quanta, of which the first, thirteen, and two; the sample point is at 87.5 %.
+const PRESCALER: u16 = 10;
+const SEGMENTS: (u8, u8) = (13, 2);
+/// Quanta by which a bit may be made longer or shorter.
+const JUMP: u8 = 2;
+
+/// While nobody acknowledges, a frame waits for so long at most, us.
+const STALE: u64 = 20_000;
+/// How long the controller stays away from a bus whose errors have driven it off: this at first, us, twice as long each
+/// time, and that at most.
+const BACK_OFF: (u64, u64) = (100_000, 3_200_000);
+/// The time away is the first one again when there were no errors for so long, us.
+const FORGOTTEN: u64 = 10_000_000;
 
 static SENT_FRAMES: ConstStaticCell<TxBuf<SENT>> = ConstStaticCell::new(TxBuf::new());
 static RECEIVED_FRAMES: ConstStaticCell<RxBuf<RECEIVED>> = ConstStaticCell::new(RxBuf::new());
 static LOST: AtomicU32 = AtomicU32::new(0);
+
+/// By how much the clocks of two nodes may be off, millionths, each: the smaller one of what resynchronisation makes good
+/// within ten bits, and of what is left at the end of an error frame (ISO 11898-1, 11.3.1.2).
+const fn tolerance() -> u32 {
+    let bit = 1 + SEGMENTS.0 as u32 + SEGMENTS.1 as u32;
+    let resynchronised = 1_000_000 * JUMP as u32 / (20 * bit);
+    let smaller = if SEGMENTS.0 < SEGMENTS.1 { SEGMENTS.0 } else { SEGMENTS.1 };
+    let after_error = 1_000_000 * smaller as u32 / (2 * (13 * bit - SEGMENTS.1 as u32));
+    if resynchronised < after_error { resynchronised } else { after_error }
+}
 
 /// The same frame of another library.
 fn same<From: embedded_can::Frame, To: embedded_can::Frame>(frame: &From) -> Option<To> {
     if frame.is_remote_frame() { To::new_remote(frame.id(), frame.dlc()) } else { To::new(frame.id(), frame.data()) }
 }
 
+/// Whether the controller takes part.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Presence {
+    There,
+    /// It stays away until then, us.
+    Away(u64),
+    /// It waits for the bus to be quiet for 128 times eleven bits.
+    Returning,
+}
+
 /// The bus.
 pub struct FdCanPort {
     bus: BufferedCan<'static, SENT, RECEIVED>,
     sender: BufferedCanSender,
+    listens_only: bool,
+    /// Since when something waits that nobody acknowledges, us.
+    unheard_since: Option<u64>,
+    presence: Presence,
+    back_off: u64,
+    last_off: u64,
 }
 
 impl FdCanPort {
-    /// Takes part in the bus. Call once.
+    /// Takes part in the bus, or only listens if a clock that is off by `clock_tolerance` millionths would disturb it. Call
+    /// once.
     #[must_use]
     pub fn start(
         instance: Peri<'static, FDCAN1>,
         receive: Peri<'static, impl RxPin<FDCAN1>>,
         transmit: Peri<'static, impl TxPin<FDCAN1>>,
         interrupts: Interrupts,
+        clock_tolerance: u32,
     ) -> Self {
         let mut configurator = CanConfigurator::new(instance, receive, transmit, interrupts);
-        configurator.set_bitrate(BIT_RATE);
-        let config = configurator.config().set_frame_transmit(FrameTransmissionConfig::AllowFdCan);
+        let timing = NominalBitTiming {
+            prescaler: NonZeroU16::new(PRESCALER).unwrap_or(NonZeroU16::MIN),
+            seg1: NonZeroU8::new(SEGMENTS.0).unwrap_or(NonZeroU8::MIN),
+            seg2: NonZeroU8::new(SEGMENTS.1).unwrap_or(NonZeroU8::MIN),
+            sync_jump_width: NonZeroU8::new(JUMP).unwrap_or(NonZeroU8::MIN),
+        };
+        // Frames that no filter takes are those of nobody that this controller listens to.
+        let filter = GlobalFilter::default()
+            .set_handle_standard_frames(NonMatchingFilter::Reject)
+            .set_handle_extended_frames(NonMatchingFilter::Reject);
+        let config = configurator
+            .config()
+            .set_frame_transmit(FrameTransmissionConfig::AllowFdCan)
+            .set_nominal_bit_timing(timing)
+            .set_global_filter(filter)
+            .set_automatic_bus_off_recovery(false);
         configurator.set_config(config);
-        let bus = configurator.into_normal_mode().buffered(SENT_FRAMES.take(), RECEIVED_FRAMES.take());
+        let listens_only = clock_tolerance > tolerance();
+        let mode = if listens_only { OperatingMode::BusMonitoringMode } else { OperatingMode::NormalOperationMode };
+        let bus = configurator.start(mode).buffered(SENT_FRAMES.take(), RECEIVED_FRAMES.take());
         let sender = bus.writer();
-        Self { bus, sender }
+        Self {
+            bus,
+            sender,
+            listens_only,
+            unheard_since: None,
+            presence: Presence::There,
+            back_off: BACK_OFF.0,
+            last_off: 0,
+        }
+    }
+
+    /// Throws away what waits to be sent: it is too old for whoever comes back.
+    fn forget_waiting(&self) {
+        // The driver moves one frame on from its queue each time that its interrupt comes.
+        for _ in 0..=SENT {
+            let waiting = REGISTERS.txbrp().read().0 & BUFFERS;
+            REGISTERS.txbcr().write(|cancelled| cancelled.0 = waiting);
+            LOST.fetch_add(waiting.count_ones(), Ordering::Relaxed);
+            interrupt::FDCAN1_IT0.pend();
+            cortex_m::asm::isb();
+        }
+        let waiting = REGISTERS.txbrp().read().0 & BUFFERS;
+        REGISTERS.txbcr().write(|cancelled| cancelled.0 = waiting);
+    }
+
+    /// Goes away from a bus whose errors have driven the controller off, and comes back.
+    fn follow_bus_off(&mut self, now: u64) -> Option<BusChange> {
+        let is_off = REGISTERS.cccr().read().init();
+        match self.presence {
+            Presence::There if is_off => {
+                let is_forgotten = now.saturating_sub(self.last_off) > FORGOTTEN;
+                self.back_off = if is_forgotten { BACK_OFF.0 } else { (2 * self.back_off).min(BACK_OFF.1) };
+                self.last_off = now;
+                self.presence = Presence::Away(now + self.back_off);
+                self.forget_waiting();
+                Some(BusChange::Off)
+            }
+            Presence::Away(until) if now >= until => {
+                REGISTERS.cccr().modify(|control| control.set_init(false));
+                self.presence = Presence::Returning;
+                None
+            }
+            Presence::Returning if !REGISTERS.psr().read().bo() => {
+                self.presence = Presence::There;
+                Some(BusChange::BackFromOff)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether nobody acknowledges (ISO 11898-1: error passive).
+    fn is_unheard() -> bool {
+        REGISTERS.psr().read().ep()
     }
 }
 
 impl CanPort for FdCanPort {
+    fn listen_to(&mut self, nodes: &[NodeId]) {
+        // Commands to all nodes and the SYNC, which have number 0, and everything from or for the others.
+        let numbers = core::iter::once(0).chain(nodes.iter().map(|node| u16::from(node.number())));
+        let slots = [StandardFilterSlot::_0, StandardFilterSlot::_1, StandardFilterSlot::_2, StandardFilterSlot::_3];
+        for (number, slot) in numbers.zip(slots) {
+            let filter = FilterType::BitMask { filter: number, mask: 0x7F };
+            let filter = StandardFilter { filter, action: Action::StoreInFifo0 };
+            self.bus.properties().set_standard_filter(slot, filter);
+        }
+    }
+
     async fn receive(&mut self) -> (Frame, Time) {
         loop {
             // Errors of the bus end by themselves; what they cost is missed by those who wait for it.
@@ -74,11 +201,34 @@ impl CanPort for FdCanPort {
     }
 
     fn send(&mut self, frame: &Frame) -> bool {
-        let is_sent = same(frame).is_some_and(|frame| self.sender.try_write(frame).is_ok());
+        let may_send = !self.listens_only && self.presence == Presence::There;
+        // While nobody listens, one frame at a time tries whether somebody does.
+        let may_send = may_send && (!Self::is_unheard() || REGISTERS.txbrp().read().0 & BUFFERS == 0);
+        let is_sent = may_send && same(frame).is_some_and(|frame| self.sender.try_write(frame).is_ok());
         if !is_sent {
             LOST.fetch_add(1, Ordering::Relaxed);
         }
         is_sent
+    }
+
+    fn supervise(&mut self, now: Time) -> Option<BusChange> {
+        let now = now.micros();
+        if REGISTERS.ir().read().rfl(0) {
+            // Frames came while the controller's queue was full; how many, it does not say.
+            REGISTERS.ir().write(|flags| flags.set_rfl(0, true));
+            LOST.fetch_add(1, Ordering::Relaxed);
+            return Some(BusChange::Overrun);
+        }
+        if Self::is_unheard() && REGISTERS.txbrp().read().0 & BUFFERS != 0 {
+            let since = *self.unheard_since.get_or_insert(now);
+            if now.saturating_sub(since) >= STALE {
+                self.unheard_since = None;
+                self.forget_waiting();
+            }
+        } else {
+            self.unheard_since = None;
+        }
+        self.follow_bus_off(now)
     }
 
     fn lost(&self) -> u32 {

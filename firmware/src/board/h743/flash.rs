@@ -1,42 +1,176 @@
-//! The settings' flash: the last two pages of the second bank. The program is in the first one, and goes on while this one
-//! is written or erased.
-#![allow(unsafe_code, reason = "the linker says where the pages are")]
+//! The settings' flash: the last two pages of the second bank (RM0433, chapter 4). The program is in the first one, and
+//! goes on while this one is written or erased.
+//!
+//! A loss of power while a word is programmed or a page erased leaves words with a double error, and reading one is a bus
+//! fault. So words are read while such faults are ignored, and a word with a double error reads as zeros, which no checksum
+//! of an item takes. A page of which most is so is one whose erasure was cut short: it is erased again at the start.
+#![allow(unsafe_code, reason = "flash is memory at addresses that the linker says, and its faults are the processor's")]
+
+use core::arch::asm;
 
 use embassy_stm32::Peri;
-use embassy_stm32::flash::{Blocking, Error, Flash, MAX_ERASE_SIZE, WRITE_SIZE};
+use embassy_stm32::pac::FLASH as REGISTERS;
+use embassy_stm32::pac::flash::Bank;
 use embassy_stm32::peripherals::FLASH;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+};
 
 unsafe extern "C" {
     static _settings_start: u8;
     static _settings_length: u8;
 }
 
-/// Offset of the first page in flash.
-fn start() -> u32 {
-    (&raw const _settings_start) as u32
+/// Where the first bank begins, bytes.
+const FLASH_START: usize = 0x0800_0000;
+/// Offset of the second bank, bytes.
+const BANK: usize = 0x10_0000;
+/// Bytes of a page.
+const PAGE: usize = 128 * 1024;
+/// Bytes of a word, which is programmed at once and once only.
+const WORD: usize = 32;
+/// 64 bits at once: the shortest times, at 1.8 V or more.
+const PARALLELISM: u8 = 3;
+/// What unlocks the control register (RM0433, 4.5.2).
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// CCR of the processor: data bus faults are ignored while FAULTMASK is set (ARMv7-M ARM, B3.2.8).
+const CCR: *mut u32 = 0xE000_ED14 as *mut u32;
+const BFHFNMIGN: u32 = 1 << 8;
+/// CFSR of the processor, whose flags are cleared by ones.
+const CFSR: *mut u32 = 0xE000_ED28 as *mut u32;
+const BUS_FAULTS: u32 = 0xFF00;
+
+/// It was not done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlashError {
+    /// The flash reports an error, or holds something else than what was written.
+    Refused,
+    /// Outside of the pages, or not in whole words.
+    Place(NorFlashErrorKind),
 }
 
-/// The pages.
-pub struct SettingsFlash(Flash<'static, Blocking>);
-
-impl SettingsFlash {
-    /// The pages of the chip's flash.
-    #[must_use]
-    pub fn new(flash: Peri<'static, FLASH>) -> Self {
-        Self(Flash::new_blocking(flash))
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Refused => NorFlashErrorKind::Other,
+            Self::Place(kind) => *kind,
+        }
     }
 }
 
+type FlashWord = [u32; WORD / 4];
+
+/// The pages.
+pub struct SettingsFlash(Peri<'static, FLASH>);
+
+impl SettingsFlash {
+    /// The pages of the chip's flash; those whose erasure was cut short are erased.
+    #[must_use]
+    pub fn open(flash: Peri<'static, FLASH>) -> Self {
+        let mut pages = Self(flash);
+        for page in 0..pages.capacity() / PAGE {
+            let (mut torn, mut written) = (0_usize, 0_usize);
+            for offset in (page * PAGE..(page + 1) * PAGE).step_by(WORD) {
+                match read_word(offset) {
+                    None => torn += 1,
+                    Some(word) => written += usize::from(word != [u32::MAX; WORD / 4]),
+                }
+            }
+            if torn > written {
+                let _ = pages.erase((page * PAGE) as u32, ((page + 1) * PAGE) as u32);
+            }
+        }
+        pages
+    }
+}
+
+/// The address of an offset in the pages.
+fn address(offset: usize) -> usize {
+    FLASH_START + (&raw const _settings_start) as usize + offset
+}
+
+fn bank() -> Bank {
+    REGISTERS.bank(1)
+}
+
+/// Reads the word at an offset. None if it has a double error.
+fn read_word(offset: usize) -> Option<FlashWord> {
+    let place = address(offset) as *const u32;
+    let mut word = [0; WORD / 4];
+    // SAFETY: the address is a whole word within the pages. Nothing else runs while faults are masked, which lasts for
+    // eight loads; a fault that is ignored leaves a mark that is cleared behind.
+    let has_error = unsafe {
+        asm!("cpsid f", options(nostack));
+        CCR.write_volatile(CCR.read_volatile() | BFHFNMIGN);
+        asm!("dsb", "isb", options(nostack));
+        for (part, number) in word.iter_mut().zip(0..) {
+            *part = place.add(number).read_volatile();
+        }
+        asm!("dsb", "isb", options(nostack));
+        let has_error = bank().sr().read().dbeccerr();
+        if has_error {
+            clear_errors();
+            CFSR.write_volatile(BUS_FAULTS);
+        }
+        CCR.write_volatile(CCR.read_volatile() & !BFHFNMIGN);
+        asm!("dsb", "isb", "cpsie f", options(nostack));
+        has_error
+    };
+    (!has_error).then_some(word)
+}
+
+/// Errors stay until they are cleared, in a register of their own, and keep everything else from being done.
+fn clear_errors() {
+    // Every flag that the status has.
+    bank().ccr().write(|flags| flags.0 = 0x1FEF_0000);
+}
+
+/// Does something with the bank unlocked.
+fn unlocked(work: impl FnOnce(Bank)) -> Result<(), FlashError> {
+    let bank = bank();
+    if bank.cr().read().lock() {
+        for key in KEYS {
+            bank.keyr().write_value(key);
+        }
+    }
+    clear_errors();
+    work(bank);
+    cortex_m::asm::dsb();
+    // The watchdog knows how long this may take.
+    while bank.sr().read().bsy() || bank.sr().read().qw() {}
+    let status = bank.sr().read();
+    let has_failed =
+        status.wrperr() || status.pgserr() || status.strberr() || status.incerr() || status.operr() || status.wbne();
+    clear_errors();
+    bank.cr().write(|control| {
+        control.set_psize(PARALLELISM);
+        control.set_lock(true);
+    });
+    if has_failed { Err(FlashError::Refused) } else { Ok(()) }
+}
+
 impl ErrorType for SettingsFlash {
-    type Error = Error;
+    type Error = FlashError;
 }
 
 impl ReadNorFlash for SettingsFlash {
     const READ_SIZE: usize = 1;
 
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
-        self.0.blocking_read(start() + offset, bytes)
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        check_read(self, offset, bytes.len()).map_err(FlashError::Place)?;
+        let mut offset = offset as usize;
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let skipped = offset % WORD;
+            let word = read_word(offset - skipped).unwrap_or_default();
+            let count = rest.len().min(WORD - skipped);
+            let (now, later) = rest.split_at_mut(count);
+            let read = word.iter().flat_map(|part| part.to_le_bytes()).skip(skipped);
+            now.iter_mut().zip(read).for_each(|(byte, read)| *byte = read);
+            rest = later;
+            offset += count;
+        }
+        Ok(())
     }
 
     fn capacity(&self) -> usize {
@@ -45,14 +179,47 @@ impl ReadNorFlash for SettingsFlash {
 }
 
 impl NorFlash for SettingsFlash {
-    const WRITE_SIZE: usize = WRITE_SIZE;
-    const ERASE_SIZE: usize = MAX_ERASE_SIZE;
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = PAGE;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
-        self.0.blocking_erase(start() + from, start() + to)
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        check_erase(self, from, to).map_err(FlashError::Place)?;
+        for offset in (from as usize..to as usize).step_by(PAGE) {
+            let page = (address(offset) - FLASH_START - BANK) / PAGE;
+            unlocked(|bank| {
+                bank.cr().write(|control| {
+                    control.set_psize(PARALLELISM);
+                    control.set_ser(true);
+                    control.set_snb(page as u8);
+                });
+                bank.cr().modify(|control| control.set_start(true));
+            })?;
+        }
+        Ok(())
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
-        self.0.blocking_write(start() + offset, bytes)
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        check_write(self, offset, bytes.len()).map_err(FlashError::Place)?;
+        for (offset, bytes) in (offset as usize..).step_by(WORD).zip(bytes.chunks_exact(WORD)) {
+            let mut word: FlashWord = [0; WORD / 4];
+            for (part, bytes) in word.iter_mut().zip(bytes.as_chunks().0) {
+                *part = u32::from_le_bytes(*bytes);
+            }
+            unlocked(|bank| {
+                bank.cr().write(|control| {
+                    control.set_psize(PARALLELISM);
+                    control.set_pg(true);
+                });
+                cortex_m::asm::dsb();
+                for (part, number) in word.iter().zip(0..) {
+                    // SAFETY: the address is within a whole word of the pages, which are flash, unlocked to be programmed.
+                    unsafe { (address(offset) as *mut u32).add(number).write_volatile(*part) };
+                }
+            })?;
+            if read_word(offset) != Some(word) {
+                return Err(FlashError::Refused);
+            }
+        }
+        Ok(())
     }
 }

@@ -21,7 +21,8 @@ pub struct Bus {
 impl Bus {
     pub fn new() -> Self {
         let settings: Settings = any(Settings::default());
-        let troubles = Troubles { has_panicked: any(false), are_settings_lost: any(false) };
+        let troubles =
+            Troubles { is_board_damaged: any(false), has_panicked: any(false), are_settings_lost: any(false) };
         Self { bus: ControllerBus::new(&settings, troubles, any(Time::default())), slcan: slcan::Decoder::new() }
     }
 
@@ -47,6 +48,7 @@ impl Bus {
             black_box(output);
         });
         black_box(self.bus.is_standing(time));
+        black_box((self.bus.nodes(), self.bus.emergency(any(0))));
         if let Some(pose) = self.bus.output() {
             let (bias, relocalization) = (any(OdometryBias::default()), any(Relocalization::Idle));
             self.bus.update(&Estimate { pose: any(pose), bias, relocalization });

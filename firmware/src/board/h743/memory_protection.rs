@@ -1,0 +1,54 @@
+//! What memory is for: not cached where others read and write, no code in the settings, nothing below the stack (PM0253, 4.6
+//! "Memory protection unit").
+#![allow(unsafe_code, reason = "memory attributes have no safe interface")]
+
+use cortex_m::peripheral::MPU;
+
+use crate::board::stack;
+
+const ENABLE: u32 = 1;
+const ENABLE_WITH_DEFAULT_MAP: u32 = 0b101;
+const NEVER_RUN: u32 = 1 << 28;
+const FULL_ACCESS: u32 = 0b011 << 24;
+const NO_ACCESS: u32 = 0;
+/// Normal memory, shareable and not cached (TEX 001, C 0, B 0, S 1).
+const NOT_CACHED: u32 = 0b001 << 19 | 1 << 18;
+/// Device memory, shareable (TEX 000, C 0, B 1): every access is made, once, in its order.
+const DEVICE: u32 = 1 << 16;
+
+/// A part of memory.
+struct Region {
+    base: u32,
+    /// Bytes: a power of two, of which the base is a multiple.
+    size: u32,
+    attributes: u32,
+}
+
+fn regions() -> [Region; 4] {
+    [
+        // SRAM1 of domain D2, where the Ethernet's DMA reads and writes.
+        Region { base: 0x3000_0000, size: 128 * 1024, attributes: NEVER_RUN | FULL_ACCESS | NOT_CACHED },
+        // SRAM4 of domain D3: what is kept over a reset, which throws lines of the cache away.
+        Region { base: 0x3800_0000, size: 64 * 1024, attributes: NEVER_RUN | FULL_ACCESS | NOT_CACHED },
+        // The settings' flash: after it was written, the cache would go on to give what was there before.
+        Region { base: 0x081C_0000, size: 256 * 1024, attributes: NEVER_RUN | FULL_ACCESS | DEVICE },
+        Region { base: stack::bottom() as u32, size: stack::GUARD as u32, attributes: NEVER_RUN | NO_ACCESS },
+    ]
+}
+
+/// Sets all of it up. Before the caches are on.
+pub fn enable(mpu: &mut MPU) {
+    // SAFETY: nothing refers to these parts of memory yet: neither the Ethernet nor the settings have started, and the
+    // stack has not come to its end.
+    unsafe {
+        mpu.ctrl.write(0);
+        for (region, number) in regions().iter().zip(0..) {
+            mpu.rnr.write(number);
+            mpu.rbar.write(region.base);
+            mpu.rasr.write(region.attributes | (region.size.trailing_zeros() - 1) << 1 | ENABLE);
+        }
+        mpu.ctrl.write(ENABLE_WITH_DEFAULT_MAP);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}

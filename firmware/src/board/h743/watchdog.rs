@@ -1,0 +1,36 @@
+//! The independent watchdog (RM0433, chapter 49), on an oscillator of its own of 32 kHz that is off by up to 8 per cent.
+
+use embassy_stm32::pac::IWDG1;
+use embassy_stm32::pac::iwdg::vals::{Key, Pr};
+
+use crate::board::WATCHDOG_PERIOD;
+
+/// Nominal frequency of the oscillator, Hz.
+const OSCILLATOR: u32 = 32_000;
+const DIVISOR: u32 = 64;
+const RELOAD: u32 = WATCHDOG_PERIOD / 1000 * (OSCILLATOR / 1000) / DIVISOR - 1;
+const _: () = assert!(RELOAD < 1 << 12, "the counter has twelve bits");
+
+/// The watchdog, which runs.
+pub struct Watchdog(());
+
+impl Watchdog {
+    /// Starts it: from now on it must be fed. The first thing that the program does.
+    #[must_use]
+    pub fn unleash() -> Self {
+        IWDG1.kr().write(|key| key.set_key(Key::START));
+        IWDG1.kr().write(|key| key.set_key(Key::ENABLE));
+        IWDG1.pr().write(|prescaler| prescaler.set_pr(Pr::DIVIDE_BY64));
+        IWDG1.rlr().write(|reload| reload.set_rl(RELOAD as u16));
+        // Both arrive after some periods of the oscillator; what starts the counter again before would start the old one.
+        while IWDG1.sr().read().pvu() || IWDG1.sr().read().rvu() {}
+        let mut watchdog = Self(());
+        watchdog.feed();
+        watchdog
+    }
+
+    /// Feeds it.
+    pub fn feed(&mut self) {
+        IWDG1.kr().write(|key| key.set_key(Key::RESET));
+    }
+}

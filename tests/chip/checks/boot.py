@@ -1,0 +1,92 @@
+"""From reset to the loop."""
+
+from bench import check_sound, describe
+from emulated_chip.clock import MILLISECOND
+from emulated_chip.system_control import DATA_CACHE_ON, INSTRUCTION_CACHE_ON, CCR
+
+# The whole start with an empty flash: memory at 64 MHz, oscillators, PHY.
+LONGEST_START = 200 * MILLISECOND
+
+
+def boot(bench, **options):
+    chip = bench.chip(**options)
+    chip.run_for(LONGEST_START, stop=lambda: chip.sleeps > 0)
+    return chip
+
+
+def boots(bench):
+    """The image comes to its loop, which sleeps, without a fault and without touching what has no clock."""
+    chip = boot(bench)
+    assert chip.sleeps > 0, describe(chip)
+    check_sound(chip)
+    bench.note("start_ms", chip.clock.now() / MILLISECOND)
+
+
+def has_the_clocks_of_the_manual(bench):
+    """Registers after the start, each against what the manual asks for."""
+    chip = boot(bench)
+    chip.run_for(100 * MILLISECOND)
+    assert not chip.findings, describe(chip)
+    rcc, fdcan, flash = (chip.peripherals[name] for name in ("RCC", "FDCAN1", "FLASH"))
+    timing = {name: fdcan.get("NBTP", name) + 1 for name in ("NBRP", "NTSEG1", "NTSEG2", "NSJW")}
+    quanta = 1 + timing["NTSEG1"] + timing["NTSEG2"]
+    gpio = lambda pin: chip.peripherals[f"GPIO{pin[1]}"].alternate_function(int(pin[2:]))
+    interrupts = chip.description.interrupts
+    priority = lambda name: chip.system.priority(interrupts[name] + 16)
+    expected = [
+        # DS12110, "General operating conditions": 480 MHz, with the buses at half and a quarter of it, at scale 0.
+        ("processor clock", rcc.processor_clock(), 480_000_000),
+        ("bus clock", rcc.bus_clock(), 240_000_000),
+        ("peripheral clock", rcc.peripheral_clock("D2CFGR", "D2PPRE1"), 120_000_000),
+        ("voltage scale", chip.peripherals["PWR"].scale(), 0),
+        # Table 17 in 4.3.8: wait states at scale 0 from 225 to 240 MHz.
+        ("flash wait states", flash.get("ACR", "LATENCY"), 4),
+        ("flash signal delay", flash.get("ACR", "WRHIGHFREQ"), 2),
+        # CiA 301, table 1: 500 kbit/s, sample point 87.5 %.
+        ("bit rate", fdcan.bit_rate(), 500_000),
+        ("sample point", (1 + timing["NTSEG1"]) / quanta, 0.875),
+        # As wide as the second segment allows, for the widest tolerance of oscillators (ISO 11898-1, 11.3.1.1).
+        ("synchronisation jump", timing["NSJW"], timing["NTSEG2"]),
+        # UM2407, table of the Ethernet pins; DS12110, table of alternate functions.
+        *((f"Ethernet on {pin}", gpio(pin), 11) for pin in "PA1 PA2 PA7 PC1 PC4 PC5 PB13 PG11 PG13".split()),
+        *((f"CAN on {pin}", gpio(pin), 9) for pin in ("PD0", "PD1")),
+        ("data cache", bool(chip.system.words[CCR] & DATA_CACHE_ON), True),
+        ("instruction cache", bool(chip.system.words[CCR] & INSTRUCTION_CACHE_ON), True),
+        # The DMA of the Ethernet goes past the cache (58.10); settings are read as they are.
+        ("RAM of the Ethernet is cached", chip.system.is_cached(0x3000_0000), False),
+        ("settings are cached", chip.system.is_cached(0x081C_0000), False),
+    ]
+    wrong = [f"{name} is {found}, not {wanted}" for name, found, wanted in expected if found != wanted]
+    order = ["FDCAN1_IT0", "TIM2", "UART7", "ETH", "UART8"]
+    priorities = [priority(name) for name in order]
+    if priorities != sorted(set(priorities)):
+        wrong.append(f"priorities of {order} are {priorities}")
+    assert not wrong, "; ".join(wrong)
+    bench.note("registers", len(expected))
+
+
+def every_clock_is_needed(bench):
+    """Each clock bit that the image sets is missed when the chip ignores it: nothing is switched on for nothing, and
+    nothing would go unnoticed if it were left out."""
+    chip = boot(bench)
+    chip.run_for(200 * MILLISECOND)
+    assert not chip.findings, describe(chip)
+    bits = chip.peripherals["RCC"].enabled()
+    unnoticed = []
+    for bit in bits:
+        mutant = bench.chip()
+        mutant.peripherals["RCC"].ignored = {bit}
+        mutant.run_for(400 * MILLISECOND)
+        if is_well(mutant):
+            unnoticed.append(".".join(bit))
+    bench.note("clock_bits", len(bits))
+    assert bits and not unnoticed, f"nobody misses {', '.join(unnoticed)}"
+
+
+def is_well(chip):
+    """The loop was reached, the bus is alive, and the Ethernet's DMA has started."""
+    has_network = chip.peripherals["ETH"].get("ETHERNET_DMA.DMACRX_CR", "SR")
+    return chip.sleeps > 0 and not chip.findings and not chip.exceptions.taken and chip.listener.heard and has_network
+
+
+CHECKS = [boots, has_the_clocks_of_the_manual, every_clock_is_needed]

@@ -1,0 +1,111 @@
+"""The bus when it is not as it should be."""
+
+from bench import check_sound, describe, emergencies, longest_gap, poses
+from emulated_chip.can_bus import CanFrame
+from emulated_chip.clock import MILLISECOND, SECOND
+
+# Oldest pose that may be sent when the bus is back.
+OLDEST = 30 * MILLISECOND
+BACK_FROM_OFF = 0x8140
+COUNTS = 16
+PERIOD = 10 * MILLISECOND
+
+
+def counts(chip, since=0):
+    """The counter of each pose, of four bits, with the time at which it was heard."""
+    return [(time, frame.data[7] >> 4) for time, frame in chip.listener.of(0x190, since)]
+
+
+def age(first, later):
+    """By how much a pose is older than it should be, ns, from another one: up to half of what the counter counts."""
+    periods = round((later[0] - first[0]) / PERIOD) - (later[1] - first[1])
+    return (periods % COUNTS if periods % COUNTS <= COUNTS // 2 else 0) * PERIOD
+
+
+def sends_nothing_stale(bench):
+    """Unplugged for five seconds and plugged in again: what is sent is of now."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    first = counts(chip)[-1]
+    fdcan = chip.peripherals["FDCAN1"]
+    fdcan.is_plugged = False
+    chip.run_for(5 * SECOND)
+    fdcan.is_plugged = True
+    chip.can_bus.changed()
+    begin = chip.clock.now()
+    chip.run_for(500 * MILLISECOND)
+    check_sound(chip)
+    sent = counts(chip, begin)
+    assert sent, "the bus stays silent"
+    oldest = max(age(first, later) for later in sent)
+    bench.note("oldest_pose_ms", oldest // MILLISECOND)
+    assert oldest <= OLDEST, f"a pose of {oldest // MILLISECOND} ms ago is sent"
+    burst = [time for time, _ in chip.listener.heard if begin <= time < begin + PERIOD]
+    bench.note("frames_in_the_first_10_ms", len(burst))
+    # One that has tried, those of one pose, a heartbeat.
+    assert len(burst) <= 6, f"{len(burst)} frames come at once"
+    gap = longest_gap(poses(chip, begin), begin, chip.clock.now())
+    assert gap <= 40 * MILLISECOND, f"no pose for {gap / 1e6:.1f} ms"
+
+
+def comes_back_from_bus_off(bench):
+    """A short circuit for two seconds: the controller goes off, waits longer each time, comes back and says so."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    fdcan = chip.peripherals["FDCAN1"]
+    offs = []
+    go_off = fdcan._go_off
+    fdcan._go_off = lambda: (offs.append(chip.clock.now()), go_off())
+    chip.can_bus.is_shorted = True
+    chip.run_for(2 * SECOND)
+    chip.can_bus.is_shorted = False
+    chip.can_bus.changed()
+    begin = chip.clock.now()
+    chip.run_for(4 * SECOND)
+    check_sound(chip)
+    assert poses(chip, begin), "the bus stays silent"
+    assert BACK_FROM_OFF in emergencies(chip, begin), f"emergencies: {emergencies(chip, begin)}"
+    waits = [later - earlier for earlier, later in zip(offs, offs[1:])]
+    bench.note("offs", len(offs))
+    assert 1 <= len(offs) <= 6 and waits == sorted(waits), f"it has gone off {len(offs)} times in two seconds"
+
+
+def hears_only_what_is_meant_for_it(bench):
+    """A bus that others fill: their frames do not come to the processor."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    fdcan = chip.peripherals["FDCAN1"]
+    refused = fdcan.refused
+    others = [0x100 + number for number in (5, 0x33, 0x45)] * 100
+    for identifier in others:
+        chip.can_bus.send(chip.listener, CanFrame(identifier, b"12345678"))
+    chip.run_for(400 * MILLISECOND)
+    check_sound(chip)
+    bench.note("refused", fdcan.refused - refused)
+    assert fdcan.refused - refused == len(others), f"{len(others) - fdcan.refused + refused} frames came through"
+    # A request for the controller itself does: its device type, object 1000h (CiA 301, 7.5.2.1).
+    chip.can_bus.send(chip.listener, CanFrame(0x610, bytes([0x40, 0x00, 0x10, 0, 0, 0, 0, 0])))
+    begin = chip.clock.now()
+    chip.run_for(50 * MILLISECOND)
+    assert chip.listener.of(0x590, begin), "no answer to a request"
+
+
+def tells_of_an_overrun(bench):
+    """More than the controller's queue holds comes while the processor takes nothing: the bus is told that frames were lost."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    interrupts = [chip.description.interrupts["FDCAN1_IT0"] + 16]
+    chip.exceptions.blocked = set(interrupts)
+    for _ in range(8):
+        chip.can_bus.send(chip.listener, CanFrame(0x080))
+    begin = chip.clock.now()
+    chip.run_for(5 * MILLISECOND)
+    assert chip.peripherals["FDCAN1"].lost > 0, "nothing was lost"
+    chip.exceptions.blocked = set()
+    chip.exceptions.take()
+    chip.run_for(200 * MILLISECOND)
+    check_sound(chip)
+    assert 0x8110 in emergencies(chip, begin), f"emergencies: {emergencies(chip, begin)}"
+
+
+CHECKS = [sends_nothing_stale, comes_back_from_bus_off, hears_only_what_is_meant_for_it, tells_of_an_overrun]

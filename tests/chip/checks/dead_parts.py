@@ -1,0 +1,75 @@
+"""Parts that are dead from the start: the pose goes on, and the bus is told."""
+
+from bench import LONGEST_START, check_sound, describe, emergencies, longest_gap, poses
+from emulated_chip.clock import MILLISECOND, SECOND
+
+HARDWARE = 0x5000
+TOLD_WITHIN = 200 * MILLISECOND
+
+
+def lives_with(bench, change, is_told=True):
+    chip = bench.chip()
+    change(chip)
+    chip.run_for(2 * SECOND, stop=lambda: chip.sleeps > 0)
+    assert chip.sleeps > 0, describe(chip)
+    begin = chip.clock.now()
+    bench.note("start_ms", begin / MILLISECOND)
+    chip.run_for(60 * SECOND if bench.is_long else 10 * SECOND)
+    check_sound(chip)
+    gap = longest_gap(poses(chip, begin), begin, chip.clock.now())
+    assert gap <= 20 * MILLISECOND, f"no pose for {gap / 1e6:.1f} ms"
+    told = [time for time, frame in chip.listener.of(0x90) if frame.data[:2] == HARDWARE.to_bytes(2, "little")]
+    if is_told:
+        assert told and told[0] <= begin + TOLD_WITHIN, f"emergencies: {emergencies(chip)}"
+    else:
+        assert not told, f"emergencies: {emergencies(chip)}"
+    return chip
+
+
+def lives_without_a_phy(bench):
+    """Nobody answers on the management bus of the Ethernet."""
+
+    def change(chip):
+        chip.phy.is_there = False
+
+    lives_with(bench, change)
+
+
+def lives_without_a_reference_clock(bench):
+    """The PHY answers, and gives no clock."""
+
+    def change(chip):
+        chip.phy.has_clock = False
+
+    lives_with(bench, change)
+
+
+def lives_without_a_cable(bench):
+    """Everything is sound but the cable: no trouble of the board."""
+
+    def change(chip):
+        chip.phy.has_cable = False
+
+    lives_with(bench, change, is_told=False)
+
+
+def only_listens_without_a_crystal(bench):
+    """The chip's own oscillator is too far off for CAN at this bit timing: the controller runs, and disturbs nobody."""
+    chip = bench.chip()
+    chip.peripherals["RCC"].has_hse = False
+    chip.run_for(2 * SECOND, stop=lambda: chip.sleeps > 0)
+    assert chip.sleeps > 0, describe(chip)
+    chip.run_for(12 * SECOND)
+    check_sound(chip)
+    assert chip.peripherals["RCC"].processor_clock() == 480_000_000, "the clock is another one"
+    fdcan = chip.peripherals["FDCAN1"]
+    assert fdcan.get("CCCR", "MON") == 1, "the controller would acknowledge"
+    assert not chip.listener.heard, "the controller sends"
+
+
+CHECKS = [
+    lives_without_a_phy,
+    lives_without_a_reference_clock,
+    lives_without_a_cable,
+    only_listens_without_a_crystal,
+]

@@ -1,0 +1,51 @@
+"""Power that goes while the flash is written: the chip starts again, and has lost nothing that was there before."""
+
+from bench import check_sound, describe, emergencies, start
+from emulated_chip.clock import MILLISECOND, SECOND
+from emulated_chip.flash import PowerCut
+
+# Starts in which power goes at each of the words that a start programs.
+WORDS = 6
+
+
+def survives_torn_words(bench):
+    """Power goes at each flash word that a start programs, at several starts in a row; the chip starts each time."""
+    flash = None
+    torn = 0
+    for number in range(1, WORDS + 1 if not bench.is_long else 40):
+        for at in (1, 2, 3):
+            chip = bench.chip(settings=flash)
+            chip.cut = PowerCut(at)
+            chip.run_for(9 * SECOND, stop=lambda: chip.sleeps > 40)
+            flash = chip.settings_flash
+            torn += not chip.has_power
+            assert not chip.has_power or chip.sleeps > 0, f"start {number}, word {at}: {describe(chip)}"
+            assert not chip.findings and not chip.exceptions.taken, f"start {number}, word {at}: {describe(chip)}"
+    assert torn > 0, "no word was torn"
+    bench.note("torn_words", torn)
+    chip = bench.chip(settings=flash)
+    start(chip)
+    check_sound(chip)
+
+
+def survives_an_erase_cut_short(bench):
+    """Both pages hold words with double errors throughout, as an erase that was cut short leaves them."""
+    for pages in ((6,), (7,), (6, 7)):
+        chip = bench.started()
+        chip.run_for(50 * MILLISECOND)
+        flash = chip.settings_flash.copy()
+        for page in pages:
+            first = page * 128 * 1024
+            for word in range(first, first + 128 * 1024, 32):
+                flash.bad.add(word)
+                flash.bytes[word : word + 32] = bytes([word >> 5 & 0xFF, word >> 13 & 0xFF] * 16)
+        again = bench.chip(settings=flash)
+        start(again)
+        check_sound(again)
+        again.run_for(100 * MILLISECOND)
+        check_sound(again)
+        bad = [word for word in flash.bad if word >= 6 * 128 * 1024]
+        assert not bad, f"pages {pages}: {len(bad)} words are still bad"
+
+
+CHECKS = [survives_torn_words, survives_an_erase_cut_short]

@@ -1,0 +1,46 @@
+"""The board's Ethernet PHY, a LAN8742A at address 0 (its data sheet DS00001989, chapter 4)."""
+
+from .clock import MILLISECOND, SECOND
+
+BASIC_CONTROL, BASIC_STATUS = 0, 1
+IDENTIFIERS = {2: 0x0007, 3: 0xC131}
+SOFT_RESET, RESTART = 1 << 15, 1 << 9
+# Extended capability, negotiation possible, 10 and 100 Mbit/s; then negotiation done, link up.
+ABILITIES, NEGOTIATED, LINK = 0x7809, 1 << 5, 1 << 2
+NEGOTIATION = 2 * SECOND
+
+
+class Phy:
+    def __init__(self, clock):
+        self.clock = clock
+        self.is_there = True
+        self.has_clock = True
+        self.has_cable = True
+        self._reset_until = 0
+        self._negotiated_at = None
+        self._control = 0x3000
+
+    def reset(self):
+        self._negotiated_at = self.clock.now() + NEGOTIATION
+
+    def read(self, address, register):
+        if not self.is_there or address != 0:
+            return 0xFFFF
+        if register == BASIC_CONTROL:
+            return self._control | (SOFT_RESET if self.clock.now() < self._reset_until else 0)
+        if register == BASIC_STATUS:
+            return ABILITIES | ((NEGOTIATED | LINK) if self.has_link() else 0)
+        return IDENTIFIERS.get(register, 0)
+
+    def write(self, address, register, value):
+        if not self.is_there or address != 0 or register != BASIC_CONTROL:
+            return
+        self._control = value & ~(SOFT_RESET | RESTART)
+        if value & SOFT_RESET:
+            self._reset_until = self.clock.now() + MILLISECOND
+        if value & (SOFT_RESET | RESTART):
+            self._negotiated_at = self.clock.now() + NEGOTIATION
+
+    def has_link(self):
+        is_negotiated = self._negotiated_at is not None and self.clock.now() >= self._negotiated_at
+        return self.is_there and self.has_cable and is_negotiated
