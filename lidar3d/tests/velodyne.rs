@@ -2,17 +2,13 @@
 
 mod support;
 
-use std::path::{Path, PathBuf};
-
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::{
     BLOCKS, Decoder, Filter, LENGTH, Model, PORT, Packet, Point, RETURNS, Return, Sensor, Tail, counts_between,
 };
-use support::{packets_of_bag, packets_of_capture, peer, points_of_pcd, recordings};
-
-/// Greatest difference of a coordinate, m.
-const TOLERANCE: f32 = 0.002;
+use support::compared::{Compared, TOLERANCE, apart_of, turned};
+use support::{file, packets_of_bag, packets_of_capture, peer, points_of_pcd, recordings};
 
 /// Packet by packet, the points.
 fn decode(sensor: Sensor, calibration: &Calibration, packets: &[Vec<u8>]) -> Vec<Vec<Point>> {
@@ -31,47 +27,6 @@ fn decode(sensor: Sensor, calibration: &Calibration, packets: &[Vec<u8>]) -> Vec
         points
     };
     packets.iter().map(points_of).collect()
-}
-
-fn apart_of(one: [f32; 3], other: [f32; 3]) -> f32 {
-    one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
-}
-
-/// The point, seen that much farther clockwise, 0.01 degrees.
-fn turned([x, y, z]: [f32; 3], counts: f32) -> [f32; 3] {
-    let (sin, cos) = (0.01 * counts).to_radians().sin_cos();
-    [x * cos + y * sin, y * cos - x * sin, z]
-}
-
-/// What a comparison found.
-#[derive(Debug, Default)]
-struct Compared {
-    points: usize,
-    /// Greatest difference of a coordinate, m.
-    worst: f32,
-    /// Points that lie farther off and for which the papers say why.
-    explained: usize,
-}
-
-impl Compared {
-    fn add(&mut self, difference: f32, is_explained: bool) {
-        self.points += 1;
-        if difference > TOLERANCE && is_explained {
-            self.explained += 1;
-        } else {
-            self.worst = self.worst.max(difference);
-        }
-    }
-
-    fn report(&self, sensor: Sensor, driver: &str) {
-        let Self { points, worst, explained } = self;
-        println!("{} against {driver}: {points} points, {:.2} mm, {explained} explained", sensor.name(), 1e3 * worst);
-    }
-}
-
-fn file(folder: &Path, ending: &str) -> PathBuf {
-    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    files.into_iter().find(|path| path.extension().is_some_and(|found| found == ending)).unwrap()
 }
 
 /// Sensor, folder of its packets, name of its model at velodyne_decoder.
@@ -130,7 +85,7 @@ fn compare_with_velodyne_decoder(
             compared.add(apart(&other), is_behind_pause || has_no_speed || is_height);
         }
     }
-    compared.report(sensor, "velodyne_decoder");
+    compared.report(sensor.name(), "velodyne_decoder");
     assert!(compared.worst <= TOLERANCE, "{compared:?}");
     Some(compared)
 }
@@ -253,7 +208,7 @@ fn points_are_those_of_nebula() {
         let ours = seen(sensor, &calibration, &packets);
         let theirs = points_of_pcd(&file(&folder, "pcd"));
         let compared = compare_with_nebula(sensor, &ours, &theirs);
-        compared.report(sensor, "nebula");
+        compared.report(sensor.name(), "nebula");
         assert_eq!(compared.points, theirs.len());
         assert!(compared.worst <= TOLERANCE, "{compared:?}");
     }

@@ -1,9 +1,9 @@
-//! A calibration and its two file formats.
+//! A calibration and its file formats.
 
 use std::string::String;
 use std::vec::Vec;
 
-use super::{Laser, db_xml, ros_yaml};
+use super::{Laser, db_xml, hesai_csv, ros_yaml};
 use crate::packet::Sensor;
 
 /// Parameters of all lasers of a sensor.
@@ -18,7 +18,7 @@ pub struct Calibration {
 /// Why a text is no calibration.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CalibrationError {
-    /// Neither of the formats.
+    /// None of the formats.
     #[error("this is no calibration file: {reason}")]
     Foreign {
         /// What the parser says, one line.
@@ -68,12 +68,19 @@ const ELEVATION_TOLERANCE: f64 = 2.0;
 const RESOLUTION_TOLERANCE: f64 = 1e-6;
 
 impl Calibration {
-    /// Reads `db.xml` (degrees, centimetres) or ROS YAML (radians, metres), whichever the text is.
+    /// Reads `db.xml` (degrees, centimetres), ROS YAML (radians, metres) or Hesai's table of angles (degrees), whichever
+    /// the text is.
     ///
     /// # Errors
     /// See [`CalibrationError`].
     pub fn read(text: &str) -> Result<Self, CalibrationError> {
-        let calibration = if text.trim_start().starts_with('<') { db_xml::read(text) } else { ros_yaml::read(text) }?;
+        let calibration = if text.trim_start().starts_with('<') {
+            db_xml::read(text)
+        } else if hesai_csv::is_one(text) {
+            hesai_csv::read(text)
+        } else {
+            ros_yaml::read(text)
+        }?;
         let values = calibration.lasers.iter().flat_map(|laser| {
             [laser.distance, laser.elevation, laser.rotation, laser.vertical_offset, laser.horizontal_offset]
         });

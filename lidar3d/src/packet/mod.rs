@@ -1,6 +1,7 @@
 //! Bytes of a packet and what they say.
 
 mod decode;
+pub mod hesai;
 mod point;
 mod sensor;
 mod status;

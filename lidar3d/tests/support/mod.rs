@@ -1,8 +1,9 @@
 //! Recorded packets of real sensors, and the clouds that other drivers made of them.
-#![allow(dead_code)]
+#![allow(dead_code, unused_imports)]
 
 mod bag;
 mod capture;
+pub mod compared;
 mod peer;
 
 use std::io::Write;
@@ -56,4 +57,10 @@ pub fn points_of_pcd(path: &Path) -> Vec<[f32; 3]> {
         })
     });
     points.collect()
+}
+
+/// The file of a folder that ends like that.
+pub fn file(folder: &Path, ending: &str) -> PathBuf {
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    files.into_iter().find(|path| path.extension().is_some_and(|found| found == ending)).unwrap()
 }
