@@ -2,6 +2,7 @@
 
 mod decode;
 pub mod hesai;
+pub mod ouster;
 mod point;
 mod sensor;
 mod status;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 pub use bag::packets_of_bag;
 pub use capture::packets_of_capture;
-pub use peer::peer;
+pub use peer::{peer, peer_bytes};
 
 /// A file of the real recordings. Where it is absent, `test` is skipped.
 pub fn recordings(test: &str, name: &str) -> Option<PathBuf> {

@@ -10,10 +10,23 @@ use super::skip;
 /// returns the 32-bit floats that it writes, row by row. None if the module that it needs is not installed.
 pub fn peer<const N: usize>(
     test: &str,
-    (script, module): (&str, &str),
+    script: (&str, &str),
     arguments: &[&str],
     packets: &[Vec<u8>],
 ) -> Option<Vec<[f32; N]>> {
+    let bytes = peer_bytes(test, script, arguments, packets)?;
+    let numbers: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    assert_eq!(numbers.len() % N, 0);
+    Some(numbers.as_chunks::<N>().0.to_vec())
+}
+
+/// As [`peer`], the bytes themselves.
+pub fn peer_bytes(
+    test: &str,
+    (script, module): (&str, &str),
+    arguments: &[&str],
+    packets: &[Vec<u8>],
+) -> Option<Vec<u8>> {
     let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let own = crate_folder.join("../target/python/bin/python3");
     let program = if own.exists() { own } else { PathBuf::from("python3") };
@@ -32,7 +45,5 @@ pub fn peer<const N: usize>(
     let output = child.wait_with_output().unwrap();
     let _ = writer.join();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let numbers: Vec<f32> = output.stdout.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-    assert_eq!(numbers.len() % N, 0);
-    Some(numbers.as_chunks::<N>().0.to_vec())
+    Some(output.stdout)
 }

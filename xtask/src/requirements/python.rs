@@ -7,7 +7,7 @@ use super::{debian, install, succeeds};
 use crate::repository;
 
 /// Packages, and the modules that they bring.
-const PACKAGES: [(&str, &str); 11] = [
+const PACKAGES: [(&str, &str); 12] = [
     ("numpy>=1.24,<3", "numpy"),
     ("scipy>=1.10,<2", "scipy"),
     ("shapely>=2,<3", "shapely"),
@@ -18,6 +18,7 @@ const PACKAGES: [(&str, &str); 11] = [
     ("rosbags>=0.10,<1", "rosbags"),
     ("evo>=1.30,<2", "evo"),
     ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
+    ("ouster-sdk>=1,<2", "ouster.sdk"),
     (include_str!("../../../host-sim/ray/requirements.txt").trim_ascii(), "ray"),
 ];
 
