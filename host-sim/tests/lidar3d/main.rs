@@ -7,4 +7,3 @@ mod range_images;
 mod refinement;
 #[path = "../support/mod.rs"]
 mod support;
-mod velodyne_decoder;

@@ -103,7 +103,7 @@ impl Calibrate {
         // What the file states beside the lasers stays as it is.
         let resolution = match &options.calibration {
             Some(path) => setup::read_calibration(path)?.distance_resolution,
-            None => 0.002,
+            None => None,
         };
         let calibration = Calibration { distance_resolution: resolution, lasers: found.lasers.clone() };
         std::fs::write(&self.output, write(&calibration)).with_context(|| self.output.display().to_string())?;
