@@ -4,8 +4,8 @@
 //! Unlike 3.7 the sum is not divided by the points of its scan: every point tells as much as every other.
 //!
 //! Walls do not show everything: upright ones hardly say where a beam points up or down. So the factory's values count as
-//! measurements of their own, with the deviations that they are believed to have, and what the walls do not show stays at
-//! them. Nor is the noise of the points all that is wrong with ranges: the ranges of a scan may be too long together, and
+//! measurements of their own, and what the walls do not show stays at them. How far they may be off is learnt from the
+//! lasers together, beginning with what factories are believed to reach. Nor is the noise of the points all that is wrong with ranges: the ranges of a scan may be too long together, and
 //! those of a laser on a wall by themselves. Both are unknowns of their own, and the residuals tell how great they are.
 
 use std::vec;
@@ -32,7 +32,7 @@ const SMALL: f64 = 0.02;
 /// So do steps below this part of the standard deviation to which a parameter is known before: where surfaces are not quite
 /// planes, which points count changes a little for ever.
 const SMALL_TO_KNOWN: f64 = 0.002;
-/// A parameter whose deviation is not below this part of that before is held at the factory's value, as good as.
+/// A parameter whose deviation is not below this part of that of the start is held at the factory's value, as good as.
 const HELD: f64 = 0.7;
 /// At which distance a calibration must be better than the factory's, m, and to which part the deviation of a point must
 /// fall there.
@@ -44,6 +44,11 @@ const COMMON_ERROR: f64 = 0.01;
 const OWN_ERROR: f64 = 0.005;
 /// Below this they are none, m.
 const NO_ERROR: f64 = 1e-5;
+
+/// Believed deviations of the start count like those of so many values; what is learnt stays between these parts of them.
+const FEW: f64 = 0.5;
+const LEAST_OFF: f64 = 0.02;
+const MOST_OFF: f64 = 4.0;
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -145,8 +150,8 @@ pub struct Adjustment {
     pub common_range_errors: Vec<f64>,
     /// Rounds that it took.
     pub rounds: usize,
-    /// What was known before.
-    prior: Deviation,
+    /// How far the values of the start are off, as the scans of all lasers together tell: standard deviations.
+    pub start_deviation: Deviation,
     covariances: Vec<Option<LaserMatrix>>,
 }
 
@@ -164,7 +169,7 @@ impl Adjustment {
             };
         };
         let [distance, elevation, rotation, vertical_offset, horizontal_offset] =
-            found.vector().zip_map(&self.prior.vector(), |found, prior| found > HELD * prior).into();
+            found.vector().zip_map(&self.start_deviation.vector(), |found, start| found > HELD * start).into();
         Held { distance, elevation, rotation, vertical_offset, horizontal_offset }
     }
 
@@ -177,8 +182,8 @@ impl Adjustment {
     }
 }
 
-/// Finds D_corr, theta and alpha of all lasers, and V_o and H_o. The start counts as known to [`Deviation::FACTORY`]; the
-/// mean of alpha stays as it is.
+/// Finds D_corr, theta and alpha of all lasers, and V_o and H_o. What the start is off is learnt, from
+/// [`Deviation::FACTORY`] on; the mean of alpha stays as it is.
 ///
 /// # Errors
 /// See [`AdjustmentError`].
@@ -188,7 +193,7 @@ pub fn calibrate(
     residual: Residual,
     targets: &[Target],
 ) -> Result<Adjustment, AdjustmentError> {
-    let found = calibrate_near(start, offsets, residual, &Deviation::FACTORY, targets)?;
+    let found = adjust(start, offsets, residual, (&Deviation::FACTORY, true), targets)?;
     let part = found.part_left(offsets);
     if part > GAINED {
         return Err(AdjustmentError::NothingGained { percent: (100.0 * part).round() as u32 });
@@ -207,6 +212,17 @@ pub fn calibrate_near(
     prior: &Deviation,
     targets: &[Target],
 ) -> Result<Adjustment, AdjustmentError> {
+    adjust(start, offsets, residual, (prior, false), targets)
+}
+
+/// With what is known of the start, and whether to learn more of that.
+fn adjust(
+    start: &[Laser],
+    offsets: Offsets,
+    residual: Residual,
+    (prior, is_learning): (&Deviation, bool),
+    targets: &[Target],
+) -> Result<Adjustment, AdjustmentError> {
     let mut points = vec![0_usize; start.len()];
     for seen in targets.iter().flat_map(|target| &target.returns) {
         if let Some(count) = points.get_mut(seen.laser) {
@@ -217,12 +233,13 @@ pub fn calibrate_near(
     if !is_observed.contains(&true) {
         return Err(AdjustmentError::NoPoints);
     }
-    let problem = Problem { start, offsets, residual, prior, targets, is_observed };
+    let problem = Problem { start, offsets, residual, prior: prior.vector(), is_learning, targets, is_observed };
     let mut state = State {
         lasers: start.to_vec(),
         planes: targets.iter().map(|target| (target.plane, 0.0)).collect(),
         own: OWN_ERROR,
         common: COMMON_ERROR,
+        known: prior.vector(),
     };
     for round in 1..=ROUNDS {
         let outcome = problem.step(&mut state, round > FIRST_ROUNDS)?;
@@ -238,7 +255,9 @@ struct Problem<'a> {
     start: &'a [Laser],
     offsets: Offsets,
     residual: Residual,
-    prior: &'a Deviation,
+    /// Standard deviations of the start, as they are believed to be.
+    prior: LaserVector,
+    is_learning: bool,
     targets: &'a [Target],
     is_observed: Vec<bool>,
 }
@@ -251,6 +270,8 @@ struct State {
     /// Standard deviations of the errors of ranges, m.
     own: f64,
     common: f64,
+    /// Standard deviations of the start, as far as they are learnt.
+    known: LaserVector,
 }
 
 /// What a round found.
@@ -280,8 +301,7 @@ impl Problem<'_> {
         if has_settled_once {
             state.common = common_error(&sums, &state.planes, noise);
         }
-        let (steps, covariances) =
-            self.equations(&state.lasers, &sums, noise).solve().ok_or(AdjustmentError::Undetermined)?;
+        let (steps, covariances) = self.equations(state, &sums, noise).solve().ok_or(AdjustmentError::Undetermined)?;
         for (laser, step) in state.lasers.iter_mut().zip(&steps) {
             laser.distance += step[0];
             laser.elevation += step[1];
@@ -296,36 +316,48 @@ impl Problem<'_> {
                 *bias += step[3];
             }
         }
-        let known = self.prior.vector();
+        let covariances: Vec<LaserMatrix> =
+            covariances.into_iter().map(|covariance| covariance * noise.powi(2)).collect();
+        if has_settled_once && self.is_learning {
+            state.known = self.learnt(state, &covariances);
+        }
         let is_small = |(step, covariance): (&LaserVector, &LaserMatrix)| {
             (0..OF_LASER).all(|parameter| {
-                let deviation = noise * covariance[(parameter, parameter)].sqrt();
-                step[parameter].abs() < (SMALL * deviation).max(SMALL_TO_KNOWN * known[parameter])
+                let deviation = covariance[(parameter, parameter)].sqrt();
+                step[parameter].abs() < (SMALL * deviation).max(SMALL_TO_KNOWN * self.prior[parameter])
             })
         };
         let is_settled = steps.iter().zip(&covariances).all(is_small);
-        let covariances = covariances.into_iter().map(|covariance| covariance * noise.powi(2)).collect();
         Ok(Outcome { noise, covariances, is_settled })
     }
 
-    fn equations(&self, lasers: &[Laser], sums: &[PlaneSums], noise: f64) -> LaserEquations {
-        let pairs = || lasers.iter().zip(self.start);
+    fn equations(&self, state: &State, sums: &[PlaneSums], noise: f64) -> LaserEquations {
+        let pairs = || state.lasers.iter().zip(self.start);
         let shift = pairs().zip(&self.is_observed).filter(|(_, is_observed)| **is_observed);
         let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
         let observed = self.is_observed.iter().filter(|is_observed| **is_observed).count();
         let mut equations = LaserEquations::new(sums, &self.is_observed, shift / observed as f64);
-        let weights = self.prior.vector().map(|deviation| (noise / deviation).powi(2));
-        let off = pairs().map(|(laser, start)| {
-            LaserVector::new(
-                laser.distance - start.distance,
-                laser.elevation - start.elevation,
-                laser.rotation - start.rotation,
-                laser.vertical_offset - start.vertical_offset,
-                laser.horizontal_offset - start.horizontal_offset,
-            )
-        });
-        equations.hold_near(&weights, off);
+        let weights = state.known.map(|deviation| (noise / deviation).powi(2));
+        equations.hold_near(&weights, pairs().map(off));
         equations
+    }
+
+    /// How far the start is off: the sum of the squares found, by the number of values that the scans determine
+    /// (MacKay's evidence approximation). Little is learnt where the scans determine less than a few values.
+    fn learnt(&self, state: &State, covariances: &[LaserMatrix]) -> LaserVector {
+        let (mut squares, mut determined) = (LaserVector::zeros(), LaserVector::zeros());
+        let variances = state.known.map(|deviation| deviation * deviation);
+        let all = state.lasers.iter().zip(self.start).zip(covariances).zip(&self.is_observed);
+        for ((pair, covariance), _) in all.filter(|(_, is_observed)| **is_observed) {
+            squares += off(pair).map(|off| off * off);
+            determined += covariance.diagonal().zip_map(&variances, |left, before| (1.0 - left / before).max(0.0));
+        }
+        LaserVector::from_fn(|parameter, _| {
+            let believed = self.prior[parameter];
+            let before = FEW * believed * believed;
+            let learnt = ((squares[parameter] + before) / (determined[parameter] + FEW)).sqrt();
+            learnt.clamp(LEAST_OFF * believed, MOST_OFF * believed)
+        })
     }
 
     /// Standard deviation of the residuals, by the median, m.
@@ -386,10 +418,21 @@ impl Problem<'_> {
             range_error: state.own,
             common_range_errors: state.planes.iter().map(|(_, bias)| *bias).collect(),
             rounds,
-            prior: *self.prior,
+            start_deviation: Deviation::of_vector(state.known),
             covariances,
         }
     }
+}
+
+/// How far a laser is off the start.
+fn off((laser, start): (&Laser, &Laser)) -> LaserVector {
+    LaserVector::new(
+        laser.distance - start.distance,
+        laser.elevation - start.elevation,
+        laser.rotation - start.rotation,
+        laser.vertical_offset - start.vertical_offset,
+        laser.horizontal_offset - start.horizontal_offset,
+    )
 }
 
 /// Standard deviation of the error that all ranges of a scan have together, m: the mean square of what is found and of what
@@ -402,7 +445,7 @@ fn common_error(sums: &[PlaneSums], planes: &[(Plane, f64)], noise: f64) -> f64 
 impl Adjustment {
     /// Deviation of the points at 10 m, as a part of that with the factory's values.
     fn part_left(&self, offsets: Offsets) -> f64 {
-        let before = LaserMatrix::from_diagonal(&self.prior.vector().map(|deviation| deviation * deviation));
+        let before = LaserMatrix::from_diagonal(&Deviation::FACTORY.vector().map(|deviation| deviation * deviation));
         let (mut left, mut known) = (0.0, 0.0);
         for (laser, covariance) in self.lasers.iter().zip(&self.covariances) {
             let Some(covariance) = covariance else { continue };
