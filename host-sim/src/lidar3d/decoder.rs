@@ -23,10 +23,10 @@ impl AnyDecoder {
             (_, Some(sensor)) => Self::Ouster(Box::new(ouster::Decoder::new((**sensor).clone(), setup.filter))),
             (Kind::Hesai(sensor), _) => Self::Hesai(Box::new(hesai::Decoder::new(sensor, &setup.lasers, setup.filter))),
             (kind, _) => {
-                // An Ouster is described, or it is no setup.
+                // An Ouster is described, or it is no setup; point clouds need no decoder.
                 let sensor = match kind {
                     Kind::Velodyne(sensor) => sensor,
-                    Kind::Hesai(_) | Kind::Ouster => agv_lidar3d::packet::Sensor::Hdl64e,
+                    Kind::Hesai(_) | Kind::Ouster | Kind::Cloud => agv_lidar3d::packet::Sensor::Hdl64e,
                 };
                 let model = Model {
                     sensor,

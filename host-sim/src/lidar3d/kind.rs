@@ -11,6 +11,8 @@ pub enum Kind {
     Hesai(hesai::Sensor),
     /// An Ouster, which its metadata describe.
     Ouster,
+    /// Of whatever sensor, as point clouds.
+    Cloud,
 }
 
 impl Kind {
@@ -21,6 +23,7 @@ impl Kind {
             Self::Velodyne(sensor) => sensor.name(),
             Self::Hesai(sensor) => sensor.name(),
             Self::Ouster => "Ouster",
+            Self::Cloud => "point clouds",
         }
     }
 
@@ -31,6 +34,7 @@ impl Kind {
             Self::Velodyne(sensor) => sensor.filter(),
             Self::Hesai(sensor) => sensor.filter(),
             Self::Ouster => Filter { near: 0.1, far: 500.0 },
+            Self::Cloud => Filter::ALL,
         }
     }
 }

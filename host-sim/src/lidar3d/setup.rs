@@ -155,8 +155,14 @@ impl Setup {
                 }
                 Ok(Self::bare(options, kind, lasers))
             }
-            Kind::Ouster => Err(SetupError::NoCalibration { kind, packets: survey.packets }),
+            Kind::Ouster | Kind::Cloud => Err(SetupError::NoCalibration { kind, packets: survey.packets }),
         }
+    }
+
+    /// Of point clouds with such rings.
+    #[must_use]
+    pub fn of_clouds(options: &SetupOptions, lasers: Vec<Laser>) -> Self {
+        Self::bare(options, Kind::Cloud, lasers)
     }
 
     fn of_velodyne(options: &SetupOptions, survey: &Survey, sensor: Sensor) -> Result<Self, SetupError> {

@@ -9,6 +9,7 @@ use agv_core::measurement::Time;
 use agv_lidar3d::packet::{PORT, Packet, STATUS_CYCLE, Sensor, Tally, ouster};
 
 use super::capture::{self, CaptureError};
+use super::clouds;
 use super::kind::{Datagram, Kind};
 use super::live::Listener;
 use super::revolution::{Revolution, Revolutions};
@@ -35,6 +36,9 @@ pub enum SourceError {
     /// The sensor or its calibration.
     #[error(transparent)]
     Setup(#[from] SetupError),
+    /// A point cloud.
+    #[error("{0}")]
+    Cloud(String),
     /// The network.
     #[error("UDP port {port}: {problem}")]
     Network {
@@ -68,10 +72,13 @@ pub enum Source {
     Live(u16),
     /// A folder of range images.
     Images(PathBuf),
+    /// Point clouds, a scan each.
+    Clouds(PathBuf, Vec<PathBuf>),
 }
 
 impl Source {
-    /// `udp` or `udp:PORT` is the network, a folder holds range images, and any other name is a capture.
+    /// `udp` or `udp:PORT` is the network, a folder holds range images or point clouds, a name that ends in .pcd, .bin,
+    /// .ply or .las is a point cloud, and any other is a capture.
     ///
     /// # Errors
     /// If the port is no number.
@@ -81,7 +88,11 @@ impl Source {
             Some(rest) if rest.starts_with(':') => {
                 rest[1..].parse().map(Self::Live).map_err(|_| format!("'{}' is no port", &rest[1..]))
             }
-            _ if Path::new(text).is_dir() => Ok(Self::Images(text.into())),
+            _ if Path::new(text).is_dir() => {
+                let found = clouds::in_folder(Path::new(text));
+                if found.is_empty() { Ok(Self::Images(text.into())) } else { Ok(Self::Clouds(text.into(), found)) }
+            }
+            _ if clouds::is_cloud(Path::new(text)) => Ok(Self::Clouds(text.into(), vec![text.into()])),
             _ => Ok(Self::Capture(text.into())),
         }
     }
@@ -90,7 +101,7 @@ impl Source {
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Capture(path) | Self::Images(path) => path.display().to_string(),
+            Self::Capture(path) | Self::Images(path) | Self::Clouds(path, _) => path.display().to_string(),
             Self::Live(port) => format!("UDP port {port}"),
         }
     }
@@ -118,6 +129,13 @@ impl Source {
                     ..Survey::default()
                 };
                 Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Images(images) })
+            }
+            Self::Clouds(path, files) => {
+                let first = files.first().ok_or_else(|| SourceError::Cloud(format!("{}: no cloud", path.display())))?;
+                let (_, lasers) = clouds::read(first).map_err(SourceError::Cloud)?;
+                let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, ..Survey::default() };
+                let setup = Some(Setup::of_clouds(options, lasers));
+                Ok(OpenSource { options: options.clone(), setup, survey, packets: Packets::Clouds(files) })
             }
             Self::Live(port) => {
                 let network = |problem| SourceError::Network { port, problem };
@@ -152,6 +170,7 @@ impl Source {
 enum Packets {
     Capture { path: PathBuf, port: Option<u16>, ouster: Option<ouster::Sensor> },
     Images(RangeImages),
+    Clouds(Vec<PathBuf>),
     Live { port: u16, listener: Listener, waiting: Vec<(Time, Vec<u8>)>, ouster: Option<ouster::Sensor> },
 }
 
@@ -187,6 +206,7 @@ impl OpenSource {
         match &self.packets {
             Packets::Capture { .. } => Some(self.survey.turns.ceil() as u64),
             Packets::Images(images) => Some(images.files.len() as u64),
+            Packets::Clouds(files) => Some(files.len() as u64),
             Packets::Live { .. } => None,
         }
     }
@@ -202,6 +222,9 @@ impl OpenSource {
         mut take: impl FnMut(Revolution) -> ControlFlow<()>,
     ) -> Result<Tally, SourceError> {
         let setup = self.setup()?;
+        if let Packets::Clouds(files) = &self.packets {
+            return cloud_revolutions(files, &setup, stop, take);
+        }
         let mut revolutions = Revolutions::new(&setup);
         let mut flow = ControlFlow::Continue(());
         let mut push = |time: Time, datagram: &Datagram<'_>, revolutions: &mut Revolutions| {
@@ -234,6 +257,7 @@ impl OpenSource {
                 }
                 "the range images".to_owned()
             }
+            Packets::Clouds(_) => String::new(),
             Packets::Live { port, listener, waiting, ouster } => {
                 let port_now = listener.port();
                 let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
@@ -264,4 +288,30 @@ impl OpenSource {
         }
         Ok(tally)
     }
+}
+
+/// Each file as a revolution.
+fn cloud_revolutions(
+    files: &[PathBuf],
+    setup: &Setup,
+    stop: &AtomicBool,
+    mut take: impl FnMut(Revolution) -> ControlFlow<()>,
+) -> Result<Tally, SourceError> {
+    let mut tally = Tally::default();
+    for (number, path) in files.iter().enumerate() {
+        let (mut revolution, _) = clouds::read(path).map_err(SourceError::Cloud)?;
+        revolution.start = Time::from_micros(number as u64 * IMAGE_INTERVAL);
+        let all = revolution.points.len();
+        let range = |[x, y, z]: [f32; 3]| (x * x + y * y + z * z).sqrt();
+        revolution.points.retain(|point| range(point.position) >= setup.filter.near);
+        tally.near += (all - revolution.points.len()) as u64;
+        let far = revolution.points.len();
+        revolution.points.retain(|point| range(point.position) <= setup.filter.far);
+        tally.far += (far - revolution.points.len()) as u64;
+        tally.points += revolution.points.len() as u64;
+        if take(revolution).is_break() || stop.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    Ok(tally)
 }

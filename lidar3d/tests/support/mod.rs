@@ -4,7 +4,9 @@
 mod bag;
 mod capture;
 pub mod compared;
+pub mod moosmann;
 mod peer;
+pub mod scan_context;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

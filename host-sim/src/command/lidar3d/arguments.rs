@@ -8,8 +8,9 @@ use agv_lidar3d::packet::{self, Tally};
 
 /// What the source of a scan can be, for the help.
 pub const SOURCES: &str = "\
-A SOURCE is a capture (pcap or pcapng), a folder of range images (velodyne_config.txt and data/*.png), or udp[:PORT] for a
-sensor that sends to this machine (port 2368 if none is stated).
+A SOURCE is a capture (pcap or pcapng), a folder of range images (velodyne_config.txt and data/*.png), a point cloud (.pcd,
+KITTI's .bin, .ply or .las) or a folder of them, or udp[:PORT] for a sensor that sends to this machine (port 2368 if none is
+stated).
 
 Sensors: Velodyne HDL-64E (db.xml or YAML), HDL-32E, VLP-16, VLP-32C, VLS-128; Hesai Pandar40P, PandarQT64, PandarXT32 (CSV of
 its angles); Ouster (JSON of its metadata). A capture is read at the port of the first packet of a sensor.";
