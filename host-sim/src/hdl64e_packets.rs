@@ -7,9 +7,9 @@ const LASERS: usize = 2 * RETURNS;
 /// Firings of all lasers in a packet: each one is two blocks.
 const FIRINGS: usize = BLOCKS / 2;
 
-/// Packs counts of distance as an HDL-64E S2 sends them. `azimuths` are the angles of the head, 0.01 degrees; `count` is
-/// asked for the distance at a column and of a laser. A last packet that is not full is filled with firings in which
-/// nothing is seen.
+/// Packs counts of distance as an HDL-64E S2 sends them, but all returns of a firing at the angle that is stated. `azimuths`
+/// are the angles of the head, 0.01 degrees; `count` is asked for the distance at a column and of a laser. A last packet that
+/// is not full is filled with firings in which nothing is seen.
 pub fn hdl64e_packets(azimuths: &[u16], count: impl Fn(usize, usize) -> u16) -> Vec<[u8; LENGTH]> {
     let packets = azimuths.chunks(FIRINGS).enumerate().map(|(number, firings)| {
         let blocks = std::array::from_fn::<_, BLOCKS, _>(|block| {
@@ -22,10 +22,7 @@ pub fn hdl64e_packets(azimuths: &[u16], count: impl Fn(usize, usize) -> u16) -> 
             });
             (is_lower, azimuth, returns)
         });
-        Packet::write(&blocks, Tail(TAIL))
+        Packet::write(&blocks, Tail::AT_ONCE)
     });
     packets.collect()
 }
-
-/// The early dialect: no turns counted, and the version that the manual's own packet states.
-const TAIL: [u8; 6] = [0, 0, b'v', b'2', b'6', b'b'];

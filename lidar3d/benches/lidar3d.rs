@@ -8,7 +8,7 @@ use std::hint::black_box;
 use agv_lidar3d::calibration::{Full, Laser};
 use agv_lidar3d::cloud::Cloud;
 use agv_lidar3d::geometry::Offsets;
-use agv_lidar3d::packet::{BLOCKS, Decoder, Filter, LENGTH, Packet, RETURNS, Return, Sensor, Tail};
+use agv_lidar3d::packet::{BLOCKS, Decoder, LENGTH, Model, Packet, RETURNS, Return, Sensor, Tail};
 use agv_lidar3d::place::{Enriched, Histogram, Neighbours, chi_square};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
@@ -55,13 +55,22 @@ fn decode(criterion: &mut Criterion) {
         let packets = packets(sensor);
         let lasers = &lasers[..sensor.lasers()];
         group.bench_function(name, |bencher| {
-            let mut decoder = Decoder::new(sensor, lasers, Offsets::Orthogonal, two_points, Filter::default());
+            let mut decoder = Decoder::new(
+                &Model {
+                    sensor,
+                    lasers,
+                    distance_resolution: sensor.distance_resolution(),
+                    offsets: Offsets::Orthogonal,
+                    two_points,
+                },
+                sensor.filter(),
+            );
             let mut points = Vec::with_capacity(PACKETS * BLOCKS * RETURNS);
             bencher.iter(|| {
                 points.clear();
                 for bytes in black_box(&packets) {
                     let packet = Packet::new(bytes).expect("a packet that was written");
-                    decoder.packet(&packet, |point| points.push(point.position));
+                    decoder.packet(&packet, |point| points.push(point.position)).expect("a packet of this sensor");
                 }
                 points.len()
             });

@@ -44,7 +44,7 @@ impl<'a> Cloud<'a> {
 }
 
 /// Most rings.
-const RINGS: usize = 64;
+const RINGS: usize = 128;
 /// Hundredths of a degree in a turn.
 const TURN: u32 = 36_000;
 

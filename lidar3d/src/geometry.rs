@@ -82,6 +82,18 @@ pub fn jacobian(laser: &Laser, offsets: Offsets, azimuth: f64, distance: f64) ->
     ]
 }
 
+/// Derivatives of [`point`] by V_o and by H_o (1): of each, those of x, y and z.
+#[must_use]
+pub fn offset_jacobian(laser: &Laser, offsets: Offsets, azimuth: f64) -> [[f64; 3]; 2] {
+    let (sin_elevation, cos_elevation) = libm::sincos(laser.elevation);
+    let (sin, cos) = libm::sincos(azimuth - laser.rotation);
+    let vertical = match offsets {
+        Offsets::Orthogonal => [-sin_elevation * cos, sin_elevation * sin, cos_elevation],
+        Offsets::Alternate => [0.0, 0.0, 1.0],
+    };
+    [vertical, [sin, cos, 0.0]]
+}
+
 /// Head angle, rad, and measured distance, m, at which a laser sees a point; for simulation. None for a point too near
 /// to the axis for this beam. The point's height is not used: a beam reaches only the points of its own cone.
 #[must_use]

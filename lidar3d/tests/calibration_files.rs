@@ -1,6 +1,8 @@
 //! Calibration files there and back, and texts that are none.
 
 use agv_lidar3d::calibration::{Calibration, CalibrationError, Full, Laser};
+use agv_lidar3d::geometry::{Offsets, point};
+use agv_lidar3d::packet::Sensor;
 use proptest::prelude::*;
 
 fn laser(has_full: bool) -> impl Strategy<Value = Laser> {
@@ -30,7 +32,7 @@ fn laser(has_full: bool) -> impl Strategy<Value = Laser> {
 fn calibration() -> impl Strategy<Value = Calibration> {
     (any::<bool>(), 1_usize..=64)
         .prop_flat_map(|(has_full, lasers)| prop::collection::vec(laser(has_full), lasers))
-        .prop_map(|lasers| Calibration { distance_resolution: 0.002, lasers })
+        .prop_map(|lasers| Calibration { distance_resolution: Some(0.002), lasers })
 }
 
 /// Degrees and centimetres are rounded when they are computed: a few units in the last place.
@@ -47,7 +49,7 @@ fn is_same(one: &Calibration, other: &Calibration) -> bool {
     };
     let near = |(a, b): (f64, f64)| (a - b).abs() <= 4.0 * f64::EPSILON * a.abs();
     one.lasers.len() == other.lasers.len()
-        && near((one.distance_resolution, other.distance_resolution))
+        && near((one.distance_resolution.unwrap(), other.distance_resolution.unwrap()))
         && one
             .lasers
             .iter()
@@ -87,10 +89,11 @@ const YAML: &str = "lasers:\n- {dist_correction: 1.238, horiz_offset_correction:
 
 #[test]
 fn degrees_and_centimetres_become_radians_and_metres() {
-    for text in [XML, YAML] {
+    for (text, resolution) in [(XML, Some(0.002)), (YAML, None)] {
         let Calibration { lasers, distance_resolution } = Calibration::read(text).unwrap();
         let laser = lasers[0];
-        assert!((distance_resolution - 0.002).abs() < 1e-12 && laser.full.is_none() && laser.is_enabled);
+        assert_eq!(distance_resolution, resolution);
+        assert!(laser.full.is_none() && laser.is_enabled);
         assert!((laser.rotation.to_degrees() + 4.5).abs() < 1e-6 && (laser.elevation.to_degrees() + 7.2).abs() < 1e-6);
         assert!((laser.distance - 1.238).abs() < 1e-9 && (laser.vertical_offset - 0.215).abs() < 1e-9);
         assert!((laser.horizontal_offset - 0.026).abs() < 1e-9);
@@ -111,6 +114,56 @@ fn what_is_wrong_with_a_file_is_said() {
     assert!(matches!(error(&YAML.replace("1.238", ".nan")), CalibrationError::Foreign { .. }));
     // A whole foreign file is not repeated.
     assert!(error(&"word ".repeat(10_000)).to_string().len() < 300);
-    let wrong = Calibration::read(YAML).unwrap().for_lasers(64);
+    let wrong = Calibration::read(YAML).unwrap().for_sensor(Sensor::Hdl64e);
     assert_eq!(wrong, Err(CalibrationError::Count { found: 1, wanted: 64 }));
+}
+
+/// A file of a sensor's lasers that states only where the beams point.
+fn bare(sensor: Sensor) -> String {
+    let elevations = sensor.elevations().map_or(vec![0.0; sensor.lasers()], <[f64]>::to_vec);
+    let entry = |(id, elevation): (usize, &f64)| {
+        format!("- {{laser_id: {id}, rot_correction: 0.0, vert_correction: {}}}\n", elevation.to_radians())
+    };
+    format!("lasers:\n{}", elevations.iter().enumerate().map(entry).collect::<String>())
+}
+
+#[test]
+fn distance_corrections_and_offsets_need_not_be_stated() {
+    let calibration = Calibration::read(&bare(Sensor::Hdl32e)).unwrap();
+    assert_eq!(calibration.lasers.len(), 32);
+    assert!(calibration.lasers.iter().all(|laser| laser.distance == 0.0 && laser.vertical_offset == 0.0));
+}
+
+#[test]
+fn a_count_is_as_long_as_the_manual_says_and_for_an_hdl64e_as_the_file_says() {
+    for sensor in Sensor::ALL {
+        let silent = Calibration::read(&bare(sensor)).unwrap();
+        assert_eq!(silent.other_resolution(sensor), None);
+        assert_eq!(silent.for_sensor(sensor).unwrap().distance_resolution, Some(sensor.distance_resolution()));
+        let wrong = Calibration::read(&format!("{}distance_resolution: 0.007\n", bare(sensor))).unwrap();
+        assert_eq!(wrong.other_resolution(sensor), Some(0.007));
+        let used = if sensor == Sensor::Hdl64e { 0.007 } else { sensor.distance_resolution() };
+        assert_eq!(wrong.for_sensor(sensor).unwrap().distance_resolution, Some(used));
+    }
+    assert!(Calibration::read(&format!("{}distance_resolution: 0.0\n", bare(Sensor::Vlp16))).is_err());
+}
+
+#[test]
+fn a_calibration_of_a_sensor_that_looks_elsewhere_is_refused() {
+    let foreign = Calibration::read(&bare(Sensor::Hdl32e)).unwrap().for_sensor(Sensor::Vlp32c);
+    assert_eq!(foreign, Err(CalibrationError::Elevation { laser: 0, found: -3067, wanted: -2500 }));
+}
+
+#[test]
+fn the_beams_of_a_maker_meet_before_the_axis() {
+    for sensor in Sensor::ALL {
+        let Some(before) = sensor.focal_point() else { continue };
+        for laser in Calibration::of_maker(sensor).unwrap().lasers {
+            // Where the distance is that of the focal point, and where it is none: on the axis.
+            let at = |distance| point(&Laser { rotation: 0.0, ..laser }, Offsets::Orthogonal, 0.0, distance);
+            let [x, _, z] = at(before / laser.elevation.cos());
+            assert!((x - before).abs() < 1e-12 && z.abs() < 1e-12, "{sensor:?}: {x} {z}");
+            assert!(at(0.0)[0].abs() < 1e-12);
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The geometric model against finite differences, and there and back.
 
 use agv_lidar3d::calibration::Laser;
-use agv_lidar3d::geometry::{Offsets, inverse, jacobian, point};
+use agv_lidar3d::geometry::{Offsets, inverse, jacobian, offset_jacobian, point};
 use proptest::prelude::*;
 
 fn laser() -> impl Strategy<Value = Laser> {
@@ -29,16 +29,26 @@ proptest! {
     ) {
         const STEP: f64 = 1e-6;
         let stated = jacobian(&laser, offsets, azimuth, distance);
-        for parameter in 0..3 {
+        let [vertical, horizontal] = offset_jacobian(&laser, offsets, azimuth);
+        for parameter in 0..5 {
             let moved = |by: f64| {
                 let mut laser = laser;
-                *[&mut laser.distance, &mut laser.elevation, &mut laser.rotation][parameter] += by;
+                let parameters = [
+                    &mut laser.distance,
+                    &mut laser.elevation,
+                    &mut laser.rotation,
+                    &mut laser.vertical_offset,
+                    &mut laser.horizontal_offset,
+                ];
+                *parameters.into_iter().nth(parameter).unwrap() += by;
                 point(&laser, offsets, azimuth, distance)
             };
             let (ahead, behind) = (moved(STEP), moved(-STEP));
             for axis in 0..3 {
                 let found = (ahead[axis] - behind[axis]) / (2.0 * STEP);
-                prop_assert!((found - stated[axis][parameter]).abs() < 1e-6 * distance.max(1.0));
+                let [a, b, c] = stated[axis];
+                let stated = [a, b, c, vertical[axis], horizontal[axis]][parameter];
+                prop_assert!((found - stated).abs() < 1e-6 * distance.max(1.0));
             }
         }
     }

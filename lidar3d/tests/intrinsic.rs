@@ -125,7 +125,7 @@ fn what_one_plane_does_not_show_stays_near_what_is_known() {
     let truth = lasers();
     let start = disturbed(&truth, &[[0.01, 0.001, 0.002], [-0.01, -0.001, 0.001]].repeat(4));
     let one = scan(&truth, Offsets::Orthogonal, unit(0.1, -0.2), 8.0);
-    let prior = Deviation { distance: 0.02, elevation: 0.002, rotation: 0.005 };
+    let prior = Deviation { distance: 0.02, elevation: 0.002, rotation: 0.005, ..Deviation::FACTORY };
     let flat = |lasers: &[Laser]| flatness(lasers, Offsets::Orthogonal, &one.returns).unwrap().thickness();
     let (before, targets) = (flat(&start), [one.clone()]);
     let found = calibrate_near(&start, Offsets::Orthogonal, Residual::AlongBeam, &prior, &targets).unwrap();

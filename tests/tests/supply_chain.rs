@@ -25,7 +25,7 @@ fn sources(lock: &toml::Table) -> Vec<String> {
     let mut wrong = Vec::new();
     for package in lock["package"].as_array().unwrap() {
         let name = package["name"].as_str().unwrap();
-        let is_own = name.starts_with("agv-") || name == "xtask";
+        let is_own = name.starts_with("agv-") || ["agv", "xtask"].contains(&name);
         let is_right = match package.get("source").and_then(toml::Value::as_str) {
             Some(source) => source == CRATES_IO && package.get("checksum").is_some() && !is_own,
             None => is_own,

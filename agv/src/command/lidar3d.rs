@@ -4,6 +4,7 @@ mod arguments;
 mod calibrate;
 mod convert;
 mod decode;
+mod held;
 mod info;
 mod places;
 pub mod relocalise;

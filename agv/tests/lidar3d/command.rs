@@ -36,7 +36,7 @@ fn turns(count: u16) -> Vec<[u8; LENGTH]> {
 
 fn calibration(files: &Files, lasers: usize) -> String {
     let laser = |number: usize| Laser { elevation: 0.03 - 0.007 * number as f64, is_enabled: true, ..Laser::default() };
-    let calibration = Calibration { distance_resolution: 0.002, lasers: (0..lasers).map(laser).collect() };
+    let calibration = Calibration { distance_resolution: Some(0.002), lasers: (0..lasers).map(laser).collect() };
     files.write(&format!("{lasers}.yaml"), calibration.to_ros_yaml().as_bytes())
 }
 
@@ -183,14 +183,14 @@ fn false_returns_are_counted_and_not_written() {
     }
 }
 
-/// x, y, z of the points of a binary PLY whose point takes 14 bytes.
+/// x, y, z of the points of a binary PLY whose point takes 15 bytes.
 fn ply_points(path: &str) -> Vec<[f32; 3]> {
     let bytes = std::fs::read(path).unwrap();
     let end = b"end_header\n";
     let start = bytes.windows(end.len()).position(|window| window == end).unwrap() + end.len();
-    let (points, rest) = bytes[start..].as_chunks::<14>();
+    let (points, rest) = bytes[start..].as_chunks::<15>();
     assert!(rest.is_empty());
-    let number = |point: &[u8; 14], at: usize| f32::from_le_bytes(std::array::from_fn(|byte| point[4 * at + byte]));
+    let number = |point: &[u8; 15], at: usize| f32::from_le_bytes(std::array::from_fn(|byte| point[4 * at + byte]));
     points.iter().map(|point| std::array::from_fn(|at| number(point, at))).collect()
 }
 
@@ -266,7 +266,7 @@ fn scans_of_a_wall_calibrate_the_sensor() {
         laser.distance += 0.02 * ((number * 7 % 5) as f64 - 2.0) / 2.0;
         laser.rotation += 0.003 * ((number * 3 % 7) as f64 - 3.0) / 3.0;
     }
-    let text = Calibration { distance_resolution: 0.002, lasers: start }.to_db_xml();
+    let text = Calibration { distance_resolution: Some(0.002), lasers: start }.to_db_xml();
     let start = files.write("start.xml", text.as_bytes());
     let (found, report) = (files.path("found.xml"), files.path("report"));
     let mut arguments =

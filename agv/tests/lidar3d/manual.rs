@@ -1,6 +1,7 @@
 //! The packet that the manual of the HDL-64E S2 prints.
 
-use agv_host_sim::import;
+use agv_host_sim::lidar3d::capture;
+use agv_host_sim::lidar3d::kind::Datagram;
 use agv_lidar3d::packet::{Packet, Sensor};
 use agv_tests::recordings;
 
@@ -16,7 +17,7 @@ fn it_decodes_to_the_values_printed() {
     let blocks: Vec<_> = packet.blocks().collect();
     assert_eq!(blocks.len(), 12);
     for (index, block) in blocks.iter().enumerate() {
-        assert_eq!((block.is_lower(), block.azimuth()), (index % 2 == 1, 450));
+        assert_eq!((block.bank(), block.azimuth()), (index % 2, 450));
     }
     for (block, expected) in blocks.iter().zip([UPPER, LOWER]) {
         let found = block.returns().map(|value| (value.distance, value.intensity));
@@ -33,7 +34,8 @@ fn the_capture_of_it_holds_the_same_bytes() {
     let Some(capture) = recordings("S2 manual", &format!("{folder}.pcap")) else { return };
     let bytes = std::fs::read(bytes).unwrap();
     let mut angles = Vec::new();
-    let seen = import::velodyne::for_each(&capture, |_, packet| {
+    let seen = capture::for_each(&capture, |_, datagram| {
+        let Datagram::Velodyne(packet) = datagram else { panic!("another sensor") };
         angles.extend(packet.blocks().map(|block| block.azimuth()));
         let expected = Packet::new(&bytes).unwrap();
         for (found, expected) in packet.blocks().zip(expected.blocks()) {

@@ -5,4 +5,3 @@ mod command;
 mod manual;
 mod range_images;
 mod refinement;
-mod velodyne_decoder;

@@ -3,9 +3,10 @@
 use agv_core::measurement::Time;
 use agv_host_sim::export::velodyne::CaptureWriter;
 use agv_host_sim::import::range_image::RangeImages;
-use agv_host_sim::import::velodyne;
+use agv_host_sim::lidar3d::capture;
+use agv_host_sim::lidar3d::kind::Datagram;
 use agv_lidar3d::geometry::Offsets;
-use agv_lidar3d::packet::{Decoder, Filter, Packet, Sensor};
+use agv_lidar3d::packet::{Decoder, Filter, Model, Packet, Sensor};
 use agv_tests::recordings;
 use rayon::prelude::*;
 
@@ -19,14 +20,21 @@ fn all_counts_come_back_from_the_points() {
     let lasers = images.calibration().lasers;
     let columns = images.rotations.len();
     let filter = Filter { near: 0.0, far: 200.0 };
+    let model = Model {
+        sensor: Sensor::Hdl64e,
+        lasers: &lasers,
+        distance_resolution: 0.002,
+        offsets: Offsets::Orthogonal,
+        two_points: true,
+    };
     let compared: usize = (0..images.files.len())
         .into_par_iter()
         .map(|index| {
             let counts = images.counts(index).unwrap();
-            let mut decoder = Decoder::new(Sensor::Hdl64e, &lasers, Offsets::Orthogonal, true, filter);
+            let mut decoder = Decoder::new(&model, filter);
             let mut points = Vec::new();
             for bytes in images.packets(&counts) {
-                decoder.packet(&Packet::new(&bytes).unwrap(), |point| points.push(point));
+                decoder.packet(&Packet::new(&bytes).unwrap(), |point| points.push(point)).unwrap();
             }
             let seen = (0..columns).flat_map(|column| {
                 let rows = counts.iter().skip(column).step_by(columns).enumerate();
@@ -62,7 +70,8 @@ fn a_capture_brings_back_the_packets_it_was_written_from() {
     }
     writer.finish().unwrap();
     let mut found = Vec::new();
-    let seen = velodyne::for_each(&path, |time, packet| {
+    let seen = capture::for_each(&path, |time, datagram| {
+        let Datagram::Velodyne(packet) = datagram else { panic!("another sensor") };
         found.push((time.micros(), packet.blocks().flat_map(|block| block.returns()).collect::<Vec<_>>()));
     })
     .unwrap();

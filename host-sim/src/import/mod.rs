@@ -17,7 +17,6 @@ mod scan_drive;
 mod scan_record;
 mod table;
 pub mod tcp_stream;
-pub mod velodyne;
 
 pub use posed_scan::{BEAMS, KEYPOINTS, PosedScan, RANGES, ScanLog};
 pub use scan_drive::drive;

@@ -118,7 +118,7 @@ impl RangeImages {
     #[must_use]
     pub fn calibration(&self) -> Calibration {
         let laser = |elevation: &f64| Laser { elevation: *elevation, is_enabled: true, ..Laser::default() };
-        Calibration { distance_resolution: self.resolution, lasers: self.elevations.iter().map(laser).collect() }
+        Calibration { distance_resolution: Some(self.resolution), lasers: self.elevations.iter().map(laser).collect() }
     }
 
     /// Angle of the head at the first column, 0.01 degrees.

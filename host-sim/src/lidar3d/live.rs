@@ -5,45 +5,50 @@ use std::net::{Ipv4Addr, UdpSocket};
 use std::time::{Duration, Instant};
 
 use agv_core::measurement::Time;
-use agv_lidar3d::packet::{LENGTH, Packet};
+use agv_lidar3d::packet::ouster;
+
+use super::kind::Datagram;
 
 /// How often somebody may want to stop.
 const PATIENCE: Duration = Duration::from_millis(200);
+/// Bytes of the longest datagram.
+const LONGEST: usize = 1 << 16;
 
 /// A socket to which a sensor sends.
 pub struct Listener {
     socket: UdpSocket,
+    port: u16,
+    ouster: Option<ouster::Sensor>,
+    bytes: Vec<u8>,
     start: Instant,
     /// Datagrams that are no packets.
     pub refused: usize,
 }
 
 impl Listener {
-    /// Listens on a port of all interfaces; port 0 takes any that is free.
+    /// Listens on a port of all interfaces; port 0 takes any that is free. `ouster` describes an Ouster.
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn new(port: u16) -> io::Result<Self> {
+    pub fn new(port: u16, ouster: Option<ouster::Sensor>) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port))?;
         socket.set_read_timeout(Some(PATIENCE))?;
-        Ok(Self { socket, start: Instant::now(), refused: 0 })
+        let port = socket.local_addr()?.port();
+        Ok(Self { socket, port, ouster, bytes: vec![0; LONGEST], start: Instant::now(), refused: 0 })
     }
 
     /// The port.
-    ///
-    /// # Errors
-    /// What the operating system says.
-    pub fn port(&self) -> io::Result<u16> {
-        Ok(self.socket.local_addr()?.port())
+    #[must_use]
+    pub fn port(&self) -> u16 {
+        self.port
     }
 
     /// Waits for a packet, a moment at most, and calls `take` with its time since the beginning. Whether one came.
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn receive(&mut self, take: impl FnOnce(Time, &Packet<'_>)) -> io::Result<bool> {
-        let mut bytes = [0; LENGTH + 1];
-        let length = match self.socket.recv(&mut bytes) {
+    pub fn receive(&mut self, take: impl FnOnce(Time, &Datagram<'_>, &[u8])) -> io::Result<bool> {
+        let length = match self.socket.recv(&mut self.bytes) {
             Ok(length) => length,
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
                 return Ok(false);
@@ -51,9 +56,10 @@ impl Listener {
             Err(error) => return Err(error),
         };
         let time = Time::from_micros(self.start.elapsed().as_micros() as u64);
-        match Packet::new(&bytes[..length]) {
-            Ok(packet) => take(time, &packet),
-            Err(_) => self.refused += 1,
+        let bytes = &self.bytes[..length];
+        match Datagram::recognise(bytes, self.port, self.ouster.as_ref()) {
+            Ok(Some(datagram)) => take(time, &datagram, bytes),
+            Ok(None) | Err(_) => self.refused += 1,
         }
         Ok(true)
     }

@@ -1,5 +1,9 @@
 //! Multi-beam lidars: where their packets come from, and whole revolutions of points.
 
+pub mod capture;
+pub mod clouds;
+pub mod decoder;
+pub mod kind;
 pub mod live;
 pub mod place_map;
 pub mod refinement;

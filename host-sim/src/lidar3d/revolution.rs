@@ -2,8 +2,10 @@
 
 use agv_core::measurement::Time;
 use agv_lidar3d::cloud::RingOrder;
-use agv_lidar3d::packet::{Decoder, Packet, Point, Tally, counts_between};
+use agv_lidar3d::packet::{Point, Tally, counts_between};
 
+use super::decoder::AnyDecoder;
+use super::kind::Datagram;
 use super::setup::Setup;
 
 /// The points of one turn.
@@ -11,7 +13,7 @@ use super::setup::Setup;
 pub struct Revolution {
     /// When its first packet came.
     pub start: Time,
-    /// In the order of the returns.
+    /// In the order of the returns; their times are after `start`, as far as the times of the packets are known.
     pub points: Vec<Point>,
     /// Whether the turn begins and ends within what was received.
     pub is_whole: bool,
@@ -50,7 +52,7 @@ const TURN: u16 = 36_000;
 
 /// Puts packets together to revolutions. A revolution begins where the angle of the head passes zero.
 pub struct Revolutions {
-    decoder: Decoder,
+    decoder: AnyDecoder,
     /// Angle at which a revolution begins, 0.01 degrees.
     beginning: u16,
     current: Revolution,
@@ -62,7 +64,13 @@ impl Revolutions {
     /// Of a sensor.
     #[must_use]
     pub fn new(setup: &Setup) -> Self {
-        Self { decoder: setup.decoder(), current: Revolution::default(), has_begun: false, last: None, beginning: 0 }
+        Self {
+            decoder: AnyDecoder::new(setup),
+            current: Revolution::default(),
+            has_begun: false,
+            last: None,
+            beginning: 0,
+        }
     }
 
     /// Lets revolutions begin at that angle of the head, 0.01 degrees. There the next packet begins one.
@@ -72,12 +80,12 @@ impl Revolutions {
     }
 
     /// Takes a packet; `take` is called with each revolution that it ends.
-    pub fn packet(&mut self, time: Time, packet: &Packet<'_>, mut take: impl FnMut(Revolution)) {
+    pub fn datagram(&mut self, time: Time, datagram: &Datagram<'_>, mut take: impl FnMut(Revolution)) {
         let Self { decoder, beginning, current, has_begun, last } = self;
         if current.points.is_empty() {
             current.start = time;
         }
-        decoder.packet(packet, |point| {
+        decoder.datagram(datagram, |point| {
             let turned = counts_between(*beginning, point.azimuth);
             if last.is_some_and(|last| last > turned && last - turned > TURN / 2) {
                 let next = Revolution {
@@ -91,7 +99,8 @@ impl Revolutions {
                 take(whole);
             }
             *last = Some(turned);
-            current.points.push(point);
+            let after = (1e9 * time.since(current.start)).round() as i32;
+            current.points.push(Point { time: after.saturating_add(point.time), ..point });
         });
     }
 

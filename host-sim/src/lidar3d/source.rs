@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use agv_core::measurement::Time;
-use agv_lidar3d::packet::{LENGTH, PORT, Packet, STATUS_CYCLE, Sensor, Tally};
+use agv_lidar3d::packet::{PORT, Packet, STATUS_CYCLE, Sensor, Tally, ouster};
 
+use super::capture::{self, CaptureError};
+use super::clouds;
+use super::kind::{Datagram, Kind};
 use super::live::Listener;
 use super::revolution::{Revolution, Revolutions};
 use super::setup::{Setup, SetupError, SetupOptions};
-use super::survey::{Survey, Surveyor};
+use super::survey::{Survey, SurveyError, Surveyor};
 use crate::import::range_image::{RangeImageError, RangeImages};
-use crate::import::velodyne::{self, VelodyneError};
 
 /// Time between two range images, us: the sensor turned ten times a second.
 const IMAGE_INTERVAL: u64 = 100_000;
@@ -27,13 +29,16 @@ const LONG_LOOK: usize = 2 * STATUS_CYCLE;
 pub enum SourceError {
     /// The capture.
     #[error(transparent)]
-    Capture(#[from] VelodyneError),
+    Capture(#[from] CaptureError),
     /// The range images.
     #[error(transparent)]
     Images(#[from] RangeImageError),
     /// The sensor or its calibration.
     #[error(transparent)]
     Setup(#[from] SetupError),
+    /// A point cloud.
+    #[error("{0}")]
+    Cloud(String),
     /// The network.
     #[error("UDP port {port}: {problem}")]
     Network {
@@ -67,10 +72,13 @@ pub enum Source {
     Live(u16),
     /// A folder of range images.
     Images(PathBuf),
+    /// Point clouds, a scan each.
+    Clouds(PathBuf, Vec<PathBuf>),
 }
 
 impl Source {
-    /// `udp` or `udp:PORT` is the network, a folder holds range images, and any other name is a capture.
+    /// `udp` or `udp:PORT` is the network, a folder holds range images or point clouds, a name that ends in .pcd, .bin,
+    /// .ply or .las is a point cloud, and any other is a capture.
     ///
     /// # Errors
     /// If the port is no number.
@@ -80,7 +88,11 @@ impl Source {
             Some(rest) if rest.starts_with(':') => {
                 rest[1..].parse().map(Self::Live).map_err(|_| format!("'{}' is no port", &rest[1..]))
             }
-            _ if Path::new(text).is_dir() => Ok(Self::Images(text.into())),
+            _ if Path::new(text).is_dir() => {
+                let found = clouds::in_folder(Path::new(text));
+                if found.is_empty() { Ok(Self::Images(text.into())) } else { Ok(Self::Clouds(text.into(), found)) }
+            }
+            _ if clouds::is_cloud(Path::new(text)) => Ok(Self::Clouds(text.into(), vec![text.into()])),
             _ => Ok(Self::Capture(text.into())),
         }
     }
@@ -89,7 +101,7 @@ impl Source {
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Capture(path) | Self::Images(path) => path.display().to_string(),
+            Self::Capture(path) | Self::Images(path) | Self::Clouds(path, _) => path.display().to_string(),
             Self::Live(port) => format!("UDP port {port}"),
         }
     }
@@ -101,31 +113,45 @@ impl Source {
     pub fn open(self, options: &SetupOptions, stop: &AtomicBool) -> Result<OpenSource, SourceError> {
         match self {
             Self::Capture(path) => {
-                let survey = Survey::of_capture(&path)?;
-                Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Capture(path) })
+                let survey = Survey::of_capture(&path, options).map_err(|error| match error {
+                    SurveyError::Capture(error) => SourceError::Capture(error),
+                    SurveyError::Setup(error) => SourceError::Setup(error),
+                })?;
+                let ouster = options.ouster()?;
+                let packets = Packets::Capture { port: survey.port, path, ouster };
+                Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
             }
             Self::Images(path) => {
                 let images = RangeImages::open(&path)?;
                 let survey = Survey {
-                    sensor: Some(Sensor::Hdl64e),
+                    kind: Some(Kind::Velodyne(Sensor::Hdl64e)),
                     calibration: Some(images.calibration()),
                     ..Survey::default()
                 };
                 Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Images(images) })
             }
+            Self::Clouds(path, files) => {
+                let first = files.first().ok_or_else(|| SourceError::Cloud(format!("{}: no cloud", path.display())))?;
+                let (_, lasers) = clouds::read(first).map_err(SourceError::Cloud)?;
+                let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, ..Survey::default() };
+                let setup = Some(Setup::of_clouds(options, lasers));
+                Ok(OpenSource { options: options.clone(), setup, survey, packets: Packets::Clouds(files) })
+            }
             Self::Live(port) => {
                 let network = |problem| SourceError::Network { port, problem };
-                let mut listener = Listener::new(port).map_err(network)?;
+                let ouster = options.ouster()?;
+                let mut listener = Listener::new(port, ouster.clone()).map_err(network)?;
                 let mut surveyor = Surveyor::default();
                 let mut waiting = Vec::new();
                 while !stop.load(Ordering::Relaxed) {
                     listener
-                        .receive(|time, packet| {
-                            surveyor.packet(time, packet);
-                            waiting.push((time, Box::new(packet.bytes())));
+                        .receive(|time, datagram, bytes| {
+                            surveyor.datagram(time, datagram);
+                            waiting.push((time, bytes.to_vec()));
                         })
                         .map_err(network)?;
-                    let needs_calibration = options.calibration.is_none() && surveyor.sensor() == Some(Sensor::Hdl64e);
+                    let needs_calibration =
+                        options.calibration.is_none() && surveyor.kind() == Some(Kind::Velodyne(Sensor::Hdl64e));
                     if waiting.len() >= (if needs_calibration { LONG_LOOK } else { LOOK }) {
                         break;
                     }
@@ -134,7 +160,7 @@ impl Source {
                     return Err(SourceError::Silent { port });
                 }
                 let survey = surveyor.finish();
-                let packets = Packets::Live { port, listener, waiting };
+                let packets = Packets::Live { port, listener, waiting, ouster };
                 Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
             }
         }
@@ -142,9 +168,10 @@ impl Source {
 }
 
 enum Packets {
-    Capture(PathBuf),
+    Capture { path: PathBuf, port: Option<u16>, ouster: Option<ouster::Sensor> },
     Images(RangeImages),
-    Live { port: u16, listener: Listener, waiting: Vec<(Time, Box<[u8; LENGTH]>)> },
+    Clouds(Vec<PathBuf>),
+    Live { port: u16, listener: Listener, waiting: Vec<(Time, Vec<u8>)>, ouster: Option<ouster::Sensor> },
 }
 
 /// A source that has been looked at.
@@ -177,8 +204,9 @@ impl OpenSource {
     #[must_use]
     pub fn length(&self) -> Option<u64> {
         match &self.packets {
-            Packets::Capture(_) => Some(self.survey.turns.ceil() as u64),
+            Packets::Capture { .. } => Some(self.survey.turns.ceil() as u64),
             Packets::Images(images) => Some(images.files.len() as u64),
+            Packets::Clouds(files) => Some(files.len() as u64),
             Packets::Live { .. } => None,
         }
     }
@@ -194,10 +222,13 @@ impl OpenSource {
         mut take: impl FnMut(Revolution) -> ControlFlow<()>,
     ) -> Result<Tally, SourceError> {
         let setup = self.setup()?;
+        if let Packets::Clouds(files) = &self.packets {
+            return cloud_revolutions(files, &setup, stop, take);
+        }
         let mut revolutions = Revolutions::new(&setup);
         let mut flow = ControlFlow::Continue(());
-        let mut push = |time: Time, packet: &Packet<'_>, revolutions: &mut Revolutions| {
-            revolutions.packet(time, packet, |revolution| {
+        let mut push = |time: Time, datagram: &Datagram<'_>, revolutions: &mut Revolutions| {
+            revolutions.datagram(time, datagram, |revolution| {
                 if flow.is_continue() {
                     flow = take(revolution);
                 }
@@ -205,8 +236,10 @@ impl OpenSource {
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { flow }
         };
         let name = match &mut self.packets {
-            Packets::Capture(path) => {
-                velodyne::for_each_until(path, |time, packet| push(time, packet, &mut revolutions))?;
+            Packets::Capture { path, port, ouster } => {
+                capture::for_each_until(path, *port, ouster.as_ref(), |time, datagram| {
+                    push(time, datagram, &mut revolutions)
+                })?;
                 path.display().to_string()
             }
             Packets::Images(images) => {
@@ -215,7 +248,7 @@ impl OpenSource {
                     let time = Time::from_micros(index as u64 * IMAGE_INTERVAL);
                     let counts = images.counts(index)?;
                     let flows = images.packets(&counts).iter().try_for_each(|bytes| match Packet::new(bytes) {
-                        Ok(packet) => push(time, &packet, &mut revolutions),
+                        Ok(packet) => push(time, &Datagram::Velodyne(packet), &mut revolutions),
                         Err(_) => ControlFlow::Continue(()),
                     });
                     if flows.is_break() {
@@ -224,14 +257,18 @@ impl OpenSource {
                 }
                 "the range images".to_owned()
             }
-            Packets::Live { port, listener, waiting } => {
-                let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| match Packet::new(&bytes[..]) {
-                    Ok(packet) => push(time, &packet, &mut revolutions),
-                    Err(_) => ControlFlow::Continue(()),
+            Packets::Clouds(_) => String::new(),
+            Packets::Live { port, listener, waiting, ouster } => {
+                let port_now = listener.port();
+                let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
+                    match Datagram::recognise(&bytes, port_now, ouster.as_ref()) {
+                        Ok(Some(datagram)) => push(time, &datagram, &mut revolutions),
+                        Ok(None) | Err(_) => ControlFlow::Continue(()),
+                    }
                 });
                 while is_going.is_continue() && !stop.load(Ordering::Relaxed) {
                     listener
-                        .receive(|time, packet| is_going = push(time, packet, &mut revolutions))
+                        .receive(|time, datagram, _| is_going = push(time, datagram, &mut revolutions))
                         .map_err(|problem| SourceError::Network { port: *port, problem })?;
                 }
                 format!("UDP port {port}")
@@ -251,4 +288,30 @@ impl OpenSource {
         }
         Ok(tally)
     }
+}
+
+/// Each file as a revolution.
+fn cloud_revolutions(
+    files: &[PathBuf],
+    setup: &Setup,
+    stop: &AtomicBool,
+    mut take: impl FnMut(Revolution) -> ControlFlow<()>,
+) -> Result<Tally, SourceError> {
+    let mut tally = Tally::default();
+    for (number, path) in files.iter().enumerate() {
+        let (mut revolution, _) = clouds::read(path).map_err(SourceError::Cloud)?;
+        revolution.start = Time::from_micros(number as u64 * IMAGE_INTERVAL);
+        let all = revolution.points.len();
+        let range = |[x, y, z]: [f32; 3]| (x * x + y * y + z * z).sqrt();
+        revolution.points.retain(|point| range(point.position) >= setup.filter.near);
+        tally.near += (all - revolution.points.len()) as u64;
+        let far = revolution.points.len();
+        revolution.points.retain(|point| range(point.position) <= setup.filter.far);
+        tally.far += (far - revolution.points.len()) as u64;
+        tally.points += revolution.points.len() as u64;
+        if take(revolution).is_break() || stop.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    Ok(tally)
 }

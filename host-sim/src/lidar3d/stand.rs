@@ -18,7 +18,8 @@ use super::source::{OpenSource, SourceError};
 pub fn returns(mut source: OpenSource, stop: &AtomicBool) -> Result<Vec<Return>, SourceError> {
     let setup = source.setup()?;
     source.decode_with(Setup {
-        // Only the distance correction stays, because the filter is for corrected distances.
+        // Only the distance correction stays, because the filter is for corrected distances. Of an Ouster, whose
+        // calibration is not searched for, nothing is left out.
         lasers: setup.lasers.iter().map(level).collect(),
         offsets: Offsets::Orthogonal,
         two_points: false,

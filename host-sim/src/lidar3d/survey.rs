@@ -1,26 +1,44 @@
 //! What a stream of packets is, before any of it is decoded.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use agv_core::measurement::Time;
 use agv_lidar3d::calibration::Calibration;
-use agv_lidar3d::packet::{Packet, Sensor, Tail, calibration_from_stream, counts_between};
+use agv_lidar3d::packet::{Packet, Sensor, Tail, calibration_from_stream, counts_between, hesai};
 
-use crate::import::velodyne::{self, VelodyneError};
+use super::capture::{self, CaptureError};
+use super::kind::{Datagram, Kind};
+use super::setup::{SetupError, SetupOptions};
+
+/// Why nothing is known of a capture.
+#[derive(Debug, thiserror::Error)]
+pub enum SurveyError {
+    /// The capture.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// What somebody states about the sensor.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+}
 
 /// What a stream says about itself.
 #[derive(Clone, Debug, Default)]
 pub struct Survey {
     /// Packets of a sensor.
     pub packets: usize,
-    /// Packets to its port that are none.
+    /// Packets that come near to being one.
     pub refused: usize,
+    /// UDP port to which the sensor sends, in a capture.
+    pub port: Option<u16>,
     /// Other packets.
     pub other: usize,
     /// Whether the file ends in the middle of a packet.
     pub is_cut: bool,
     /// Kind of sensor.
-    pub sensor: Option<Sensor>,
+    pub kind: Option<Kind>,
+    /// Which returns of a firing are sent, if the packets state it.
+    pub return_mode: Option<String>,
     /// Text in the tails, if they are of the early dialect: the version of the firmware.
     pub version: Option<String>,
     /// Calibration that the packets carry.
@@ -35,12 +53,21 @@ impl Survey {
     /// Looks through a capture.
     ///
     /// # Errors
-    /// See [`VelodyneError`].
-    pub fn of_capture(path: &Path) -> Result<Self, VelodyneError> {
+    /// See [`SurveyError`].
+    pub fn of_capture(path: &Path, options: &SetupOptions) -> Result<Self, SurveyError> {
+        let ouster = options.ouster()?;
         let mut surveyor = Surveyor::default();
-        let seen = velodyne::for_each(path, |time, packet| surveyor.packet(time, packet))?;
+        let seen = capture::for_each_until(path, options.port, ouster.as_ref(), |time, datagram| {
+            surveyor.datagram(time, datagram);
+            ControlFlow::Continue(())
+        })?;
         let mut survey = surveyor.finish();
         (survey.refused, survey.other, survey.is_cut) = (seen.refused, seen.other, seen.is_cut);
+        survey.port = seen.port;
+        if let Some(ouster) = ouster {
+            let columns = survey.packets * ouster.columns_per_packet;
+            survey.turns = columns as f64 / f64::from(ouster.columns_per_frame);
+        }
         Ok(survey)
     }
 
@@ -62,32 +89,58 @@ pub struct Surveyor {
 
 impl Surveyor {
     /// One packet.
-    pub fn packet(&mut self, time: Time, packet: &Packet<'_>) {
+    pub fn datagram(&mut self, time: Time, datagram: &Datagram<'_>) {
         let survey = &mut self.survey;
         survey.packets += 1;
         survey.span = Some((survey.span.map_or(time, |(first, _)| first), time));
+        match datagram {
+            Datagram::Velodyne(packet) => self.velodyne(packet),
+            Datagram::Hesai(packet) => self.hesai(packet),
+            Datagram::Ouster(_) => survey.kind = Some(Kind::Ouster),
+        }
+    }
+
+    fn hesai(&mut self, packet: &hesai::Packet<'_>) {
+        self.survey.kind = Some(Kind::Hesai(packet.sensor()));
+        self.survey.return_mode.get_or_insert_with(|| match packet.kinds() {
+            (first, None) => first.name().to_owned(),
+            (first, Some(second)) => format!("{} and {}", first.name(), second.name()),
+        });
+        for azimuth in (0..packet.blocks()).filter_map(|block| packet.azimuth(block)) {
+            self.turn_to(azimuth);
+        }
+    }
+
+    fn velodyne(&mut self, packet: &Packet<'_>) {
+        let survey = &mut self.survey;
         // One packet of lower lasers tells an HDL-64E, even among others that state nothing.
-        if survey.sensor != Some(Sensor::Hdl64e) {
-            survey.sensor = Sensor::of_packet(packet).or(survey.sensor);
+        if survey.kind != Some(Kind::Velodyne(Sensor::Hdl64e)) {
+            survey.kind = Sensor::of_packet(packet).map(Kind::Velodyne).or(survey.kind);
         }
         let tail = packet.tail();
+        if survey.kind.is_some_and(|kind| kind != Kind::Velodyne(Sensor::Hdl64e)) {
+            survey.return_mode = tail.return_mode().map(|mode| mode.name().to_owned());
+        }
         if let (None, Some((_, text))) = (&survey.version, tail.early()) {
             survey.version = Some(text.iter().map(|byte| char::from(*byte)).collect());
         }
         self.tails.push(tail);
         for block in packet.blocks() {
-            let azimuth = block.azimuth();
-            if let Some(last) = self.last_azimuth {
-                self.counts += u64::from(counts_between(last, azimuth));
-            }
-            self.last_azimuth = Some(azimuth);
+            self.turn_to(block.azimuth());
         }
+    }
+
+    fn turn_to(&mut self, azimuth: u16) {
+        if let Some(last) = self.last_azimuth {
+            self.counts += u64::from(counts_between(last, azimuth));
+        }
+        self.last_azimuth = Some(azimuth);
     }
 
     /// The kind of sensor, as far as it is known.
     #[must_use]
-    pub fn sensor(&self) -> Option<Sensor> {
-        self.survey.sensor
+    pub fn kind(&self) -> Option<Kind> {
+        self.survey.kind
     }
 
     /// What was found.
@@ -95,7 +148,7 @@ impl Surveyor {
     pub fn finish(self) -> Survey {
         let mut survey = self.survey;
         survey.turns = self.counts as f64 / 36_000.0;
-        if survey.sensor == Some(Sensor::Hdl64e) {
+        if survey.kind == Some(Kind::Velodyne(Sensor::Hdl64e)) {
             survey.calibration = calibration_from_stream(self.tails);
         } else {
             survey.version = None;

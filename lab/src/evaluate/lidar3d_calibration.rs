@@ -7,6 +7,7 @@ use std::time::Instant;
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::intrinsic::{self, Deviation, Residual, Return, Target};
+use agv_lidar3d::packet::Sensor as Model;
 use anyhow::Context;
 use serde::Serialize;
 
@@ -79,8 +80,8 @@ pub fn run(path: &Path, offsets: Offsets, residual: Residual, seed: u64) -> anyh
     let name = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
     let calibration = Calibration::read(&text).with_context(|| format!("{name}"))?;
-    let sensor =
-        Sensor { lasers: &calibration.lasers, offsets, resolution: calibration.distance_resolution, noise: NOISE };
+    let resolution = calibration.distance_resolution.unwrap_or(Model::Hdl64e.distance_resolution());
+    let sensor = Sensor { lasers: &calibration.lasers, offsets, resolution, noise: NOISE };
     let start = disturbed(&calibration.lasers, &mut Random::new(seed, Stream::LaserParameters));
     let mut random = Random::new(seed, Stream::MultiBeam);
     let used: Vec<Vec<Return>> =

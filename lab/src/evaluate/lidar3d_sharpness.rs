@@ -103,7 +103,12 @@ pub fn moosmann(folder: &Path) -> anyhow::Result<Outcome> {
     };
     let (used, held_out) = (scans(0)?, scans(STEP / 2)?);
     let targets: Vec<Target> = used.iter().map(|(_, target)| target.clone()).collect();
-    let prior = Deviation { distance: PRIOR[0], elevation: PRIOR[1].to_radians(), rotation: PRIOR[2].to_radians() };
+    let prior = Deviation {
+        distance: PRIOR[0],
+        elevation: PRIOR[1].to_radians(),
+        rotation: PRIOR[2].to_radians(),
+        ..Deviation::FACTORY
+    };
     let found = calibrate_near(&lasers, Offsets::Orthogonal, Residual::AlongBeam, &prior, &targets)
         .context("the patches of ground and facades")?;
     let thickness = |patches: &[(Kind, Target)], kind| thickness(patches, kind, &lasers, &found.lasers);

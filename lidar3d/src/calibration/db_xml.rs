@@ -17,7 +17,7 @@ pub(super) fn read(text: &str) -> Result<Calibration, CalibrationError> {
     let document = Document::parse_with_options(text, options).map_err(|error| foreign(&error.to_string()))?;
     let db = child(document.root_element(), "DB").ok_or_else(|| foreign("there is no element DB"))?;
     let points = child(db, "points_").ok_or_else(|| foreign("there is no element points_"))?;
-    let resolution = number(db, "distLSB_").ok_or_else(|| foreign("there is no distLSB_"))?;
+    let resolution = number(db, "distLSB_").map(|centimetres| centimetres * CENTIMETRE);
     let list = |name| {
         let items =
             child(db, name).into_iter().flat_map(|list| list.children().filter(|node| node.has_tag_name("item")));
@@ -59,7 +59,7 @@ pub(super) fn read(text: &str) -> Result<Calibration, CalibrationError> {
     if lasers.is_empty() {
         return Err(foreign("it holds no laser"));
     }
-    Ok(Calibration { distance_resolution: resolution * CENTIMETRE, lasers })
+    Ok(Calibration { distance_resolution: resolution, lasers })
 }
 
 fn child<'a, 'input>(node: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
@@ -81,7 +81,9 @@ pub(super) fn write(calibration: &Calibration) -> String {
          <boost_serialization signature=\"serialization::archive\" version=\"4\">\n\
          <DB class_id=\"0\" tracking_level=\"1\" version=\"0\" object_id=\"_0\">\n",
     );
-    let _ = writeln!(text, "\t<distLSB_>{}</distLSB_>", calibration.distance_resolution / CENTIMETRE);
+    if let Some(resolution) = calibration.distance_resolution {
+        let _ = writeln!(text, "\t<distLSB_>{}</distLSB_>", resolution / CENTIMETRE);
+    }
     text += &list("enabled_", &|laser| u8::from(laser.is_enabled));
     if lasers.iter().any(|laser| laser.full.is_some()) {
         text += &list("minIntensity_", &|laser| laser.full.map_or(0, |full| full.min_intensity));

@@ -4,6 +4,8 @@
 mod db_xml;
 #[cfg(feature = "std")]
 mod file;
+#[cfg(feature = "std")]
+mod hesai_csv;
 mod laser;
 #[cfg(feature = "std")]
 mod ros_yaml;

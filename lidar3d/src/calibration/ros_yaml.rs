@@ -12,27 +12,26 @@ const LONGEST_REASON: usize = 120;
 
 #[derive(Serialize, Deserialize)]
 struct File {
-    #[serde(default = "default_resolution")]
-    distance_resolution: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    distance_resolution: Option<f64>,
     lasers: Vec<Entry>,
     #[serde(skip_serializing_if = "Option::is_none")]
     num_lasers: Option<usize>,
 }
 
-fn default_resolution() -> f64 {
-    0.002
-}
-
 #[derive(Serialize, Deserialize)]
 struct Entry {
     laser_id: i64,
+    #[serde(default)]
     rot_correction: f64,
     vert_correction: f64,
+    #[serde(default)]
     dist_correction: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     dist_correction_x: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dist_correction_y: Option<f64>,
+    #[serde(default)]
     vert_offset_correction: f64,
     #[serde(default)]
     horiz_offset_correction: f64,

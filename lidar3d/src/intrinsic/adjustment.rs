@@ -2,19 +2,25 @@
 //!
 //! Minimising over the lasers and the planes together has the same minimum as fitting each plane anew in every step.
 //! Unlike 3.7 the sum is not divided by the points of its scan: every point tells as much as every other.
+//!
+//! Walls do not show everything: upright ones hardly say where a beam points up or down. So the factory's values count as
+//! measurements of their own, and what the walls do not show stays at them. How far they may be off is learnt from the
+//! lasers together, beginning with what factories are believed to reach. Nor is the noise of the points all that is wrong with ranges: the ranges of a scan may be too long together, and
+//! those of a laser on a wall by themselves. Both are unknowns of their own, and the residuals tell how great they are.
 
 use std::vec;
 use std::vec::Vec;
 
-use nalgebra::{Matrix3, Vector3};
-
-use super::normal_equations::{LaserEquations, PlaneSums};
-use super::{Plane, Return, Target};
+use super::normal_equations::{LaserEquations, LaserMatrix, PlaneSums};
+use super::sight::{LaserVector, OF_LASER, Sight};
+use super::{Plane, Target};
 use crate::calibration::Laser;
-use crate::geometry::{Offsets, jacobian};
+use crate::geometry::{Offsets, jacobian, offset_jacobian};
 
 /// Rounds at most.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 60;
+/// Rounds before the residuals tell how great the errors of the ranges are: at first they show those of the start.
+const FIRST_ROUNDS: usize = 4;
 /// A laser with fewer points is held where it is.
 const LEAST_POINTS: usize = 100;
 /// From here on points do not count, in deviations of the noise (Tukey's biweight, 95 % as efficient as least squares).
@@ -25,7 +31,24 @@ const MEDIAN_DEVIATE: f64 = 0.6745;
 const SMALL: f64 = 0.02;
 /// So do steps below this part of the standard deviation to which a parameter is known before: where surfaces are not quite
 /// planes, which points count changes a little for ever.
-const SMALL_TO_KNOWN: f64 = 0.05;
+const SMALL_TO_KNOWN: f64 = 0.002;
+/// A parameter whose deviation is not below this part of that of the start is held at the factory's value, as good as.
+const HELD: f64 = 0.7;
+/// At which distance a calibration must be better than the factory's, m, and to which part the deviation of a point must
+/// fall there.
+const JUDGED_AT: f64 = 10.0;
+const GAINED: f64 = 0.9;
+/// Errors of ranges to begin with, standard deviations, m: of all in a scan (the accuracy that makers state), and of a
+/// laser's own on a wall.
+const COMMON_ERROR: f64 = 0.01;
+const OWN_ERROR: f64 = 0.005;
+/// Below this they are none, m.
+const NO_ERROR: f64 = 1e-5;
+
+/// Believed deviations of the start count like those of so many values; what is learnt stays between these parts of them.
+const FEW: f64 = 0.5;
+const LEAST_OFF: f64 = 0.02;
+const MOST_OFF: f64 = 4.0;
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,9 +61,6 @@ pub enum Residual {
     Perpendicular,
 }
 
-/// Sine of the angle at which a beam meets its plane: from 12 deg downwards points count less, below 6 deg not at all.
-const OBLIQUE: [f64; 2] = [0.1, 0.2];
-
 /// Why there is no calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AdjustmentError {
@@ -50,6 +70,15 @@ pub enum AdjustmentError {
     /// The scans do not determine the parameters.
     #[error("the scans do not determine the lasers: scan the plane from more distances and at more tilts")]
     Undetermined,
+    /// Points would be hardly better known than with the factory's values.
+    #[error(
+        "the scans say hardly more than the factory's values ({percent} % of their deviation is left): scan the plane \
+         from more distances and at more tilts"
+    )]
+    NothingGained {
+        /// Deviation of a point at 10 m, of that with the factory's values.
+        percent: u32,
+    },
     /// It does not settle.
     #[error("it does not settle within {ROUNDS} rounds: the start is too far off, or the targets are no planes")]
     Unsettled,
@@ -64,6 +93,46 @@ pub struct Deviation {
     pub elevation: f64,
     /// Of alpha, rad; the mean of all alpha is held.
     pub rotation: f64,
+    /// Of V_o, m.
+    pub vertical_offset: f64,
+    /// Of H_o, m.
+    pub horizontal_offset: f64,
+}
+
+impl Deviation {
+    /// Those that a factory's values are believed to have: 2 cm, 0.1 deg, 0.3 deg, and 5 mm of the offsets.
+    pub const FACTORY: Self = Self {
+        distance: 0.02,
+        elevation: 0.1 * core::f64::consts::PI / 180.0,
+        rotation: 0.3 * core::f64::consts::PI / 180.0,
+        vertical_offset: 0.005,
+        horizontal_offset: 0.005,
+    };
+
+    fn vector(&self) -> LaserVector {
+        let Self { distance, elevation, rotation, vertical_offset, horizontal_offset } = *self;
+        LaserVector::new(distance, elevation, rotation, vertical_offset, horizontal_offset)
+    }
+
+    fn of_vector(vector: LaserVector) -> Self {
+        let [distance, elevation, rotation, vertical_offset, horizontal_offset] = vector.into();
+        Self { distance, elevation, rotation, vertical_offset, horizontal_offset }
+    }
+}
+
+/// Which parameters of a laser the scans hardly show, so that they are the factory's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Held {
+    /// D_corr.
+    pub distance: bool,
+    /// Theta.
+    pub elevation: bool,
+    /// Alpha.
+    pub rotation: bool,
+    /// V_o.
+    pub vertical_offset: bool,
+    /// H_o.
+    pub horizontal_offset: bool,
 }
 
 /// A calibration found.
@@ -75,11 +144,46 @@ pub struct Adjustment {
     pub deviations: Vec<Option<Deviation>>,
     /// Standard deviation of the residuals, m.
     pub noise: f64,
+    /// Standard deviation of the error that the ranges of one laser on one target have together, m.
+    pub range_error: f64,
+    /// By how much all ranges of each target's scan are too long, m, as far as the targets contradict each other.
+    pub common_range_errors: Vec<f64>,
     /// Rounds that it took.
     pub rounds: usize,
+    /// How far the values of the start are off, as the scans of all lasers together tell: standard deviations.
+    pub start_deviation: Deviation,
+    covariances: Vec<Option<LaserMatrix>>,
 }
 
-/// Finds D_corr, theta and alpha of all lasers. The offsets V_o and H_o stay as they are, and so does the mean of alpha.
+impl Adjustment {
+    /// Which parameters of a laser are the factory's, as the scans hardly show them. Of a laser that was not observed, all.
+    #[must_use]
+    pub fn held(&self, laser: usize) -> Held {
+        let Some(found) = self.deviations.get(laser).copied().flatten() else {
+            return Held {
+                distance: true,
+                elevation: true,
+                rotation: true,
+                vertical_offset: true,
+                horizontal_offset: true,
+            };
+        };
+        let [distance, elevation, rotation, vertical_offset, horizontal_offset] =
+            found.vector().zip_map(&self.start_deviation.vector(), |found, start| found > HELD * start).into();
+        Held { distance, elevation, rotation, vertical_offset, horizontal_offset }
+    }
+
+    /// Standard deviation of the place of a point that a laser sees at a distance, m, all three coordinates together,
+    /// without the noise of its range. None for a laser that was not observed.
+    #[must_use]
+    pub fn point_deviation(&self, laser: usize, offsets: Offsets, distance: f64) -> Option<f64> {
+        let covariance = self.covariances.get(laser)?.as_ref()?;
+        Some(point_deviation(self.lasers.get(laser)?, offsets, distance, covariance))
+    }
+}
+
+/// Finds D_corr, theta and alpha of all lasers, and V_o and H_o. What the start is off is learnt, from
+/// [`Deviation::FACTORY`] on; the mean of alpha stays as it is.
 ///
 /// # Errors
 /// See [`AdjustmentError`].
@@ -89,10 +193,15 @@ pub fn calibrate(
     residual: Residual,
     targets: &[Target],
 ) -> Result<Adjustment, AdjustmentError> {
-    adjust(start, offsets, residual, None, targets)
+    let found = adjust(start, offsets, residual, (&Deviation::FACTORY, true), targets)?;
+    let part = found.part_left(offsets);
+    if part > GAINED {
+        return Err(AdjustmentError::NothingGained { percent: (100.0 * part).round() as u32 });
+    }
+    Ok(found)
 }
 
-/// As [`calibrate`], where the start is known to these standard deviations: what the targets hardly show stays near it.
+/// As [`calibrate`], where the start is known to these standard deviations, and however little is gained.
 ///
 /// # Errors
 /// See [`AdjustmentError`].
@@ -103,14 +212,15 @@ pub fn calibrate_near(
     prior: &Deviation,
     targets: &[Target],
 ) -> Result<Adjustment, AdjustmentError> {
-    adjust(start, offsets, residual, Some(prior), targets)
+    adjust(start, offsets, residual, (prior, false), targets)
 }
 
+/// With what is known of the start, and whether to learn more of that.
 fn adjust(
     start: &[Laser],
     offsets: Offsets,
     residual: Residual,
-    prior: Option<&Deviation>,
+    (prior, is_learning): (&Deviation, bool),
     targets: &[Target],
 ) -> Result<Adjustment, AdjustmentError> {
     let mut points = vec![0_usize; start.len()];
@@ -123,137 +233,237 @@ fn adjust(
     if !is_observed.contains(&true) {
         return Err(AdjustmentError::NoPoints);
     }
-    let mut lasers = start.to_vec();
-    let mut planes: Vec<Plane> = targets.iter().map(|target| target.plane).collect();
-    let known = prior.map_or(Vector3::zeros(), |prior| Vector3::new(prior.distance, prior.elevation, prior.rotation));
+    let problem = Problem { start, offsets, residual, prior: prior.vector(), is_learning, targets, is_observed };
+    let mut state = State {
+        lasers: start.to_vec(),
+        planes: targets.iter().map(|target| (target.plane, 0.0)).collect(),
+        own: OWN_ERROR,
+        common: COMMON_ERROR,
+        known: prior.vector(),
+    };
     for round in 1..=ROUNDS {
-        let noise = noise(&lasers, offsets, residual, targets, &planes);
-        let sums: Vec<PlaneSums> = targets
-            .iter()
-            .zip(&planes)
-            .map(|(target, plane)| sums(&lasers, offsets, residual, target, plane, noise))
-            .collect();
-        let shift = lasers.iter().zip(start).zip(&is_observed).filter(|(_, is_observed)| **is_observed);
-        let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
-        let observed = is_observed.iter().filter(|is_observed| **is_observed).count();
-        let mut equations = LaserEquations::new(&sums, &is_observed, shift / observed as f64);
-        if prior.is_some() {
-            let weights = known.map(|deviation| (noise / deviation).powi(2));
-            let off = lasers.iter().zip(start).map(|(laser, start)| {
-                let by = [laser.distance - start.distance, laser.elevation - start.elevation];
-                Vector3::new(by[0], by[1], laser.rotation - start.rotation)
-            });
-            equations.hold_near(&weights, off);
-        }
-        let (steps, variances) = equations.solve().ok_or(AdjustmentError::Undetermined)?;
-        for (laser, step) in lasers.iter_mut().zip(&steps) {
-            laser.distance += step[0];
-            laser.elevation += step[1];
-            laser.rotation += step[2];
-        }
-        for (plane, sums) in planes.iter_mut().zip(&sums) {
-            // A plane whose points all graze it or lie far off stays where it is, and moves no laser.
-            if let Some(step) = sums.plane_step(&steps) {
-                *plane = plane.moved(step.into());
-            }
-        }
-        let deviations: Vec<Vector3<f64>> = variances.iter().map(|variance| variance.map(libm::sqrt) * noise).collect();
-        let is_small = |(step, deviation): (&Vector3<f64>, &Vector3<f64>)| {
-            (0..3).all(|parameter| {
-                step[parameter].abs() < (SMALL * deviation[parameter]).max(SMALL_TO_KNOWN * known[parameter])
-            })
-        };
-        if steps.iter().zip(&deviations).all(is_small) {
-            let deviations = deviations.iter().zip(&is_observed).map(|(deviation, is_observed)| {
-                let [distance, elevation, rotation] = (*deviation).into();
-                is_observed.then_some(Deviation { distance, elevation, rotation })
-            });
-            return Ok(Adjustment { deviations: deviations.collect(), lasers, noise, rounds: round });
+        let outcome = problem.step(&mut state, round > FIRST_ROUNDS)?;
+        if outcome.is_settled && round > FIRST_ROUNDS {
+            return Ok(problem.found(state, outcome, round));
         }
     }
     Err(AdjustmentError::Unsettled)
 }
 
-/// Where a return lies to its plane.
-struct Sight {
-    /// From the plane, m.
-    residual: f64,
-    /// The residual's derivatives by D_corr, theta and alpha.
-    by_laser: Vector3<f64>,
-    /// The same by the normal itself.
-    by_normal: Vector3<f64>,
-    /// The same by the plane's distance.
-    by_distance: f64,
-    /// Between 0 and 1.
-    weight: f64,
+/// What does not change from round to round.
+struct Problem<'a> {
+    start: &'a [Laser],
+    offsets: Offsets,
+    residual: Residual,
+    /// Standard deviations of the start, as they are believed to be.
+    prior: LaserVector,
+    is_learning: bool,
+    targets: &'a [Target],
+    is_observed: Vec<bool>,
 }
 
-impl Sight {
-    /// None if there is no such laser, or the beam only grazes the plane.
-    fn new(lasers: &[Laser], offsets: Offsets, kind: Residual, seen: &Return, plane: &Plane) -> Option<Self> {
-        let laser = lasers.get(seen.laser)?;
-        let normal = Vector3::from(plane.normal);
-        // Its columns are the rows of the Jacobian.
-        let derivatives = |distance| Matrix3::from(jacobian(laser, offsets, seen.azimuth, distance));
-        let at = derivatives(seen.distance);
-        let perpendicular = plane.distance_of(seen.point(lasers, offsets)?);
-        let point = Vector3::from(seen.point(lasers, offsets)?);
-        match kind {
-            Residual::Perpendicular => Some(Self {
-                residual: perpendicular,
-                by_laser: at * normal,
-                by_normal: point,
-                by_distance: -1.0,
-                weight: 1.0,
-            }),
-            Residual::AlongBeam => {
-                let beam = at.row(0).transpose();
-                let incidence = beam.dot(&normal);
-                let [least, full] = OBLIQUE;
-                if incidence.abs() < least {
-                    return None;
-                }
-                // Where the beam meets the plane: derivatives there do not carry the noise of the distance.
-                let residual = perpendicular / incidence;
-                Some(Self {
-                    residual,
-                    by_laser: derivatives(seen.distance - residual) * normal / incidence,
-                    by_normal: (point - beam * residual) / incidence,
-                    by_distance: -1.0 / incidence,
-                    weight: ((incidence.abs() - least) / (full - least)).min(1.0),
-                })
+/// What is sought.
+struct State {
+    lasers: Vec<Laser>,
+    /// With the common error of the ranges, m.
+    planes: Vec<(Plane, f64)>,
+    /// Standard deviations of the errors of ranges, m.
+    own: f64,
+    common: f64,
+    /// Standard deviations of the start, as far as they are learnt.
+    known: LaserVector,
+}
+
+/// What a round found.
+struct Outcome {
+    noise: f64,
+    covariances: Vec<LaserMatrix>,
+    is_settled: bool,
+}
+
+impl Problem<'_> {
+    /// One round of Gauss and Newton.
+    fn step(&self, state: &mut State, has_settled_once: bool) -> Result<Outcome, AdjustmentError> {
+        let noise = self.noise(state);
+        let mut sums: Vec<PlaneSums> = self
+            .targets
+            .iter()
+            .zip(&state.planes)
+            .map(|(target, plane)| self.sums(&state.lasers, target, (&plane.0, plane.1), noise))
+            .collect();
+        if has_settled_once {
+            state.own = self.own_error(&sums, noise);
+        }
+        let part = |deviation: f64| (deviation / noise).powi(2);
+        for (sums, (_, bias)) in sums.iter_mut().zip(&state.planes) {
+            sums.close(part(state.own), part(state.common), *bias);
+        }
+        if has_settled_once {
+            state.common = common_error(&sums, &state.planes, noise);
+        }
+        let (steps, covariances) = self.equations(state, &sums, noise).solve().ok_or(AdjustmentError::Undetermined)?;
+        for (laser, step) in state.lasers.iter_mut().zip(&steps) {
+            laser.distance += step[0];
+            laser.elevation += step[1];
+            laser.rotation += step[2];
+            laser.vertical_offset += step[3];
+            laser.horizontal_offset += step[4];
+        }
+        for ((plane, bias), sums) in state.planes.iter_mut().zip(&sums) {
+            // A plane whose points all graze it or lie far off stays where it is, and moves no laser.
+            if let Some(step) = sums.plane_step(&steps) {
+                *plane = plane.moved([step[0], step[1], step[2]]);
+                *bias += step[3];
             }
         }
-    }
-}
-
-/// Standard deviation of the residuals, by the median, m.
-fn noise(lasers: &[Laser], offsets: Offsets, kind: Residual, targets: &[Target], planes: &[Plane]) -> f64 {
-    let residuals = targets.iter().zip(planes).flat_map(|(target, plane)| {
-        let sights = target.returns.iter().filter_map(|seen| Sight::new(lasers, offsets, kind, seen, plane));
-        sights.map(|sight| sight.residual.abs())
-    });
-    let mut residuals: Vec<f64> = residuals.collect();
-    if residuals.is_empty() {
-        return f64::INFINITY;
-    }
-    let middle = residuals.len() / 2;
-    let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / MEDIAN_DEVIATE).max(1e-6)
-}
-
-fn sums(lasers: &[Laser], offsets: Offsets, kind: Residual, target: &Target, plane: &Plane, noise: f64) -> PlaneSums {
-    let mut sums = PlaneSums::new(lasers.len());
-    let [first, second] = plane.directions();
-    for seen in &target.returns {
-        let Some(sight) = Sight::new(lasers, offsets, kind, seen, plane) else { continue };
-        let deviate = sight.residual.abs() / noise;
-        if deviate > CUT {
-            continue;
+        let covariances: Vec<LaserMatrix> =
+            covariances.into_iter().map(|covariance| covariance * noise.powi(2)).collect();
+        if has_settled_once && self.is_learning {
+            state.known = self.learnt(state, &covariances);
         }
-        let by_plane = Vector3::new(first.dot(&sight.by_normal), second.dot(&sight.by_normal), sight.by_distance);
-        let weight = sight.weight * (1.0 - (deviate / CUT).powi(2)).powi(2);
-        sums.add(seen.laser, sight.by_laser, by_plane, sight.residual, weight);
+        let is_small = |(step, covariance): (&LaserVector, &LaserMatrix)| {
+            (0..OF_LASER).all(|parameter| {
+                let deviation = covariance[(parameter, parameter)].sqrt();
+                step[parameter].abs() < (SMALL * deviation).max(SMALL_TO_KNOWN * self.prior[parameter])
+            })
+        };
+        let is_settled = steps.iter().zip(&covariances).all(is_small);
+        Ok(Outcome { noise, covariances, is_settled })
     }
-    sums
+
+    fn equations(&self, state: &State, sums: &[PlaneSums], noise: f64) -> LaserEquations {
+        let pairs = || state.lasers.iter().zip(self.start);
+        let shift = pairs().zip(&self.is_observed).filter(|(_, is_observed)| **is_observed);
+        let shift: f64 = shift.map(|((laser, start), _)| laser.rotation - start.rotation).sum();
+        let observed = self.is_observed.iter().filter(|is_observed| **is_observed).count();
+        let mut equations = LaserEquations::new(sums, &self.is_observed, shift / observed as f64);
+        let weights = state.known.map(|deviation| (noise / deviation).powi(2));
+        equations.hold_near(&weights, pairs().map(off));
+        equations
+    }
+
+    /// How far the start is off: the sum of the squares found, by the number of values that the scans determine
+    /// (MacKay's evidence approximation). Little is learnt where the scans determine less than a few values.
+    fn learnt(&self, state: &State, covariances: &[LaserMatrix]) -> LaserVector {
+        let (mut squares, mut determined) = (LaserVector::zeros(), LaserVector::zeros());
+        let variances = state.known.map(|deviation| deviation * deviation);
+        let all = state.lasers.iter().zip(self.start).zip(covariances).zip(&self.is_observed);
+        for ((pair, covariance), _) in all.filter(|(_, is_observed)| **is_observed) {
+            squares += off(pair).map(|off| off * off);
+            determined += covariance.diagonal().zip_map(&variances, |left, before| (1.0 - left / before).max(0.0));
+        }
+        LaserVector::from_fn(|parameter, _| {
+            let believed = self.prior[parameter];
+            let before = FEW * believed * believed;
+            let learnt = ((squares[parameter] + before) / (determined[parameter] + FEW)).sqrt();
+            learnt.clamp(LEAST_OFF * believed, MOST_OFF * believed)
+        })
+    }
+
+    /// Standard deviation of the residuals, by the median, m.
+    fn noise(&self, state: &State) -> f64 {
+        let residuals = self.targets.iter().zip(&state.planes).flat_map(|(target, (plane, bias))| {
+            let sight = |seen| Sight::new(&state.lasers, self.offsets, self.residual, seen, (plane, *bias));
+            target.returns.iter().filter_map(sight).map(|sight| sight.residual.abs())
+        });
+        let mut residuals: Vec<f64> = residuals.collect();
+        if residuals.is_empty() {
+            return f64::INFINITY;
+        }
+        let middle = residuals.len() / 2;
+        let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
+        (*median / MEDIAN_DEVIATE).max(1e-6)
+    }
+
+    fn sums(&self, lasers: &[Laser], target: &Target, plane: (&Plane, f64), noise: f64) -> PlaneSums {
+        let mut sums = PlaneSums::new(lasers.len());
+        for seen in target.returns.iter().filter(|seen| self.is_observed.get(seen.laser) == Some(&true)) {
+            let Some(sight) = Sight::new(lasers, self.offsets, self.residual, seen, plane) else { continue };
+            let deviate = sight.residual.abs() / noise;
+            if deviate < CUT {
+                let weight = sight.weight * (1.0 - (deviate / CUT).powi(2)).powi(2);
+                sums.add(seen.laser, &sight, weight);
+            }
+        }
+        sums
+    }
+
+    /// Standard deviation of the error that the ranges of one laser on one target have together, m, by moments.
+    fn own_error(&self, sums: &[PlaneSums], noise: f64) -> f64 {
+        let (mut squares, mut count) = (0.0, 0);
+        for (mean, variance) in sums.iter().flat_map(PlaneSums::range_errors) {
+            squares += mean * mean - variance * noise * noise;
+            count += 1;
+        }
+        let lasers = self.is_observed.iter().filter(|is_observed| **is_observed).count();
+        let free = count as f64 - (3 * (lasers + sums.len())) as f64;
+        (squares / free.max(0.25 * f64::from(count)).max(1.0)).max(0.0).sqrt()
+    }
+
+    fn found(&self, state: State, outcome: Outcome, rounds: usize) -> Adjustment {
+        let seen = |covariances: Vec<LaserMatrix>| {
+            covariances
+                .into_iter()
+                .zip(&self.is_observed)
+                .map(|(covariance, is_observed)| is_observed.then_some(covariance))
+        };
+        let covariances: Vec<Option<LaserMatrix>> = seen(outcome.covariances).collect();
+        let deviation = |covariance: &Option<LaserMatrix>| {
+            covariance.map(|covariance| Deviation::of_vector(covariance.diagonal().map(f64::sqrt)))
+        };
+        Adjustment {
+            deviations: covariances.iter().map(deviation).collect(),
+            lasers: state.lasers,
+            noise: outcome.noise,
+            range_error: state.own,
+            common_range_errors: state.planes.iter().map(|(_, bias)| *bias).collect(),
+            rounds,
+            start_deviation: Deviation::of_vector(state.known),
+            covariances,
+        }
+    }
+}
+
+/// How far a laser is off the start.
+fn off((laser, start): (&Laser, &Laser)) -> LaserVector {
+    LaserVector::new(
+        laser.distance - start.distance,
+        laser.elevation - start.elevation,
+        laser.rotation - start.rotation,
+        laser.vertical_offset - start.vertical_offset,
+        laser.horizontal_offset - start.horizontal_offset,
+    )
+}
+
+/// Standard deviation of the error that all ranges of a scan have together, m: the mean square of what is found and of what
+/// stays open (a step of expectation maximisation).
+fn common_error(sums: &[PlaneSums], planes: &[(Plane, f64)], noise: f64) -> f64 {
+    let squares = sums.iter().zip(planes).map(|(sums, (_, bias))| bias * bias + sums.bias_variance() * noise * noise);
+    (squares.sum::<f64>() / planes.len().max(1) as f64).sqrt().max(NO_ERROR)
+}
+
+impl Adjustment {
+    /// Deviation of the points at 10 m, as a part of that with the factory's values.
+    fn part_left(&self, offsets: Offsets) -> f64 {
+        let before = LaserMatrix::from_diagonal(&Deviation::FACTORY.vector().map(|deviation| deviation * deviation));
+        let (mut left, mut known) = (0.0, 0.0);
+        for (laser, covariance) in self.lasers.iter().zip(&self.covariances) {
+            let Some(covariance) = covariance else { continue };
+            left += point_deviation(laser, offsets, JUDGED_AT, covariance).powi(2);
+            known += point_deviation(laser, offsets, JUDGED_AT, &before).powi(2);
+        }
+        (left / known).sqrt()
+    }
+}
+
+fn point_deviation(laser: &Laser, offsets: Offsets, distance: f64, covariance: &LaserMatrix) -> f64 {
+    let ahead = laser.rotation;
+    let main = jacobian(laser, offsets, ahead, distance - laser.distance);
+    let [vertical, horizontal] = offset_jacobian(laser, offsets, ahead);
+    let variance = |axis: usize| {
+        let [distance, elevation, rotation] = main[axis];
+        let by = LaserVector::new(distance, elevation, rotation, vertical[axis], horizontal[axis]);
+        by.dot(&(covariance * by))
+    };
+    (0..3).map(variance).sum::<f64>().max(0.0).sqrt()
 }

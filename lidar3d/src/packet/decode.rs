@@ -1,57 +1,32 @@
 //! From packets to points.
 
-use super::{Packet, RETURNS, Sensor};
+use super::{BLOCKS, Filter, OtherSensor, Packet, Point, RETURNS, Return, ReturnKind, ReturnMode, Sensor, Tail, Tally};
+use super::{Block, rings};
 use crate::calibration::Laser;
 use crate::geometry::{self, FAR_POINT, Offsets, near_corrections};
 
 /// Most lasers of a sensor.
-const LASERS: usize = 64;
+const LASERS: usize = 128;
+/// Most banks of [`RETURNS`] lasers.
+const BANKS: usize = 4;
 /// Hundredths of a degree in a turn.
 const TURN: u32 = 36_000;
 /// A hundredth of a degree, rad.
 const COUNT: f32 = core::f32::consts::TAU / TURN as f32;
 
-/// Returns outside of these distances are false (M 2.3.2).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Filter {
-    /// Least corrected distance, m.
-    pub near: f32,
-    /// Greatest corrected distance, m.
-    pub far: f32,
-}
-
-impl Default for Filter {
-    fn default() -> Self {
-        Self { near: 0.9, far: 120.0 }
-    }
-}
-
-/// One point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
-    /// x, y, z, m.
-    pub position: [f32; 3],
-    /// Angle of the head, 0.01 degrees.
-    pub azimuth: u16,
-    /// Number of the laser.
-    pub laser: u8,
-    /// Intensity.
-    pub intensity: u8,
-}
-
-/// What became of the returns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// Points.
-    pub points: u64,
-    /// Returns in which nothing was seen.
-    pub empty: u64,
-    /// Nearer than the filter allows.
-    pub near: u64,
-    /// Farther than the filter allows.
-    pub far: u64,
-    /// Of a laser that the sensor does not have, or that is not in use.
-    pub unused: u64,
+/// A sensor as its packets are decoded.
+#[derive(Clone, Copy, Debug)]
+pub struct Model<'a> {
+    /// Kind of sensor.
+    pub sensor: Sensor,
+    /// As many lasers as the sensor has.
+    pub lasers: &'a [Laser],
+    /// Length of one count of distance, m.
+    pub distance_resolution: f64,
+    /// How the offsets of the beams are measured.
+    pub offsets: Offsets,
+    /// Whether the maker's two-point correction is used where a laser states it.
+    pub two_points: bool,
 }
 
 /// The constants of a laser, as decoding needs them. Without its turn, a point is linear in its distance.
@@ -65,6 +40,7 @@ struct Beam {
     horizontal_offset: f32,
     rotation: f32,
     is_enabled: bool,
+    ring: u8,
     /// Corrections at the two near points.
     near: Option<[f64; 2]>,
 }
@@ -93,8 +69,10 @@ impl Direction {
 struct Turned {
     /// 0.01 degrees.
     counts: u32,
-    /// With the rotation of the laser in the head, for a block of the upper and one of the lower lasers.
-    directions: [Direction; 2],
+    /// After the angle that is stated, ns.
+    time: u32,
+    /// With the rotation of the laser in the head.
+    direction: Direction,
 }
 
 /// Decodes the packets of one sensor.
@@ -104,24 +82,37 @@ pub struct Decoder {
     resolution: f32,
     beams: [Beam; LASERS],
     tally: Tally,
-    /// By the place in the block.
-    turned: [Turned; RETURNS],
-    /// Hundredths of a degree that the head turns in `step.1` blocks; `turned` is for these.
+    /// By the bank and the place in the block.
+    turned: [[Turned; RETURNS]; BANKS],
+    /// Hundredths of a degree that the head turns in `step.1` firings; `turned` is for these.
     step: (u32, u32),
+    /// First angle of the packet before.
+    before: Option<u16>,
+}
+
+/// What the blocks of a packet have in common.
+#[derive(Clone, Copy)]
+struct Firing {
+    /// Blocks of one angle.
+    blocks: usize,
+    /// Returns of each laser.
+    returns: usize,
+    mode: Option<ReturnMode>,
 }
 
 impl Decoder {
-    /// A decoder; `lasers` are as many as the sensor has. `two_points`: whether the maker's two-point correction is used
-    /// where a laser states it.
+    /// A decoder.
     #[must_use]
-    pub fn new(sensor: Sensor, lasers: &[Laser], offsets: Offsets, two_points: bool, filter: Filter) -> Self {
+    pub fn new(model: &Model<'_>, filter: Filter) -> Self {
+        let lasers = model.lasers;
+        let rings: [u8; LASERS] = rings(lasers.iter().map(|laser| laser.is_enabled.then_some(laser.elevation)));
         let mut beams = [Beam::default(); LASERS];
-        for (beam, laser) in beams.iter_mut().zip(lasers) {
+        for ((beam, laser), ring) in beams.iter_mut().zip(lasers).zip(rings) {
             // Both coordinates are linear in the distance.
             let still = Laser { distance: 0.0, rotation: 0.0, horizontal_offset: 0.0, ..*laser };
             let ([forward, _, height], [end, _, top]) =
-                (geometry::point(&still, offsets, 0.0, 0.0), geometry::point(&still, offsets, 0.0, 1.0));
-            let full = laser.full.filter(|full| two_points && full.has_two_points);
+                (geometry::point(&still, model.offsets, 0.0, 0.0), geometry::point(&still, model.offsets, 0.0, 1.0));
+            let full = laser.full.filter(|full| model.two_points && full.has_two_points);
             *beam = Beam {
                 distance: laser.distance as f32,
                 forward: [forward as f32, (end - forward) as f32],
@@ -129,17 +120,19 @@ impl Decoder {
                 horizontal_offset: laser.horizontal_offset as f32,
                 rotation: laser.rotation as f32,
                 is_enabled: laser.is_enabled,
+                ring,
                 near: full.map(|full| [full.distance_x, full.distance_y]),
             };
         }
         let mut decoder = Self {
-            sensor,
+            sensor: model.sensor,
             filter,
-            resolution: sensor.distance_resolution(),
+            resolution: model.distance_resolution as f32,
             beams,
             tally: Tally::default(),
-            turned: [Turned::default(); RETURNS],
+            turned: [[Turned::default(); RETURNS]; BANKS],
             step: (0, 1),
+            before: None,
         };
         decoder.set_step(0, 1);
         decoder
@@ -151,62 +144,141 @@ impl Decoder {
         self.tally
     }
 
-    /// The head turns by `counts` hundredths of a degree in so many blocks.
-    fn set_step(&mut self, counts: u32, blocks: u32) {
-        self.step = (counts, blocks);
-        for (place, turned) in self.turned.iter_mut().enumerate() {
-            turned.counts = (counts * self.sensor.firing_permille(place) + 500 * blocks) / (1000 * blocks);
-            let angle = turned.counts as f32 * COUNT;
-            for (direction, first) in turned.directions.iter_mut().zip([0, RETURNS]) {
-                let laser = self.sensor.laser(first > 0, place);
-                let rotation = self.beams.get(laser).map_or(0.0, |beam| beam.rotation);
-                *direction = Direction::of(angle - rotation);
+    /// The head turns by `counts` hundredths of a degree in so many firings.
+    fn set_step(&mut self, counts: u32, firings: u32) {
+        self.step = (counts, firings);
+        let whole = u64::from(self.sensor.period()) * u64::from(firings);
+        for (bank, places) in self.turned.iter_mut().enumerate() {
+            for (place, turned) in places.iter_mut().enumerate() {
+                turned.time = self.sensor.firing_time(bank, place);
+                turned.counts = ((u64::from(counts) * u64::from(turned.time) + whole / 2) / whole) as u32;
+                let rotation = self.beams.get(self.sensor.laser(bank, place)).map_or(0.0, |beam| beam.rotation);
+                turned.direction = Direction::of(turned.counts as f32 * COUNT - rotation);
             }
         }
     }
 
     /// Calls `take` with each point of a packet, in the order of the returns. The head's speed is the mean one of the
     /// packet.
-    pub fn packet(&mut self, packet: &Packet<'_>, mut take: impl FnMut(Point)) {
-        if let Some(step) = self.sensor.step(packet).filter(|step| *step != self.step) {
+    ///
+    /// # Errors
+    /// [`OtherSensor`] if the packet states another sensor; nothing of it is decoded.
+    pub fn packet(&mut self, packet: &Packet<'_>, mut take: impl FnMut(Point)) -> Result<(), OtherSensor> {
+        self.sensor.accept(packet)?;
+        let step = if packet.tail() == Tail::AT_ONCE { (0, 1) } else { self.sensor.step(packet, self.before) };
+        if step != self.step {
             self.set_step(step.0, step.1);
         }
+        self.before = packet.azimuth(0);
+        let firing = Firing {
+            blocks: self.sensor.blocks(),
+            returns: self.sensor.returns(packet),
+            mode: packet.tail().return_mode().filter(|_| self.sensor != Sensor::Hdl64e),
+        };
+        let first = self.sensor.first_firing();
+        for (index, block) in packet.blocks().enumerate().take(BLOCKS) {
+            let start = first + (index / (firing.blocks * firing.returns)) as i32 * self.sensor.period() as i32;
+            let other = firing.other(self.sensor, index).and_then(|(other, role)| Some((packet.block(other)?, role)));
+            self.block(block, start, firing.mode, other, &mut take);
+        }
+        Ok(())
+    }
+
+    /// The points of one block; `other` has the other returns of its firings.
+    fn block(
+        &mut self,
+        block: Block<'_>,
+        start: i32,
+        mode: Option<ReturnMode>,
+        other: Option<(Block<'_>, Role)>,
+        take: &mut impl FnMut(Point),
+    ) {
         let Self { sensor, filter, resolution, ref beams, ref turned, ref mut tally, .. } = *self;
-        for block in packet.blocks() {
-            let azimuth = u32::from(block.azimuth());
-            let head = Direction::of(azimuth as f32 * COUNT);
-            let is_lower = block.is_lower();
-            for (place, (value, turned)) in block.returns().zip(turned).enumerate() {
-                let laser = sensor.laser(is_lower, place);
-                let Some(beam) = beams.get(laser).filter(|beam| beam.is_enabled) else {
-                    tally.unused += 1;
-                    continue;
-                };
-                if value.distance == 0 {
-                    tally.empty += 1;
-                    continue;
-                }
-                let distance = f32::from(value.distance) * resolution + beam.distance;
-                if distance < filter.near {
-                    tally.near += 1;
-                    continue;
-                }
-                if distance > filter.far {
-                    tally.far += 1;
-                    continue;
-                }
-                let at = azimuth + turned.counts;
-                let direction = head.plus(turned.directions[usize::from(is_lower)]);
-                tally.points += 1;
-                take(Point {
-                    position: beam.point(direction, distance),
-                    azimuth: (if at >= TURN { at - TURN } else { at }) as u16,
-                    laser: laser as u8,
-                    intensity: value.intensity,
-                });
+        let azimuth = u32::from(block.azimuth());
+        let head = Direction::of(azimuth as f32 * COUNT);
+        let bank = block.bank();
+        let Some(places) = turned.get(bank) else { return };
+        for (place, (value, turned)) in block.returns().zip(places).enumerate() {
+            let laser = sensor.laser(bank, place);
+            let Some(beam) = beams.get(laser).filter(|beam| beam.is_enabled) else {
+                tally.unused += 1;
+                continue;
+            };
+            if value.distance == 0 {
+                tally.empty += 1;
+                continue;
             }
+            let other = other.and_then(|(block, role)| Some((block.one(place)?, role)));
+            let Some(kind) = kind(mode, value, other) else {
+                tally.equal += 1;
+                continue;
+            };
+            let distance = f32::from(value.distance) * resolution + beam.distance;
+            if distance < filter.near {
+                tally.near += 1;
+                continue;
+            }
+            if distance > filter.far {
+                tally.far += 1;
+                continue;
+            }
+            let at = azimuth + turned.counts;
+            tally.points += 1;
+            take(Point {
+                position: beam.point(head.plus(turned.direction), distance),
+                time: start + turned.time as i32,
+                intensity: u16::from(value.intensity),
+                azimuth: (at % TURN) as u16,
+                laser: laser as u8,
+                ring: beam.ring,
+                kind,
+            });
         }
     }
+}
+
+/// Which of two blocks of the same lasers and firings it is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Before,
+    Behind,
+}
+
+impl Firing {
+    /// The block that holds the other returns of a block's firings, and which of the two the block itself is: one next
+    /// to the other, but at an HDL-64E upper and lower block go together.
+    fn other(self, sensor: Sensor, index: usize) -> Option<(usize, Role)> {
+        if self.returns < 2 {
+            return None;
+        }
+        let apart = if sensor == Sensor::Hdl64e { self.blocks } else { 1 };
+        if (index / apart).is_multiple_of(2) {
+            Some((index + apart, Role::Before))
+        } else {
+            Some((index - apart, Role::Behind))
+        }
+    }
+}
+
+/// Which of the returns of its firing a return is; None if it is the other one again. In dual return mode the block
+/// before holds the last return and the one behind the strongest, or the second strongest if the last is the strongest
+/// (VLP-16 manual, dual return mode). An HDL-64E states nothing.
+fn kind(mode: Option<ReturnMode>, value: Return, other: Option<(Return, Role)>) -> Option<ReturnKind> {
+    if let Some((other, role)) = other {
+        return match role {
+            Role::Behind if other.distance == value.distance => None,
+            _ if mode.is_none() => Some(ReturnKind::Unknown),
+            Role::Before if other.distance == value.distance || other.distance == 0 => Some(ReturnKind::Both),
+            Role::Before => Some(ReturnKind::Last),
+            Role::Behind if other.intensity > value.intensity => Some(ReturnKind::SecondStrongest),
+            Role::Behind => Some(ReturnKind::Strongest),
+        };
+    }
+    Some(match mode {
+        Some(ReturnMode::Strongest) => ReturnKind::Strongest,
+        Some(ReturnMode::Last) => ReturnKind::Last,
+        Some(ReturnMode::Dual) | None => ReturnKind::Unknown,
+    })
 }
 
 impl Beam {

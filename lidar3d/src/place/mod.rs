@@ -2,7 +2,9 @@
 
 mod enriched;
 mod facing;
+mod floor;
 mod histogram;
+mod image;
 mod key_signatures;
 mod loop_closure;
 mod normals;
@@ -12,7 +14,9 @@ mod threshold;
 
 pub use enriched::{ENRICHED_LENGTH, Enriched};
 pub use facing::{Facing, relative_turn};
+pub use floor::Floor;
 pub use histogram::{BINS, Histogram, chi_square, normalised_chi_square, normalised_sorensen, sorensen};
+pub use image::{Likeness, PlaceImage, RINGS, SECTORS};
 pub use key_signatures::KeySignatures;
 pub use loop_closure::{Limits, loop_closure};
 pub use normals::{Neighbours, surfaces, vertical_parts};

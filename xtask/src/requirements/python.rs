@@ -17,7 +17,7 @@ const CHIP: [Package; 2] = [
     ("pyelftools>=0.31,<1", "elftools"),
 ];
 
-const PACKAGES: [Package; 13] = [
+const PACKAGES: [Package; 14] = [
     CHIP[0],
     CHIP[1],
     ("numpy>=1.24,<3", "numpy"),
@@ -30,6 +30,7 @@ const PACKAGES: [Package; 13] = [
     ("rosbags>=0.10,<1", "rosbags"),
     ("evo>=1.30,<2", "evo"),
     ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
+    ("ouster-sdk>=1,<2", "ouster.sdk"),
     (include_str!("../../../lab/ray/requirements.txt").trim_ascii(), "ray"),
 ];
 

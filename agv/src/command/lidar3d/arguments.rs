@@ -4,12 +4,16 @@ use std::path::PathBuf;
 
 use agv_host_sim::lidar3d::SetupOptions;
 use agv_lidar3d::geometry;
-use agv_lidar3d::packet::{self, Filter, Tally};
+use agv_lidar3d::packet::{self, Tally};
 
 /// What the source of a scan can be, for the help.
 pub const SOURCES: &str = "\
-A SOURCE is a capture (pcap or pcapng) with packets to UDP port 2368, a folder of range images (velodyne_config.txt and
-data/*.png), or udp[:PORT] for a sensor that sends to this machine.";
+A SOURCE is a capture (pcap or pcapng), a folder of range images (velodyne_config.txt and data/*.png), a point cloud (.pcd,
+KITTI's .bin, .ply or .las) or a folder of them, or udp[:PORT] for a sensor that sends to this machine (port 2368 if none is
+stated).
+
+Sensors: Velodyne HDL-64E (db.xml or YAML), HDL-32E, VLP-16, VLP-32C, VLS-128; Hesai Pandar40P, PandarQT64, PandarXT32 (CSV of
+its angles); Ouster (JSON of its metadata). A capture is read at the port of the first packet of a sensor.";
 
 /// The sensor and its parameters.
 #[derive(clap::Args, Clone)]
@@ -17,21 +21,24 @@ pub struct SensorArguments {
     /// Kind of sensor, where the packets do not state it.
     #[arg(long, value_name = "KIND")]
     sensor: Option<Sensor>,
-    /// Calibration file, db.xml or YAML; without it that of the packets, or the maker's elevations.
+    /// Calibration file: db.xml, YAML or CSV, and of an Ouster its JSON; without it that of the packets, or the maker's.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    /// UDP port of a capture; without it that of the first packet of a sensor.
+    #[arg(long, value_name = "PORT")]
+    port: Option<u16>,
     /// How the offsets of a beam are measured.
     #[arg(long, default_value = "orthogonal")]
     offsets: Offsets,
     /// Use the maker's two-point correction of near distances where the calibration states it.
     #[arg(long)]
     two_points: bool,
-    /// Returns nearer than this are false, m.
-    #[arg(long, default_value_t = 0.9, value_name = "M")]
-    near: f32,
-    /// Returns farther than this are false, m.
-    #[arg(long, default_value_t = 120.0, value_name = "M")]
-    far: f32,
+    /// Returns nearer than this are false, m; without it 0.9 of an HDL-64E, and what the others can see.
+    #[arg(long, value_name = "M")]
+    near: Option<f32>,
+    /// Returns farther than this are false, m; without it 120 of an HDL-64E, and what the others can see.
+    #[arg(long, value_name = "M")]
+    far: Option<f32>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -42,6 +49,10 @@ pub enum Sensor {
     Hdl32e,
     /// 16 lasers.
     Vlp16,
+    /// 32 lasers, 4 mm a count.
+    Vlp32c,
+    /// 128 lasers, Alpha Prime.
+    Vls128,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -68,23 +79,18 @@ impl SensorArguments {
             Sensor::Hdl64e => packet::Sensor::Hdl64e,
             Sensor::Hdl32e => packet::Sensor::Hdl32e,
             Sensor::Vlp16 => packet::Sensor::Vlp16,
+            Sensor::Vlp32c => packet::Sensor::Vlp32c,
+            Sensor::Vls128 => packet::Sensor::Vls128,
         });
         SetupOptions {
             sensor,
             calibration: self.calibration.clone(),
             offsets: self.offsets.into(),
             two_points: self.two_points,
-            filter: Filter { near: self.near, far: self.far },
+            port: self.port,
+            near: self.near,
+            far: self.far,
         }
-    }
-}
-
-/// Name of a kind of sensor.
-pub fn sensor_name(sensor: packet::Sensor) -> &'static str {
-    match sensor {
-        packet::Sensor::Hdl64e => "HDL-64E",
-        packet::Sensor::Hdl32e => "HDL-32E",
-        packet::Sensor::Vlp16 => "VLP-16",
     }
 }
 
@@ -96,6 +102,7 @@ pub fn tally_object(tally: Tally) -> serde_json::Value {
         "false_near": tally.near,
         "false_far": tally.far,
         "unused": tally.unused,
+        "equal": tally.equal,
     })
 }
 
@@ -110,6 +117,9 @@ pub fn tally_rows(tally: Tally) -> Vec<[String; 2]> {
     ];
     if tally.unused > 0 {
         rows.push(row("of lasers not in use", tally.unused));
+    }
+    if tally.equal > 0 {
+        rows.push(row("second returns that are the first", tally.equal));
     }
     rows
 }

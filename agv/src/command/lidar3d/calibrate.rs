@@ -2,28 +2,32 @@
 
 use std::path::{Path, PathBuf};
 
+use agv_host_sim::lidar3d::kind::Kind;
 use agv_host_sim::lidar3d::{Source, setup, stand};
 use agv_host_sim::report::{Page, PointSet, Table, scatter_chart};
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::intrinsic::{self, Adjustment, Residual, Target};
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::arguments::{SOURCES, SensorArguments};
+use super::held;
 use crate::command::{output, progress, stop};
 
 const HELP: &str = "\
 Each SOURCE is one stand of the sensor before the same wall, or any other plane that is at most 45 degrees off upright; of
-each, one revolution is used. D_corr, theta and alpha of all lasers are found together with the planes; the mean of alpha,
-which no plane can show, and the offsets stay as they are. A laser that saw too little of the planes is not changed.
+each, one revolution is used. D_corr, theta, alpha and the offsets of all lasers are found together with the planes; the
+mean of alpha, which no plane can show, stays as it is, and so does what the scans hardly show: upright walls say little of
+theta. A laser that saw too little of the planes is not changed. Where nothing is gained, nothing is written.
 
 Examples:
   agv lidar3d calibrate stand*.pcap --calibration factory.xml --output found.xml
   agv lidar3d calibrate stand*.pcap --calibration factory.xml --output found.yaml --report report --json
 
-Keys of --json: stands, lasers, not_observed, noise_m, rounds, worst_deviation {distance_m, elevation_deg, rotation_deg},
-  walls [stand, points, thickness_before_m, thickness_after_m, sum_of_squares_before_m2, sum_of_squares_after_m2].";
+Keys of --json: stands, lasers, not_observed, held {distance, elevation, rotation, vertical_offset, horizontal_offset: lasers},
+  noise_m, range_error_m, rounds, worst_deviation {distance_m, elevation_deg, rotation_deg}, points [distance_m, deviation_m],
+  factory {distance_m, elevation_deg, rotation_deg}, walls [stand, points, range_error_m, thickness_before_m, thickness_after_m, sum_of_squares_before_m2, sum_of_squares_after_m2].";
 
 /// Find the parameters of all lasers from scans of a plane.
 #[derive(clap::Args)]
@@ -70,6 +74,7 @@ impl From<ResidualKind> for Residual {
 struct Wall {
     stand: String,
     points: usize,
+    range_error_m: f64,
     thickness_before_m: f64,
     thickness_after_m: f64,
     sum_of_squares_before_m2: f64,
@@ -89,7 +94,13 @@ impl Calibrate {
         for (number, source) in self.sources.into_iter().enumerate() {
             let name = source.name();
             let source = source.open(&options, &stop)?;
-            let lasers = source.setup().with_context(|| name.clone())?.lasers;
+            let setup = source.setup().with_context(|| name.clone())?;
+            ensure!(
+                matches!(setup.kind, Kind::Velodyne(_)),
+                "{name}: only a Velodyne is calibrated; this is a {}",
+                setup.kind.name()
+            );
+            let lasers = setup.lasers;
             let returns = stand::returns(source, &stop).with_context(|| name.clone())?;
             let target = intrinsic::segment(&lasers, options.offsets, &returns, number as u64);
             targets.push(target.with_context(|| name.clone())?);
@@ -103,11 +114,12 @@ impl Calibrate {
         // What the file states beside the lasers stays as it is.
         let resolution = match &options.calibration {
             Some(path) => setup::read_calibration(path)?.distance_resolution,
-            None => 0.002,
+            None => None,
         };
         let calibration = Calibration { distance_resolution: resolution, lasers: found.lasers.clone() };
         std::fs::write(&self.output, write(&calibration)).with_context(|| self.output.display().to_string())?;
-        let walls = walls(&names, &targets, options.offsets, [&start, &found.lasers]);
+        let walls = walls(&names, &targets, options.offsets, (&start, &found));
+        let points_known = held::point_deviations(&found, options.offsets);
         if let Some(folder) = &self.report {
             let path = folder.join("index.html");
             let page = page(&start, &found, &walls, &targets, options.offsets)?;
@@ -127,7 +139,15 @@ impl Calibrate {
                 "stands": targets.len(),
                 "lasers": found.lasers.len() - not_observed.len(),
                 "not_observed": not_observed,
+                "held": held::object(&found),
                 "noise_m": found.noise,
+                "range_error_m": found.range_error,
+                "points": points_known,
+                "factory": {
+                    "distance_m": found.start_deviation.distance,
+                    "elevation_deg": found.start_deviation.elevation.to_degrees(),
+                    "rotation_deg": found.start_deviation.rotation.to_degrees(),
+                },
                 "rounds": found.rounds,
                 "worst_deviation": { "distance_m": distance, "elevation_deg": elevation, "rotation_deg": rotation },
                 "walls": walls,
@@ -148,8 +168,11 @@ impl Calibrate {
                 "standard deviations".to_owned(),
                 format!("at most {:.2} mm, theta {elevation:.4} deg, alpha {rotation:.4} deg", 1000.0 * distance),
             ],
+            held::point_row(&points_known),
             ["walls".to_owned(), format!("{:.1} -> {:.1} mm thick", thickness(before), thickness(after))],
         ];
+        rows.extend(contradiction(&walls));
+        rows.extend(held::rows(&found));
         if !not_observed.is_empty() {
             rows.push(["not observed".to_owned(), listed]);
         }
@@ -167,20 +190,36 @@ fn writer(path: &Path) -> anyhow::Result<fn(&Calibration) -> String> {
     }
 }
 
-fn walls(names: &[String], targets: &[Target], offsets: Offsets, sets: [&[Laser]; 2]) -> Vec<Wall> {
-    let wall = |(name, target): (&String, &Target)| {
-        let [before, after] = sets.map(|lasers| intrinsic::flatness(lasers, offsets, &target.returns));
+fn walls(names: &[String], targets: &[Target], offsets: Offsets, (start, found): (&[Laser], &Adjustment)) -> Vec<Wall> {
+    let wall = |((name, target), range_error): ((&String, &Target), &f64)| {
+        let [before, after] =
+            [start, &found.lasers].map(|lasers| intrinsic::flatness(lasers, offsets, &target.returns));
         let (before, after) = (before?, after?);
         Some(Wall {
             stand: name.clone(),
             points: before.points,
+            range_error_m: *range_error,
             thickness_before_m: before.thickness(),
             thickness_after_m: after.thickness(),
             sum_of_squares_before_m2: before.sum_of_squares,
             sum_of_squares_after_m2: after.sum_of_squares,
         })
     };
-    names.iter().zip(targets).filter_map(wall).collect()
+    names.iter().zip(targets).zip(&found.common_range_errors).filter_map(wall).collect()
+}
+
+/// Ranges of two scans that differ by more than this contradict each other, m.
+const CONTRADICTION: f64 = 0.01;
+
+/// What the scans say against each other: the two whose ranges differ most.
+fn contradiction(walls: &[Wall]) -> Option<[String; 2]> {
+    let by = |a: &&Wall, b: &&Wall| a.range_error_m.total_cmp(&b.range_error_m);
+    let (least, most) = (walls.iter().min_by(by)?, walls.iter().max_by(by)?);
+    let apart = most.range_error_m - least.range_error_m;
+    (apart > CONTRADICTION).then(|| {
+        let text = format!("{:.0} mm longer in {} than in {}", 1000.0 * apart, most.stand, least.stand);
+        ["ranges contradict".to_owned(), text]
+    })
 }
 
 /// Points of a wall in a picture, at the most.

@@ -19,9 +19,10 @@ Examples:
   agv lidar3d decode drive.pcap --output scan.pcd
   agv lidar3d decode drive.pcap --calibration db.xml --first 10 --count 1 --output scan.las
   agv lidar3d decode udp --count 5 --output live.ply
+  agv lidar3d decode ouster.pcap --calibration ouster.json --output scan.pcd
   agv lidar3d decode drive.pcap --organised --output scan.pcd --json
 
-Keys of --json: revolutions, files, returns {points, empty, false_near, false_far, unused}.";
+Keys of --json: revolutions, files, returns {points, empty, false_near, false_far, unused, equal}.";
 
 /// Write the points of each revolution as PCD, PLY or LAS.
 #[derive(clap::Args)]
@@ -62,6 +63,9 @@ impl Decode {
         let source = self.source.open(&self.sensor.options(), &stop)?;
         let setup = source.setup()?;
         let order = RingOrder::new(&setup.lasers);
+        if let Some(warning) = &setup.warning {
+            eprintln!("{warning}");
+        }
         let length = source.length();
         let bar = progress::bar("decoding", length.unwrap_or(0));
         let is_single = self.count == Some(1);

@@ -2,10 +2,12 @@
 
 use std::ops::ControlFlow;
 
+use agv_host_sim::lidar3d::kind::Kind;
 use agv_host_sim::lidar3d::{SetupError, Source};
+use agv_lidar3d::packet::Sensor;
 use serde_json::json;
 
-use super::arguments::{SOURCES, SensorArguments, sensor_name, tally_object, tally_rows};
+use super::arguments::{SOURCES, SensorArguments, tally_object, tally_rows};
 use crate::command::{output, progress, stop};
 
 const HELP: &str = "\
@@ -14,8 +16,8 @@ Examples:
   agv lidar3d info drive.pcap --calibration db.xml --json
   agv lidar3d info udp
 
-Keys of --json: sensor, version, packets, refused, other, cut, duration_s, turns, turns_per_s,
-  calibration_in_stream, lasers, returns {points, empty, false_near, false_far, unused}; returns is null without a calibration.";
+Keys of --json: sensor, return_mode, port, warning, version, packets, refused, other, cut, duration_s, turns, turns_per_s,
+  calibration_in_stream, lasers, returns {points, empty, false_near, false_far, unused, equal}; returns is null without a calibration.";
 
 /// What sends a stream of packets, and what is in it.
 #[derive(clap::Args)]
@@ -45,7 +47,9 @@ impl Info {
             Err(error) => return Err(error.into()),
         };
         let lasers = setup.as_ref().map(|setup| setup.lasers.len());
-        let sensor = setup.as_ref().map(|setup| setup.sensor).or(survey.sensor).map(sensor_name);
+        let kind = setup.as_ref().map(|setup| setup.kind).or(survey.kind);
+        let sensor = kind.map(Kind::name);
+        let warning = setup.as_ref().and_then(|setup| setup.warning.clone());
         let bar = progress::bar("decoding", source.length().unwrap_or(0));
         let tally = match setup {
             Some(_) => Some(source.revolutions(&stop, |_| {
@@ -60,6 +64,9 @@ impl Info {
         if self.json {
             let object = json!({
                 "sensor": sensor,
+                "return_mode": survey.return_mode,
+                "port": survey.port,
+                "warning": warning,
                 "version": survey.version,
                 "packets": survey.packets,
                 "refused": survey.refused,
@@ -79,19 +86,19 @@ impl Info {
             ["source".to_owned(), name],
             ["sensor".to_owned(), sensor.unwrap_or("unknown; name it with --sensor").to_owned()],
         ];
+        rows.extend(survey.return_mode.map(|mode| ["returns of a firing".to_owned(), mode]));
+        rows.extend(survey.port.map(|port| ["UDP port".to_owned(), port.to_string()]));
         rows.extend(survey.version.map(|version| ["version".to_owned(), version]));
+        rows.extend(warning.map(|warning| ["warning".to_owned(), warning]));
         if survey.packets > 0 {
             rows.push(["packets".to_owned(), survey.packets.to_string()]);
-            rows.push([
-                "not of a sensor".to_owned(),
-                format!("{} to the port, {} others", survey.refused, survey.other),
-            ]);
+            rows.push(["not of a sensor".to_owned(), format!("{} come near, {} others", survey.refused, survey.other)]);
             rows.push(["turns".to_owned(), format!("{:.2} in {duration:.2} s, {rate:.2} a second", survey.turns)]);
         }
         if survey.is_cut {
             rows.push(["end".to_owned(), "in the middle of a packet".to_owned()]);
         }
-        if survey.sensor == Some(agv_lidar3d::packet::Sensor::Hdl64e) {
+        if survey.kind == Some(Kind::Velodyne(Sensor::Hdl64e)) {
             let found = if survey.calibration.is_some() { "in the packets" } else { "not in the packets" };
             rows.push(["calibration".to_owned(), found.to_owned()]);
         }

@@ -56,7 +56,9 @@ impl Format {
     }
 }
 
-/// Writes points: x, y, z in m, intensity and the number of the laser (in LAS: user data).
+/// Writes points: x, y, z in m, intensity and the ring from the lowest up (in LAS: user data); in PCD also which return it
+/// is (0 unknown, 1 first, 2 second, 3 strongest, 4 second strongest, 5 last, 6 both) and the time after the beginning
+/// of the turn, s.
 ///
 /// # Errors
 /// See [`PointCloudError`].
@@ -81,7 +83,9 @@ pub fn write_organised(path: &Path, cloud: &[Option<[f32; 3]>], rings: usize) ->
     let columns = cloud.len() / rings.max(1);
     let points = cloud.iter().enumerate().map(|(place, position)| {
         let laser = (place / columns.max(1)) as u8;
-        position.map(|position| Point { position, azimuth: 0, laser, intensity: 0 })
+        // Rows go down, rings go up.
+        let ring = (rings.saturating_sub(1) as u8).saturating_sub(laser);
+        position.map(|position| Point { position, laser, ring, ..Point::default() })
     });
     let outcome = writers::write_pcd(path, points, columns, rings);
     outcome.map_err(|reason| PointCloudError::Write { path: path.to_owned(), reason })

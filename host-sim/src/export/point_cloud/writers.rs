@@ -26,16 +26,19 @@ impl PcdSerialize for PcdPoint {
             ("z", ValueKind::F32, 1),
             ("intensity", ValueKind::F32, 1),
             ("ring", ValueKind::U8, 1),
+            ("return", ValueKind::U8, 1),
+            ("time", ValueKind::F32, 1),
         ])
     }
 
     fn write_chunk<W: Write + Seek>(&self, writer: &mut W, _: &Schema) -> pcd_rs::Result<()> {
         let [x, y, z] = self.0.map_or([f32::NAN; 3], |point| point.position);
-        let (intensity, laser) = self.0.map_or((0, 0), |point| (point.intensity, point.laser));
-        for value in [x, y, z, f32::from(intensity)] {
+        let point = self.0.unwrap_or_default();
+        for value in [x, y, z, f32::from(point.intensity)] {
             writer.write_all(&value.to_le_bytes())?;
         }
-        writer.write_all(&[laser])?;
+        writer.write_all(&[point.ring, point.kind as u8])?;
+        writer.write_all(&(1e-9 * point.time as f32).to_le_bytes())?;
         Ok(())
     }
 
@@ -71,7 +74,7 @@ struct PlyPoint(Point);
 
 impl PropertyAccess for PlyPoint {
     fn new() -> Self {
-        Self(Point { position: [0.0; 3], azimuth: 0, laser: 0, intensity: 0 })
+        Self(Point::default())
     }
 
     fn get_float(&self, name: &str) -> Option<f32> {
@@ -84,12 +87,12 @@ impl PropertyAccess for PlyPoint {
         }
     }
 
+    fn get_ushort(&self, name: &str) -> Option<u16> {
+        (name == "intensity").then_some(self.0.intensity)
+    }
+
     fn get_uchar(&self, name: &str) -> Option<u8> {
-        match name {
-            "intensity" => Some(self.0.intensity),
-            "ring" => Some(self.0.laser),
-            _ => None,
-        }
+        (name == "ring").then_some(self.0.ring)
     }
 }
 
@@ -103,8 +106,8 @@ fn try_ply(path: &Path, points: &[Point]) -> io::Result<()> {
     for name in ["x", "y", "z"] {
         element.properties.add(PropertyDef::new(name.to_owned(), PropertyType::Scalar(ScalarType::Float)));
     }
-    for name in ["intensity", "ring"] {
-        element.properties.add(PropertyDef::new(name.to_owned(), PropertyType::Scalar(ScalarType::UChar)));
+    for (name, scalar) in [("intensity", ScalarType::UShort), ("ring", ScalarType::UChar)] {
+        element.properties.add(PropertyDef::new(name.to_owned(), PropertyType::Scalar(scalar)));
     }
     let mut ply = Ply::<PlyPoint>::new();
     ply.header.encoding = Encoding::BinaryLittleEndian;
@@ -128,8 +131,8 @@ fn try_las(path: &Path, points: &[Point]) -> las::Result<()> {
     let mut writer = las::Writer::from_path(path, builder.into_header()?)?;
     for point in points {
         let [x, y, z] = point.position.map(f64::from);
-        let intensity = u16::from(point.intensity);
-        writer.write_point(las::Point { x, y, z, intensity, user_data: point.laser, ..las::Point::default() })?;
+        let intensity = point.intensity;
+        writer.write_point(las::Point { x, y, z, intensity, user_data: point.ring, ..las::Point::default() })?;
     }
     writer.close()
 }

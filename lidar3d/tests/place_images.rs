@@ -1,0 +1,187 @@
+//! Places of the Moosmann drive recognised by their images, whole and with sectors hidden, beside Scan Context.
+//!
+//! Protocols: A, the map is every other key scan, 1 m apart, of the first 150 m, right is within 3 m; A10, nodes 10 m apart,
+//! right is within 5.5 m; A10b, the same, and answers of 5.5 to 7.5 m count neither way. The other key scans of the whole
+//! route ask; of those beyond the map there is no right answer.
+
+mod support;
+
+use std::sync::OnceLock;
+
+use agv_lidar3d::cloud::Cloud;
+use agv_lidar3d::place::{Floor, PlaceImage};
+use support::moosmann::{Drive, RINGS};
+use support::scan_context::ScanContext;
+
+type Points = Vec<Option<[f32; 3]>>;
+
+#[derive(Clone, Copy)]
+struct Protocol {
+    name: &'static str,
+    spacing: usize,
+    /// Answers within this are right, m.
+    right: f64,
+    /// From here on they are wrong, m.
+    wrong: f64,
+}
+
+const A: Protocol = Protocol { name: "A", spacing: 2, right: 3.0, wrong: 3.0 };
+const A10: Protocol = Protocol { name: "A10", spacing: 10, right: 5.5, wrong: 5.5 };
+const A10B: Protocol = Protocol { name: "A10b", spacing: 10, right: 5.5, wrong: 7.5 };
+
+/// Scans, as both methods see them.
+struct Described {
+    image: PlaceImage,
+    context: ScanContext,
+}
+
+impl Described {
+    fn new(points: &Points, is_levelled: bool) -> Self {
+        let cloud = Cloud::new(points, RINGS).unwrap();
+        let floor = Floor::find(&cloud).unwrap();
+        let floor = if is_levelled { floor } else { Floor::level(floor.height) };
+        Self { image: PlaceImage::new(&cloud, &floor), context: ScanContext::new(points) }
+    }
+}
+
+fn drive() -> Option<&'static (Drive, Vec<Points>)> {
+    static DRIVE: OnceLock<Option<(Drive, Vec<Points>)>> = OnceLock::new();
+    let open = || {
+        let drive = Drive::open("images of places")?;
+        let points = drive.keys.iter().map(|key| drive.points(key.scan)).collect();
+        Some((drive, points))
+    };
+    DRIVE.get_or_init(open).as_ref()
+}
+
+/// Recall at precision 1, and the best F1.
+#[derive(Clone, Copy, Debug)]
+struct Score {
+    r1: f64,
+    f1: f64,
+}
+
+fn score(
+    drive: &Drive,
+    protocol: Protocol,
+    distance: impl Fn(usize, usize) -> f64,
+) -> Score {
+    let keys = &drive.keys;
+    let apart = |a: usize, b: usize| {
+        let ([x, y], [u, v]) = (keys[a].position, keys[b].position);
+        (x - u).hypot(y - v)
+    };
+    let map: Vec<usize> = (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
+    let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
+    let has_answer = |query: &&usize| map.iter().any(|node| apart(**query, *node) <= protocol.right);
+    let answerable = queries.iter().filter(has_answer).count();
+    let answer = |query: &usize| {
+        let all = map.iter().map(|node| (distance(*query, *node), *node));
+        let (distance, node) = all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        (distance, apart(*query, node))
+    };
+    let mut answers: Vec<(f64, f64)> = queries.iter().map(answer).collect();
+    // Near-misses count neither way.
+    answers.retain(|(_, apart)| *apart <= protocol.right || *apart > protocol.wrong);
+    answers.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut right, mut best) = (0.0, Score { r1: 0.0, f1: 0.0 });
+    for (number, (_, apart)) in answers.iter().enumerate() {
+        right += f64::from(u8::from(*apart <= protocol.right));
+        let (precision, recall) = (right / (number + 1) as f64, right / answerable as f64);
+        if precision >= 1.0 {
+            best.r1 = recall;
+        }
+        best.f1 = best.f1.max(2.0 * precision * recall / (precision + recall).max(1e-9));
+    }
+    best
+}
+
+/// Without what lies within `width` degrees round a direction, and turned by half a turn if so.
+fn masked(points: &Points, (direction, width): (f32, f32), is_reversed: bool) -> Points {
+    let hide = |[x, y, z]: [f32; 3]| {
+        let [x, y] = if is_reversed { [-x, -y] } else { [x, y] };
+        let off = (y.atan2(x).to_degrees() - direction + 540.0).rem_euclid(360.0) - 180.0;
+        (off.abs() > width / 2.0).then_some([x, y, z])
+    };
+    points.iter().map(|point| point.and_then(hide)).collect()
+}
+
+/// Leaning by 3 deg about an axis.
+fn tilted(points: &Points, axis: f32) -> Points {
+    let (sin, cos) = 3.0_f32.to_radians().sin_cos();
+    let (b, a) = axis.sin_cos();
+    let turn = |[x, y, z]: [f32; 3]| {
+        let (along, across) = (x * a + y * b, y * a - x * b);
+        let (across, z) = (across * cos - z * sin, across * sin + z * cos);
+        [along * a - across * b, along * b + across * a, z]
+    };
+    points.iter().map(|point| point.map(turn)).collect()
+}
+
+/// 16 of the 64 rings, the others seen nothing.
+fn thinned(points: &Points) -> Points {
+    let columns = points.len() / RINGS;
+    let keep = |(at, point): (usize, &Option<[f32; 3]>)| if (at / columns).is_multiple_of(4) { *point } else { None };
+    points.iter().enumerate().map(keep).collect()
+}
+
+fn both(map: &[Described], asked: &[Described], protocol: Protocol) -> [Score; 2] {
+    let (drive, _) = drive().unwrap();
+    let image = |query: usize, node: usize| {
+        map[node].image.likeness(&asked[query].image).map_or(f64::MAX, |likeness| f64::from(likeness.distance))
+    };
+    [
+        score(drive, protocol, image),
+        score(drive, protocol, |query, node| map[node].context.distance(&asked[query].context)),
+    ]
+}
+
+fn report(condition: &str, protocol: Protocol, [image, context]: [Score; 2]) {
+    println!(
+        "{} {condition}: image {:.3} / {:.3}, Scan Context {:.3} / {:.3}",
+        protocol.name, image.r1, image.f1, context.r1, context.f1
+    );
+}
+
+#[test]
+fn whole_scans() {
+    let Some((_, points)) = drive() else { return };
+    let plain: Vec<Described> = points.iter().map(|points| Described::new(points, false)).collect();
+    let levelled: Vec<Described> = points.iter().map(|points| Described::new(points, true)).collect();
+    for protocol in [A, A10, A10B] {
+        report("clean", protocol, both(&plain, &plain, protocol));
+        report("clean, levelled", protocol, both(&levelled, &levelled, protocol));
+    }
+}
+
+#[test]
+fn stressed_scans() {
+    let Some((_, points)) = drive() else { return };
+    let plain: Vec<Described> = points.iter().map(|points| Described::new(points, true)).collect();
+    let ask = |change: &dyn Fn(usize, &Points) -> Points| -> Vec<Described> {
+        points.iter().enumerate().map(|(number, points)| Described::new(&change(number, points), true)).collect()
+    };
+    for width in [60.0, 120.0] {
+        for is_both in [false, true] {
+            let mut mean = [Score { r1: 0.0, f1: 0.0 }; 2];
+            for direction in (0..8).map(|eighth| 45.0 * eighth as f32) {
+                let asked = ask(&|_, points| masked(points, (direction, width), is_both));
+                let scores = if is_both {
+                    let map = ask(&|_, points| masked(points, (direction, width), false));
+                    both(&map, &asked, A10)
+                } else {
+                    both(&plain, &asked, A10)
+                };
+                for (mean, score) in mean.iter_mut().zip(scores) {
+                    mean.r1 += score.r1 / 8.0;
+                    mean.f1 += score.f1 / 8.0;
+                }
+            }
+            report(&format!("{} {width}", if is_both { "both, reversed" } else { "query" }), A10, mean);
+        }
+    }
+    let asked = ask(&|number, points| tilted(points, 2.4 * number as f32));
+    report("tilt 3 deg", A10, both(&plain, &asked, A10));
+    let asked = ask(&|_, points| thinned(points));
+    report("16 of 64 rings", A10, both(&plain, &asked, A10));
+}
