@@ -37,7 +37,7 @@ const WORK: [&str; 14] = [
     "7session",
     "6record",
     "6leaves6LEAVES",
-    "14authentication8is_right",
+    "14authentication4code",
 ];
 
 #[test]

@@ -252,7 +252,7 @@ fn check_candump(log: &str) {
     }
     let Some(mut python) = python(NAME, "cantools, canopen") else { return };
     let mut python = python
-        .arg(repository("host-sim/tests/can/agv_description.py"))
+        .arg(repository("agv/tests/can/agv_description.py"))
         .args([repository("docs/agv.dbc"), repository("docs/agv.eds")])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

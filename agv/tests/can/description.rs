@@ -156,7 +156,7 @@ fn line(frame: &Frame) -> String {
 /// What cantools makes of each frame. None if it is not installed.
 fn described(frames: &[Frame]) -> Option<Vec<Value>> {
     let mut child = python("agv.dbc and agv.eds", "cantools, canopen")?
-        .arg(repository("host-sim/tests/can/agv_description.py"))
+        .arg(repository("agv/tests/can/agv_description.py"))
         .args([repository("docs/agv.dbc"), repository("docs/agv.eds")])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
