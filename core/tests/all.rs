@@ -23,6 +23,7 @@ mod odometry;
 mod order;
 mod output_predictor;
 mod overflow;
+mod parameters;
 mod pose_output;
 mod prediction;
 mod record;

@@ -61,17 +61,14 @@ struct Score {
     f1: f64,
 }
 
-fn score(
-    drive: &Drive,
-    protocol: Protocol,
-    distance: impl Fn(usize, usize) -> f64,
-) -> Score {
+fn score(drive: &Drive, protocol: Protocol, distance: impl Fn(usize, usize) -> f64) -> Score {
     let keys = &drive.keys;
     let apart = |a: usize, b: usize| {
         let ([x, y], [u, v]) = (keys[a].position, keys[b].position);
         (x - u).hypot(y - v)
     };
-    let map: Vec<usize> = (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
+    let map: Vec<usize> =
+        (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
     let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
     let has_answer = |query: &&usize| map.iter().any(|node| apart(**query, *node) <= protocol.right);
     let answerable = queries.iter().filter(has_answer).count();

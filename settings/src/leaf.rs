@@ -4,7 +4,7 @@ use agv_core::localizer::Parameters;
 use agv_core::odometry::{Tricycle, Vehicle};
 use serde::{Deserialize, Serialize};
 
-use crate::{LEAVES, Settings};
+use crate::Settings;
 
 /// What a leaf holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,18 +45,6 @@ pub enum LeafError {
 }
 
 impl Leaf {
-    /// The leaf with that name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<&'static Self> {
-        LEAVES.iter().find(|leaf| leaf.name == name)
-    }
-
-    /// The leaf with that key.
-    #[must_use]
-    pub fn keyed(key: u16) -> Option<&'static Self> {
-        LEAVES.iter().find(|leaf| leaf.key == key)
-    }
-
     /// What the settings say; None if the vehicle has no such setting.
     #[must_use]
     pub fn get(&self, settings: &Settings) -> Option<Value> {

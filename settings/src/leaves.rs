@@ -1,17 +1,18 @@
 //! The leaves, by the rooms of the code that they are for.
 
+use agv_core::localizer::bounds;
 use agv_core::odometry::CounterRange;
 
 use crate::leaf::{Leaf, Value, tricycle, tricycle_mut};
 
 /// A measure.
 macro_rules! number {
-    ($key:literal, $name:literal, $unit:literal, $least:expr, $most:expr, $($field:ident).+) => {
+    ($key:literal, $name:literal, $unit:literal, $($field:ident).+) => {
         Leaf {
             key: $key,
             name: $name,
             unit: $unit,
-            bounds: ($least, $most),
+            bounds: bounds($name),
             get: |settings| Some(Value::Number(settings.$($field).+.into())),
             set: |settings, value| {
                 let Value::Number(number) = value else { return false };
@@ -24,12 +25,12 @@ macro_rules! number {
 
 /// A measure of a tricycle.
 macro_rules! tricycle_number {
-    ($key:literal, $name:literal, $unit:literal, $least:expr, $most:expr, $field:ident) => {
+    ($key:literal, $name:literal, $unit:literal, $field:ident) => {
         Leaf {
             key: $key,
             name: $name,
             unit: $unit,
-            bounds: ($least, $most),
+            bounds: bounds($name),
             get: |settings| Some(Value::Number(tricycle(&settings.parameters)?.$field)),
             set: |settings, value| match (tricycle_mut(&mut settings.parameters), value) {
                 (Some(vehicle), Value::Number(number)) => {
@@ -58,6 +59,13 @@ macro_rules! counter {
                 _ => false,
             },
         }
+    };
+}
+
+/// A number of things that the localiser counts.
+macro_rules! count {
+    ($key:literal, $name:literal, $($field:ident).+) => {
+        Leaf { bounds: bounds($name), ..whole!($key, $name, "", 0.0, 0.0, $($field).+) }
     };
 }
 
@@ -111,75 +119,57 @@ macro_rules! address {
     };
 }
 
-const TURN: f64 = core::f64::consts::TAU;
-/// The bounds of a standard deviation: zero would be certainty.
-const SMALL: f64 = 1e-9;
-
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
 pub static LEAVES: [Leaf; 60] = [
-    tricycle_number!(100, "vehicle.wheelbase", "m", 0.05, 50.0, wheelbase),
-    tricycle_number!(101, "vehicle.drive_scale", "m/tick", -1.0, 1.0, drive_scale),
-    tricycle_number!(102, "vehicle.steering_scale", "rad/tick", -1.0, 1.0, steering_scale),
-    tricycle_number!(103, "vehicle.steering_offset_forward", "rad", -TURN, TURN, steering_offset_forward),
-    tricycle_number!(104, "vehicle.steering_offset_backward", "rad", -TURN, TURN, steering_offset_backward),
+    tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
+    tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
+    tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
+    tricycle_number!(103, "vehicle.steering_offset_forward", "rad", steering_offset_forward),
+    tricycle_number!(104, "vehicle.steering_offset_backward", "rad", steering_offset_backward),
     counter!(105, "vehicle.drive_counter_values", drive_range),
     counter!(106, "vehicle.steering_counter_values", steering_range),
-    number!(120, "laser.x", "m", -20.0, 20.0, parameters.laser.x),
-    number!(121, "laser.y", "m", -20.0, 20.0, parameters.laser.y),
-    number!(122, "laser.theta", "rad", -TURN, TURN, parameters.laser.theta),
-    number!(140, "odometry.speed_deviation", "m/s", 0.0, 10.0, parameters.odometry_noise.speed),
-    number!(141, "odometry.steering_deviation", "rad", 0.0, 1.0, parameters.odometry_noise.steering),
-    number!(142, "odometry.slip", "m/sqrt(m)", 0.0, 1.0, parameters.odometry_noise.slip),
-    number!(143, "odometry.side_slip", "m/sqrt(m)", 0.0, 1.0, parameters.odometry_noise.side_slip),
-    number!(144, "odometry.yaw", "rad/sqrt(m)", 0.0, 1.0, parameters.odometry_noise.yaw),
-    number!(
-        145,
-        "odometry.unknown_acceleration",
-        "m/s^2",
-        SMALL,
-        100.0,
-        parameters.odometry_noise.unknown_acceleration
-    ),
-    number!(146, "odometry.unknown_turn", "rad/s^2", SMALL, 100.0, parameters.odometry_noise.unknown_turn),
+    number!(120, "laser.x", "m", parameters.laser.x),
+    number!(121, "laser.y", "m", parameters.laser.y),
+    number!(122, "laser.theta", "rad", parameters.laser.theta),
+    number!(140, "odometry.speed_deviation", "m/s", parameters.odometry_noise.speed),
+    number!(141, "odometry.steering_deviation", "rad", parameters.odometry_noise.steering),
+    number!(142, "odometry.slip", "m/sqrt(m)", parameters.odometry_noise.slip),
+    number!(143, "odometry.side_slip", "m/sqrt(m)", parameters.odometry_noise.side_slip),
+    number!(144, "odometry.yaw", "rad/sqrt(m)", parameters.odometry_noise.yaw),
+    number!(145, "odometry.unknown_acceleration", "m/s^2", parameters.odometry_noise.unknown_acceleration),
+    number!(146, "odometry.unknown_turn", "rad/s^2", parameters.odometry_noise.unknown_turn),
     switch!(160, "maps.reflectors", parameters.maps.reflectors),
     switch!(161, "maps.features", parameters.maps.features),
     switch!(162, "maps.dynamic", parameters.maps.dynamic),
     switch!(163, "maps.start_search", start_search),
     switch!(164, "maps.slam", parameters.maps.slam),
-    number!(170, "reflectors.range_deviation", "m", SMALL, 10.0, parameters.reflectors.range_deviation),
-    number!(171, "reflectors.bearing_deviation", "rad", SMALL, 1.0, parameters.reflectors.bearing_deviation),
-    number!(180, "features.nearest", "m", 0.0, 250.0, parameters.features.nearest),
-    number!(181, "features.farthest", "m", 0.1, 250.0, parameters.features.farthest),
-    number!(182, "features.added_deviation", "m", 0.0, 10.0, parameters.features.added_deviation),
+    number!(170, "reflectors.range_deviation", "m", parameters.reflectors.range_deviation),
+    number!(171, "reflectors.bearing_deviation", "rad", parameters.reflectors.bearing_deviation),
+    number!(180, "features.nearest", "m", parameters.features.nearest),
+    number!(181, "features.farthest", "m", parameters.features.farthest),
+    number!(182, "features.added_deviation", "m", parameters.features.added_deviation),
     switch!(183, "features.motion_correction", parameters.features.motion_correction),
-    number!(200, "association.reflector_radius", "m", 0.01, 50.0, parameters.association.reflector_radius),
-    number!(201, "association.feature_radius", "m", 0.01, 50.0, parameters.association.feature_radius),
-    number!(202, "association.gate", "", 0.1, 1000.0, parameters.association.gate),
-    number!(203, "association.margin", "", 0.0, 1000.0, parameters.association.margin),
-    number!(204, "association.shared_map_error", "", 1.0, 10_000.0, parameters.association.shared_map_error),
-    number!(220, "dynamic_map.update_rate", "", 0.0, 1.0, parameters.dynamic_map.update_rate),
-    whole!(221, "dynamic_map.first_hits", "", 0.0, 65_535.0, parameters.dynamic_map.first_hits),
-    whole!(222, "dynamic_map.most_hits", "", 1.0, 65_535.0, parameters.dynamic_map.most_hits),
-    whole!(223, "dynamic_map.least_hits", "", 0.0, 65_535.0, parameters.dynamic_map.least_hits),
-    number!(224, "dynamic_map.deviation", "m", 0.0, 10.0, parameters.dynamic_map.deviation),
-    number!(240, "consistency.memory", "", 1.0, 10_000.0, parameters.consistency.memory),
-    number!(241, "consistency.least_remaining", "", 0.0, 1.0, parameters.consistency.least_remaining),
-    number!(242, "consistency.least_observations", "", 0.0, 10_000.0, parameters.consistency.least_observations),
-    number!(243, "consistency.least_acceptance", "", 0.0, 1.0, parameters.consistency.least_acceptance),
-    number!(
-        244,
-        "consistency.largest_normalised_square",
-        "",
-        2.0,
-        1000.0,
-        parameters.consistency.largest_normalised_square
-    ),
-    number!(260, "limits.fastest", "m/s", 0.1, 100.0, parameters.limits.fastest),
-    number!(261, "limits.dead_reckoning_from", "m", 0.0, 10_000.0, parameters.limits.dead_reckoning_from),
-    number!(262, "limits.lost_after", "m", 0.1, 100_000.0, parameters.limits.lost_after),
-    number!(263, "limits.largest_position_deviation", "m", SMALL, 1000.0, parameters.limits.largest_position_deviation),
-    number!(264, "limits.largest_heading_deviation", "rad", SMALL, TURN, parameters.limits.largest_heading_deviation),
-    number!(265, "limits.longest_extrapolation", "s", 0.0, 10.0, parameters.limits.longest_extrapolation),
+    number!(200, "association.reflector_radius", "m", parameters.association.reflector_radius),
+    number!(201, "association.feature_radius", "m", parameters.association.feature_radius),
+    number!(202, "association.gate", "", parameters.association.gate),
+    number!(203, "association.margin", "", parameters.association.margin),
+    number!(204, "association.shared_map_error", "", parameters.association.shared_map_error),
+    number!(220, "dynamic_map.update_rate", "", parameters.dynamic_map.update_rate),
+    count!(221, "dynamic_map.first_hits", parameters.dynamic_map.first_hits),
+    count!(222, "dynamic_map.most_hits", parameters.dynamic_map.most_hits),
+    count!(223, "dynamic_map.least_hits", parameters.dynamic_map.least_hits),
+    number!(224, "dynamic_map.deviation", "m", parameters.dynamic_map.deviation),
+    number!(240, "consistency.memory", "", parameters.consistency.memory),
+    number!(241, "consistency.least_remaining", "", parameters.consistency.least_remaining),
+    number!(242, "consistency.least_observations", "", parameters.consistency.least_observations),
+    number!(243, "consistency.least_acceptance", "", parameters.consistency.least_acceptance),
+    number!(244, "consistency.largest_normalised_square", "", parameters.consistency.largest_normalised_square),
+    number!(260, "limits.fastest", "m/s", parameters.limits.fastest),
+    number!(261, "limits.dead_reckoning_from", "m", parameters.limits.dead_reckoning_from),
+    number!(262, "limits.lost_after", "m", parameters.limits.lost_after),
+    number!(263, "limits.largest_position_deviation", "m", parameters.limits.largest_position_deviation),
+    number!(264, "limits.largest_heading_deviation", "rad", parameters.limits.largest_heading_deviation),
+    number!(265, "limits.longest_extrapolation", "s", parameters.limits.longest_extrapolation),
     whole!(300, "can.controller_node", "", 1.0, 127.0, nodes.controller),
     whole!(301, "can.drive_node", "", 1.0, 127.0, nodes.drive),
     whole!(302, "can.steering_node", "", 1.0, 127.0, nodes.steering),
@@ -192,3 +182,17 @@ pub static LEAVES: [Leaf; 60] = [
     whole!(325, "log.port", "", 1.0, 65_535.0, network.log_port),
     whole!(326, "service.port", "", 1.0, 65_535.0, network.service_port),
 ];
+
+impl Leaf {
+    /// The leaf with that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        LEAVES.iter().find(|leaf| leaf.name == name)
+    }
+
+    /// The leaf with that key.
+    #[must_use]
+    pub fn keyed(key: u16) -> Option<&'static Self> {
+        LEAVES.iter().find(|leaf| leaf.key == key)
+    }
+}

@@ -44,7 +44,7 @@ const HOUSES: [House; 7] = [
         ],
     },
     House { folder: "wire", floors: &[&["can", "cola"], &["nav350"]] },
-    House { folder: "settings", floors: &[&["settings"], &["leaf"], &["leaves", "store"], &["service"]] },
+    House { folder: "settings", floors: &[&["settings"], &["leaf"], &["leaves"], &["store"], &["service"]] },
     House {
         folder: "lidar3d",
         floors: &[&["calibration"], &["geometry"], &["intrinsic", "packet"], &["cloud"], &["place"]],

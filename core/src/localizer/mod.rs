@@ -1,5 +1,6 @@
 //! The machine that owns all below: one event in, outputs out.
 
+mod bounds;
 mod capacities;
 mod event;
 mod evidence;
@@ -17,6 +18,7 @@ mod start_finder;
 mod start_search;
 mod supervisor;
 
+pub use bounds::{ParameterError, bounds};
 pub use capacities::Capacities;
 pub use event::Event;
 pub use localize::Localize;

@@ -1,0 +1,314 @@
+//! Between what every number of the parameters must lie.
+
+use super::Parameters;
+use crate::odometry::{Tricycle, Vehicle};
+
+/// The bounds of one number.
+struct Bound {
+    leaf: &'static str,
+    least: f64,
+    most: f64,
+    get: fn(&Parameters) -> Option<f64>,
+}
+
+/// A parameter with which nothing can be computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParameterError {
+    /// Its name, as the settings have it.
+    pub leaf: &'static str,
+}
+
+impl core::fmt::Display for ParameterError {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(formatter, "{} is out of its bounds", self.leaf)
+    }
+}
+
+impl core::error::Error for ParameterError {}
+
+const TURN: f64 = core::f64::consts::TAU;
+/// The bounds of a standard deviation: zero would be certainty.
+const SMALL: f64 = 1e-9;
+
+const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
+    match &parameters.vehicle {
+        Vehicle::Tricycle(tricycle) => Some(tricycle),
+        Vehicle::Ackermann(_) | Vehicle::Increments => None,
+    }
+}
+
+const BOUNDS: [Bound; 41] = [
+    Bound {
+        leaf: "vehicle.wheelbase",
+        least: 0.05,
+        most: 50.0,
+        get: |parameters| Some(tricycle(parameters)?.wheelbase),
+    },
+    Bound {
+        leaf: "vehicle.drive_scale",
+        least: -1.0,
+        most: 1.0,
+        get: |parameters| Some(tricycle(parameters)?.drive_scale),
+    },
+    Bound {
+        leaf: "vehicle.steering_scale",
+        least: -1.0,
+        most: 1.0,
+        get: |parameters| Some(tricycle(parameters)?.steering_scale),
+    },
+    Bound {
+        leaf: "vehicle.steering_offset_forward",
+        least: -TURN,
+        most: TURN,
+        get: |parameters| Some(tricycle(parameters)?.steering_offset_forward),
+    },
+    Bound {
+        leaf: "vehicle.steering_offset_backward",
+        least: -TURN,
+        most: TURN,
+        get: |parameters| Some(tricycle(parameters)?.steering_offset_backward),
+    },
+    Bound { leaf: "laser.x", least: -20.0, most: 20.0, get: |parameters| Some(parameters.laser.x) },
+    Bound { leaf: "laser.y", least: -20.0, most: 20.0, get: |parameters| Some(parameters.laser.y) },
+    Bound { leaf: "laser.theta", least: -TURN, most: TURN, get: |parameters| Some(parameters.laser.theta) },
+    Bound {
+        leaf: "odometry.speed_deviation",
+        least: 0.0,
+        most: 10.0,
+        get: |parameters| Some(parameters.odometry_noise.speed),
+    },
+    Bound {
+        leaf: "odometry.steering_deviation",
+        least: 0.0,
+        most: 1.0,
+        get: |parameters| Some(parameters.odometry_noise.steering),
+    },
+    Bound { leaf: "odometry.slip", least: 0.0, most: 1.0, get: |parameters| Some(parameters.odometry_noise.slip) },
+    Bound {
+        leaf: "odometry.side_slip",
+        least: 0.0,
+        most: 1.0,
+        get: |parameters| Some(parameters.odometry_noise.side_slip),
+    },
+    Bound { leaf: "odometry.yaw", least: 0.0, most: 1.0, get: |parameters| Some(parameters.odometry_noise.yaw) },
+    Bound {
+        leaf: "odometry.unknown_acceleration",
+        least: SMALL,
+        most: 100.0,
+        get: |parameters| Some(parameters.odometry_noise.unknown_acceleration),
+    },
+    Bound {
+        leaf: "odometry.unknown_turn",
+        least: SMALL,
+        most: 100.0,
+        get: |parameters| Some(parameters.odometry_noise.unknown_turn),
+    },
+    Bound {
+        leaf: "reflectors.range_deviation",
+        least: SMALL,
+        most: 10.0,
+        get: |parameters| Some(parameters.reflectors.range_deviation),
+    },
+    Bound {
+        leaf: "reflectors.bearing_deviation",
+        least: SMALL,
+        most: 1.0,
+        get: |parameters| Some(parameters.reflectors.bearing_deviation),
+    },
+    Bound {
+        leaf: "features.nearest",
+        least: 0.0,
+        most: 250.0,
+        get: |parameters| Some(f64::from(parameters.features.nearest)),
+    },
+    Bound {
+        leaf: "features.farthest",
+        least: 0.1,
+        most: 250.0,
+        get: |parameters| Some(f64::from(parameters.features.farthest)),
+    },
+    Bound {
+        leaf: "features.added_deviation",
+        least: 0.0,
+        most: 10.0,
+        get: |parameters| Some(parameters.features.added_deviation),
+    },
+    Bound {
+        leaf: "association.reflector_radius",
+        least: 0.01,
+        most: 50.0,
+        get: |parameters| Some(parameters.association.reflector_radius),
+    },
+    Bound {
+        leaf: "association.feature_radius",
+        least: 0.01,
+        most: 50.0,
+        get: |parameters| Some(parameters.association.feature_radius),
+    },
+    Bound { leaf: "association.gate", least: 0.1, most: 1000.0, get: |parameters| Some(parameters.association.gate) },
+    Bound {
+        leaf: "association.margin",
+        least: 0.0,
+        most: 1000.0,
+        get: |parameters| Some(parameters.association.margin),
+    },
+    Bound {
+        leaf: "association.shared_map_error",
+        least: 1.0,
+        most: 10_000.0,
+        get: |parameters| Some(parameters.association.shared_map_error),
+    },
+    Bound {
+        leaf: "dynamic_map.update_rate",
+        least: 0.0,
+        most: 1.0,
+        get: |parameters| Some(parameters.dynamic_map.update_rate),
+    },
+    Bound {
+        leaf: "dynamic_map.deviation",
+        least: 0.0,
+        most: 10.0,
+        get: |parameters| Some(parameters.dynamic_map.deviation),
+    },
+    Bound {
+        leaf: "consistency.memory",
+        least: 1.0,
+        most: 10_000.0,
+        get: |parameters| Some(parameters.consistency.memory),
+    },
+    Bound {
+        leaf: "consistency.least_remaining",
+        least: 0.0,
+        most: 1.0,
+        get: |parameters| Some(parameters.consistency.least_remaining),
+    },
+    Bound {
+        leaf: "consistency.least_observations",
+        least: 0.0,
+        most: 10_000.0,
+        get: |parameters| Some(parameters.consistency.least_observations),
+    },
+    Bound {
+        leaf: "consistency.least_acceptance",
+        least: 0.0,
+        most: 1.0,
+        get: |parameters| Some(parameters.consistency.least_acceptance),
+    },
+    Bound {
+        leaf: "consistency.largest_normalised_square",
+        least: 2.0,
+        most: 1000.0,
+        get: |parameters| Some(parameters.consistency.largest_normalised_square),
+    },
+    Bound { leaf: "limits.fastest", least: 0.1, most: 100.0, get: |parameters| Some(parameters.limits.fastest) },
+    Bound {
+        leaf: "limits.dead_reckoning_from",
+        least: 0.0,
+        most: 10_000.0,
+        get: |parameters| Some(parameters.limits.dead_reckoning_from),
+    },
+    Bound {
+        leaf: "limits.lost_after",
+        least: 0.1,
+        most: 100_000.0,
+        get: |parameters| Some(parameters.limits.lost_after),
+    },
+    Bound {
+        leaf: "limits.largest_position_deviation",
+        least: SMALL,
+        most: 1000.0,
+        get: |parameters| Some(parameters.limits.largest_position_deviation),
+    },
+    Bound {
+        leaf: "limits.largest_heading_deviation",
+        least: SMALL,
+        most: TURN,
+        get: |parameters| Some(parameters.limits.largest_heading_deviation),
+    },
+    Bound {
+        leaf: "limits.longest_extrapolation",
+        least: 0.0,
+        most: 10.0,
+        get: |parameters| Some(parameters.limits.longest_extrapolation),
+    },
+    Bound {
+        leaf: "dynamic_map.first_hits",
+        least: 0.0,
+        most: 65_535.0,
+        get: |parameters| Some(f64::from(parameters.dynamic_map.first_hits)),
+    },
+    Bound {
+        leaf: "dynamic_map.most_hits",
+        least: 1.0,
+        most: 65_535.0,
+        get: |parameters| Some(f64::from(parameters.dynamic_map.most_hits)),
+    },
+    Bound {
+        leaf: "dynamic_map.least_hits",
+        least: 0.0,
+        most: 65_535.0,
+        get: |parameters| Some(f64::from(parameters.dynamic_map.least_hits)),
+    },
+];
+
+/// The least and the largest value of a number, by the name that the settings have for it. To be asked when a program is
+/// compiled: a name that no number has is an error then.
+///
+/// # Panics
+/// If no number has that name.
+#[must_use]
+pub const fn bounds(leaf: &str) -> (f64, f64) {
+    let mut index = 0;
+    while index < BOUNDS.len() {
+        #[allow(clippy::indexing_slicing, reason = "it is computed by the compiler, which has no other way")]
+        let bound = &BOUNDS[index];
+        if is_same(bound.leaf.as_bytes(), leaf.as_bytes()) {
+            return (bound.least, bound.most);
+        }
+        index += 1;
+    }
+    #[allow(clippy::panic, reason = "this is how the compiler is told")]
+    {
+        panic!("no number of the parameters has that name")
+    }
+}
+
+const fn is_same(one: &[u8], other: &[u8]) -> bool {
+    if one.len() != other.len() {
+        return false;
+    }
+    let mut index = 0;
+    while index < one.len() {
+        #[allow(clippy::indexing_slicing, reason = "it is computed by the compiler, which has no other way")]
+        if one[index] != other[index] {
+            return false;
+        }
+        index += 1;
+    }
+    true
+}
+
+impl Parameters {
+    /// Whether the localiser can compute with these parameters.
+    ///
+    /// # Errors
+    /// The first parameter that is not finite, or not within its bounds.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        for bound in &BOUNDS {
+            let is_within = (bound.get)(self).is_none_or(|value| (bound.least..=bound.most).contains(&value));
+            if !is_within {
+                return Err(ParameterError { leaf: bound.leaf });
+            }
+        }
+        let scales = tricycle(self).map(|tricycle| {
+            [("vehicle.drive_scale", tricycle.drive_scale), ("vehicle.steering_scale", tricycle.steering_scale)]
+        });
+        if let Some((leaf, _)) = scales.into_iter().flatten().find(|(_, scale)| *scale == 0.0) {
+            return Err(ParameterError { leaf });
+        }
+        if self.features.nearest >= self.features.farthest {
+            return Err(ParameterError { leaf: "features.nearest" });
+        }
+        Ok(())
+    }
+}

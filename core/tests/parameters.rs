@@ -1,0 +1,76 @@
+//! Parameters with which nothing can be computed are named.
+
+use agv_core::geometry::Pose;
+use agv_core::localizer::{ParameterError, Parameters, bounds};
+use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
+
+const TRICYCLE: Tricycle = Tricycle {
+    wheelbase: 1.5,
+    drive_scale: 1e-4,
+    drive_range: CounterRange::BITS_32,
+    steering_scale: 1e-4,
+    steering_range: CounterRange::BITS_16,
+    steering_offset_forward: 0.0,
+    steering_offset_backward: 0.0,
+};
+
+fn parameters() -> Parameters {
+    Parameters::new(Vehicle::Tricycle(TRICYCLE), Pose::new(0.9, 0.0, 0.0))
+}
+
+#[test]
+fn the_default_parameters_of_every_vehicle_are_sound() {
+    let vehicles = [
+        Vehicle::Tricycle(TRICYCLE),
+        Vehicle::Ackermann(Ackermann { wheelbase: 2.8, encoder_offset: 0.7 }),
+        Vehicle::Increments,
+    ];
+    for vehicle in vehicles {
+        assert_eq!(Parameters { vehicle, ..parameters() }.check(), Ok(()));
+    }
+}
+
+#[test]
+fn what_is_no_number_or_beyond_its_bounds_is_named() {
+    let cases: [(&'static str, fn(&mut Parameters, f64)); 7] = [
+        ("laser.x", |parameters, value| parameters.laser.x = value),
+        ("laser.theta", |parameters, value| parameters.laser.theta = value),
+        ("odometry.unknown_turn", |parameters, value| parameters.odometry_noise.unknown_turn = value),
+        ("reflectors.range_deviation", |parameters, value| parameters.reflectors.range_deviation = value),
+        ("association.gate", |parameters, value| parameters.association.gate = value),
+        ("consistency.memory", |parameters, value| parameters.consistency.memory = value),
+        ("limits.fastest", |parameters, value| parameters.limits.fastest = value),
+    ];
+    for (leaf, set) in cases {
+        let (least, most) = bounds(leaf);
+        for (value, expected) in [
+            (least, Ok(())),
+            (most, Ok(())),
+            (least - 1e-6 - least.abs() * 1e-6, Err(ParameterError { leaf })),
+            (most + 1e-6 + most.abs() * 1e-6, Err(ParameterError { leaf })),
+            (f64::NAN, Err(ParameterError { leaf })),
+            (f64::INFINITY, Err(ParameterError { leaf })),
+        ] {
+            let mut changed = parameters();
+            set(&mut changed, value);
+            assert_eq!(changed.check(), expected, "{leaf} {value}");
+        }
+    }
+}
+
+#[test]
+fn a_wheel_without_a_scale_and_ranges_that_exclude_each_other_are_named() {
+    for (leaf, tricycle) in [
+        ("vehicle.wheelbase", Tricycle { wheelbase: 0.0, ..TRICYCLE }),
+        ("vehicle.drive_scale", Tricycle { drive_scale: 0.0, ..TRICYCLE }),
+        ("vehicle.steering_scale", Tricycle { steering_scale: 0.0, ..TRICYCLE }),
+    ] {
+        let changed = Parameters { vehicle: Vehicle::Tricycle(tricycle), ..parameters() };
+        assert_eq!(changed.check(), Err(ParameterError { leaf }));
+    }
+    let mut changed = parameters();
+    changed.features.nearest = changed.features.farthest;
+    let error = changed.check().err();
+    assert_eq!(error, Some(ParameterError { leaf: "features.nearest" }));
+    assert_eq!(error.map(|error| error.to_string()).as_deref(), Some("features.nearest is out of its bounds"));
+}
