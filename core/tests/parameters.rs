@@ -30,9 +30,11 @@ fn the_default_parameters_of_every_vehicle_are_sound() {
     }
 }
 
+type Set = fn(&mut Parameters, f64);
+
 #[test]
 fn what_is_no_number_or_beyond_its_bounds_is_named() {
-    let cases: [(&'static str, fn(&mut Parameters, f64)); 7] = [
+    let cases: [(&'static str, Set); 7] = [
         ("laser.x", |parameters, value| parameters.laser.x = value),
         ("laser.theta", |parameters, value| parameters.laser.theta = value),
         ("odometry.unknown_turn", |parameters, value| parameters.odometry_noise.unknown_turn = value),

@@ -118,7 +118,7 @@ impl Source {
                     SurveyError::Setup(error) => SourceError::Setup(error),
                 })?;
                 let ouster = options.ouster()?;
-                let packets = Packets::Capture { port: survey.port, path, ouster };
+                let packets = Packets::Capture { port: survey.port, path, ouster: ouster.map(Box::new) };
                 Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
             }
             Self::Images(path) => {
@@ -160,7 +160,8 @@ impl Source {
                     return Err(SourceError::Silent { port });
                 }
                 let survey = surveyor.finish();
-                let packets = Packets::Live { port, listener, waiting, ouster };
+                let packets =
+                    Packets::Live { port, listener: Box::new(listener), waiting, ouster: ouster.map(Box::new) };
                 Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
             }
         }
@@ -168,10 +169,10 @@ impl Source {
 }
 
 enum Packets {
-    Capture { path: PathBuf, port: Option<u16>, ouster: Option<ouster::Sensor> },
+    Capture { path: PathBuf, port: Option<u16>, ouster: Option<Box<ouster::Sensor>> },
     Images(RangeImages),
     Clouds(Vec<PathBuf>),
-    Live { port: u16, listener: Listener, waiting: Vec<(Time, Vec<u8>)>, ouster: Option<ouster::Sensor> },
+    Live { port: u16, listener: Box<Listener>, waiting: Vec<(Time, Vec<u8>)>, ouster: Option<Box<ouster::Sensor>> },
 }
 
 /// A source that has been looked at.
@@ -237,7 +238,7 @@ impl OpenSource {
         };
         let name = match &mut self.packets {
             Packets::Capture { path, port, ouster } => {
-                capture::for_each_until(path, *port, ouster.as_ref(), |time, datagram| {
+                capture::for_each_until(path, *port, ouster.as_deref(), |time, datagram| {
                     push(time, datagram, &mut revolutions)
                 })?;
                 path.display().to_string()
@@ -261,7 +262,7 @@ impl OpenSource {
             Packets::Live { port, listener, waiting, ouster } => {
                 let port_now = listener.port();
                 let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
-                    match Datagram::recognise(&bytes, port_now, ouster.as_ref()) {
+                    match Datagram::recognise(&bytes, port_now, ouster.as_deref()) {
                         Ok(Some(datagram)) => push(time, &datagram, &mut revolutions),
                         Ok(None) | Err(_) => ControlFlow::Continue(()),
                     }

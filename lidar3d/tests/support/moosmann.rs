@@ -61,7 +61,7 @@ fn keys(path: &Path) -> Vec<Key> {
         let values: Vec<f64> = line.split_whitespace().map(|value| value.parse().unwrap()).collect();
         let (x, y) = (values[3], values[7]);
         if let Some([a, b]) = last.replace([x, y]) {
-            travelled += (x - a as f64).hypot(y - b as f64);
+            travelled += (x - a).hypot(y - b);
         }
         if keys.last().is_none_or(|key| travelled - key.travelled >= 1.0) {
             keys.push(Key { position: [x, y], travelled, scan });

@@ -31,7 +31,7 @@ fn pose(output: &PoseOutput, limits: &Limits) -> Option<String> {
     if !((0.0..=1.0).contains(&output.acceptance) && (0.0..=f64::MAX).contains(&output.normalised_square)) {
         return Some(format!("acceptance {}, normalised square {}", output.acceptance, output.normalised_square));
     }
-    let level = ProtectionLevel::of(&output);
+    let level = ProtectionLevel::of(output);
     if !(0.0..f64::INFINITY).contains(&level.position) || !(0.0..f64::INFINITY).contains(&level.heading) {
         return Some(format!("{level:?}, drift {:?}", output.drift));
     }
