@@ -7,7 +7,7 @@ use super::maps::Maps;
 use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
 use super::supervisor::{Support, supervise};
-use super::{Capacities, Event, Localize, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
+use super::{Capacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::{Estimate, Integrity, Replacement, is_sure};
@@ -132,7 +132,7 @@ impl<
                 reflectors: Vec::new(),
                 sightings: Vec::new(),
             },
-            outputs: Outputs { pose, uses: Vec::new(), has_cut: false },
+            outputs: Outputs { pose, uses: Vec::new(), misuse: None, has_cut: false },
             parameters,
         }
     }
@@ -157,6 +157,25 @@ impl<
             rest = others;
         }
         Ok(())
+    }
+
+    /// Replaces all landmarks of the fixed maps, also while the vehicle drives: what is seen next is compared with the new
+    /// ones. What was found while driving remains, as it may be on none of them.
+    ///
+    /// # Errors
+    /// [`MapError`] if the landmarks do not fit; the maps are as before then.
+    pub fn replace_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
+        if !landmarks.iter().all(Landmark::is_finite) {
+            return Err(MapError::NotFinite);
+        }
+        let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector).count();
+        if reflectors > REFLECTORS || landmarks.len() - reflectors > FEATURES {
+            return Err(MapError::Full);
+        }
+        self.maps.reflectors.clear();
+        self.maps.features.clear();
+        self.slam.forget_given();
+        self.add_landmarks(landmarks)
     }
 
     /// What the localiser believes of its vehicle and its sensors.
@@ -200,6 +219,7 @@ impl<
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.outputs.uses.clear();
         self.outputs.has_cut = false;
+        self.outputs.misuse = None;
         if let Some((from, until)) = event.seen().filter(|(_, until)| *until > self.timeline.now()) {
             self.bridge(from, until);
         }
@@ -292,11 +312,13 @@ impl<
 
     fn set_pose(&mut self, fix: &PoseFix) {
         if !fix.is_sound() {
+            self.outputs.misuse = Some(Misuse::NoPose);
             return;
         }
         let is_past = self.timeline.begun().is_some_and(|timeline| fix.time < timeline.now());
         // A pose of a time that has not come yet is no reason to refuse one of now.
         if is_past && self.lost != Some(Reason::NoPose) && self.timeline.reaches(fix.time).is_err() {
+            self.outputs.misuse = Some(Misuse::TooLate);
             return;
         }
         let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
@@ -325,6 +347,11 @@ impl<
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
+        self.outputs.misuse = match &motion {
+            Err(OdometryError::WrongVehicle) => Some(Misuse::WrongVehicle),
+            Err(OdometryError::OutOfOrder) => Some(Misuse::OutOfOrder),
+            _ => None,
+        };
         let Some(start) = self.timeline.begun().map(Timeline::start) else {
             return;
         };

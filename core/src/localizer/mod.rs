@@ -23,7 +23,7 @@ pub use capacities::Capacities;
 pub use event::Event;
 pub use localize::Localize;
 pub use machine::Localizer;
-pub use output::{OBSERVATIONS, Outputs};
+pub use output::{Misuse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
 

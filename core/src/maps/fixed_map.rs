@@ -44,8 +44,7 @@ impl<const LANDMARKS: usize> FixedMap<LANDMARKS> {
     /// [`MapError`] for the first landmark that does not fit; those before it are in the map.
     pub fn extend(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
         let outcome = landmarks.iter().try_for_each(|landmark| {
-            let is_finite = landmark.x.is_finite() && landmark.y.is_finite();
-            if !(is_finite && landmark.deviation >= 0.0 && landmark.deviation.is_finite()) {
+            if !landmark.is_finite() {
                 return Err(MapError::NotFinite);
             }
             self.landmarks.push(*landmark).map_err(|_| MapError::Full)

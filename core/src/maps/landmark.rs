@@ -38,6 +38,12 @@ impl Landmark {
         Self { id, kind: LandmarkKind::Reflector, x: position.x, y: position.y, deviation }
     }
 
+    /// Whether the position is finite, and its deviation finite and not negative.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.x.is_finite() && self.y.is_finite() && self.deviation >= 0.0 && self.deviation.is_finite()
+    }
+
     /// Position in W, m.
     #[must_use]
     pub fn position(&self) -> Point {

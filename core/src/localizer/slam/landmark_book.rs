@@ -35,6 +35,15 @@ impl<const LANDMARKS: usize> LandmarkBook<LANDMARKS> {
         self.entries.fill(None);
     }
 
+    /// Forgets the landmarks that were given; `remove` is called with their places.
+    pub(super) fn forget_given(&mut self, mut remove: impl FnMut(usize)) {
+        for (place, slot) in self.entries.iter_mut().enumerate() {
+            if slot.take_if(|entry| entry.source == LandmarkSource::Fixed).is_some() {
+                remove(place);
+            }
+        }
+    }
+
     /// The landmarks with their places in the state.
     pub(super) fn entries(&self) -> impl Iterator<Item = (usize, &BookEntry)> {
         self.entries.iter().enumerate().filter_map(|(place, entry)| Some((place, entry.as_ref()?)))

@@ -83,6 +83,12 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         self.place = (state.pose, 0);
     }
 
+    /// Forgets the landmarks that were given beforehand, as their map is replaced.
+    pub(super) fn forget_given(&mut self) {
+        let Self { book, filter, .. } = self;
+        book.forget_given(|place| filter.remove_landmark(place));
+    }
+
     /// What is known of the odometry's bias.
     pub(super) fn bias(&self) -> OdometryBias {
         self.filter.bias()
