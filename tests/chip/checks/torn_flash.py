@@ -1,8 +1,9 @@
 """Power that goes while the flash is written: the chip starts again, and has lost nothing that was there before."""
 
-from bench import check_sound, describe, emergencies, start
+from bench import check_sound, describe, start
 from emulated_chip.clock import MILLISECOND, SECOND
 from emulated_chip.flash import PowerCut
+from stored_settings import starts
 
 # Starts in which power goes at each of the words that a start programs.
 WORDS = 6
@@ -48,4 +49,15 @@ def survives_an_erase_cut_short(bench):
         assert not bad, f"pages {pages}: {len(bad)} words are still bad"
 
 
-CHECKS = [survives_torn_words, survives_an_erase_cut_short]
+def writes_after_an_error(bench):
+    """An error of the flash is left over: what is written after it is written."""
+    chip = bench.chip()
+    chip.peripherals["FLASH"].banks[1].fail("PGSERR")
+    start(chip)
+    chip.run_for(50 * MILLISECOND)
+    check_sound(chip)
+    first = bytes(chip.settings_flash.bytes[6 * 128 * 1024 :])
+    assert starts(1) in first, "the start is not counted"
+
+
+CHECKS = [survives_torn_words, survives_an_erase_cut_short, writes_after_an_error]

@@ -11,6 +11,7 @@ ENABLE_BITS = {MEMORY_FAULT: 1 << 16, BUS_FAULT: 1 << 17, USAGE_FAULT: 1 << 18}
 
 # Bits of CFSR (B3.2.15).
 DATA_VIOLATION, MEMORY_ADDRESS_VALID = 1 << 1, 1 << 7
+MEMORY_STACKING_ERROR = 1 << 4
 PRECISE_ERROR, STACKING_ERROR, BUS_ADDRESS_VALID = 1 << 9, 1 << 12, 1 << 15
 UNDEFINED_INSTRUCTION = 1 << 16
 FORCED = 1 << 30
@@ -129,11 +130,14 @@ class Exceptions:
         if has_floats:
             words += list(processor.get_all(FLOATS)) + [0]
         stack = (stack - pad - 4 * len(words)) & 0xFFFF_FFFF
-        if not self.chip.is_stack(stack, 4 * len(words)):
-            self._on_stacking_error(stack)
-            return
-        data = b"".join((word & 0xFFFF_FFFF).to_bytes(4, "little") for word in words)
-        processor.engine.mem_write(stack, data)
+        if self.chip.is_stack(stack, 4 * len(words)):
+            data = b"".join((word & 0xFFFF_FFFF).to_bytes(4, "little") for word in words)
+            processor.engine.mem_write(stack, data)
+        else:
+            # The frame is lost, and the fault of stacking it is taken instead, without another one (B1.5.11).
+            cause = MEMORY_STACKING_ERROR if system.forbids(stack, True) else STACKING_ERROR
+            system.note_fault(cause, FORCED)
+            number = HARD_FAULT
         link = 0xFFFF_FFF1 if self.active else 0xFFFF_FFF9
         processor.set_all(STATE, [stack, THUMB | number, control & ~FPCA])
         processor.set(arm.UC_ARM_REG_LR, link & ~0x10 if has_floats else link)
@@ -142,11 +146,6 @@ class Exceptions:
             self.taken.append((self.chip.clock.now(), number, return_address))
         processor.pc = processor.word(system.vector_table() + 4 * number) & ~1
         processor.progress.is_pending = int(self._candidate() is not None)
-
-    def _on_stacking_error(self, stack):
-        """The frame does not fit the memory of the stack: a bus fault whose own frame does not fit either."""
-        self.chip.system.note_fault(STACKING_ERROR, FORCED)
-        self.chip.lock_up(f"the stack pointer is {stack:#010x} when an exception is to be taken")
 
     def leave(self, link):
         """Returns from the exception that runs (B1.5.8)."""

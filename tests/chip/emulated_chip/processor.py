@@ -13,7 +13,6 @@ from .finding import Finding
 # Nothing is there: where Unicorn would stop by itself.
 NOWHERE = 0xDEAD_0000
 WFI = b"\x30\xbf"
-EXCEPTION_RETURN = 8
 NEVER = (1 << 64) - 1
 
 INVALID_WRITES = (const.UC_MEM_WRITE_UNMAPPED, const.UC_MEM_WRITE_PROT)
@@ -136,7 +135,8 @@ class Processor:
 
     def _on_stop_by_interrupt(self, number):
         here = self.pc
-        if number == EXCEPTION_RETURN and here >= 0xFFFF_FF00:
+        # A jump to such an address is a return wherever an exception is handled; Unicorn does not always know that one is.
+        if here >= 0xFFFF_FF00 and self.chip.exceptions.active:
             self.chip.exceptions.leave(here)
             return
         if number == 7:
