@@ -71,6 +71,7 @@ class DataFlash:
         self.flash = flash
         self.size = len(flash.bytes)
         self.reads = 0
+        self.open_page = None
         self._apart = {}
         self._cached = {}
         chip.processor.engine.mmio_map(base, self.size, self._read, None, self._write, None)
@@ -136,6 +137,19 @@ class DataFlash:
 
     def is_apart(self, address):
         return (address - self.base) & ~(PAGE - 1) in self._apart
+
+    def open_for_a_block(self, address):
+        """Lets the block of code that meets a page that is apart read it. The words around are good."""
+        page = (address - self.base) & ~(PAGE - 1)
+        ctypes.memmove(self._apart[page], self.seen(page, PAGE), PAGE)
+        self.chip.processor.engine.mem_protect(self.base + page, PAGE, UC_PROT_ALL)
+        self.open_page = page
+
+    def close(self):
+        """Behind that block."""
+        if self.open_page in self._apart:
+            self.chip.processor.engine.mem_protect(self.base + self.open_page, PAGE, UC_PROT_NONE)
+        self.open_page = None
 
     def step_over(self, address, size, is_write, value):
         """Runs the one instruction that meets a page that is apart."""
