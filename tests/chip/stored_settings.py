@@ -3,6 +3,8 @@
 WORD = 32
 PAGE = 128 * 1024
 STARTS_KEY = 2
+# The first of the two pages, in its bank.
+FIRST_PAGE = 6
 
 
 def crc16(data):
@@ -40,6 +42,16 @@ def item(key, value):
 def starts(number):
     """The item that counts starts."""
     return item(STARTS_KEY, number.to_bytes(4, "little"))
+
+
+# Leaf 300 is the controller's node: a whole number (variant 1 of the leaf's value) as `postcard` writes it.
+NODE_17 = item(300, bytes([1, 17]))
+
+
+def write(flash, page, items):
+    """A page that holds these items and has room for more."""
+    contents = b"\0" * WORD + items
+    flash.bytes[page * PAGE : page * PAGE + len(contents)] = contents
 
 
 def fill(flash, page, first_items=b"", room=0):

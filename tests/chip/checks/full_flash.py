@@ -3,13 +3,10 @@
 from bench import LONGEST_START, check_sound, describe, poses
 from emulated_chip.clock import MILLISECOND, SECOND
 from emulated_chip.flash import Flash
-from stored_settings import PAGE, fill, item, starts
+from stored_settings import FIRST_PAGE, NODE_17, PAGE, fill, starts
 
 # From the reset to the first pose on the bus.
 LONGEST = 1 * SECOND
-FIRST_PAGE = 6
-# Leaf 300 is the controller's node: a whole number (variant 1 of the leaf's value) as `postcard` writes it.
-NODE_17 = item(300, bytes([1, 17]))
 
 
 def first_pose(chip):

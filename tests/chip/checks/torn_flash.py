@@ -2,16 +2,25 @@
 
 from bench import check_sound, describe, start
 from emulated_chip.clock import MILLISECOND, SECOND
-from emulated_chip.flash import PowerCut
-from stored_settings import starts
+from emulated_chip.flash import Flash, PowerCut
+from stored_settings import FIRST_PAGE, NODE_17, fill, starts, write
 
 # Starts in which power goes at each of the words that a start programs.
 WORDS = 6
 
 
+def node_of(chip):
+    """The node that the chip takes part as, by its heartbeat; a setting that is not the default one tells that it is kept."""
+    chip.run_for(200 * MILLISECOND)
+    found = {frame.identifier - 0x700 for _, frame in chip.listener.heard if frame.identifier >= 0x700}
+    assert len(found) == 1, f"nodes {found}: {describe(chip)}"
+    return found.pop()
+
+
 def survives_torn_words(bench):
     """Power goes at each flash word that a start programs, at several starts in a row; the chip starts each time."""
-    flash = None
+    flash = Flash(bench.description.memory["BANK_2"][1])
+    write(flash, FIRST_PAGE, NODE_17)
     torn = 0
     for number in range(1, WORDS + 1 if not bench.is_long else 40):
         for at in (1, 2, 3):
@@ -26,7 +35,32 @@ def survives_torn_words(bench):
     bench.note("torn_words", torn)
     chip = bench.chip(settings=flash)
     start(chip)
+    assert node_of(chip) == 17, "a setting is lost"
     check_sound(chip)
+
+
+def survives_a_cut_while_a_page_is_moved(bench):
+    """Power goes while the items of a page that is full are moved to the other one, and while the old one is erased."""
+    cuts = [("program", 2), ("erase", 1)]
+    if bench.is_long:
+        cuts = [("program", at) for at in range(1, 12)] + [("erase", 1)]
+    for kind, at in cuts:
+        flash = Flash(bench.description.memory["BANK_2"][1])
+        number = fill(flash, FIRST_PAGE, NODE_17)
+        chip = bench.chip(settings=flash)
+        chip.cut = PowerCut(at, kind)
+        chip.run_for(14 * SECOND)
+        if kind == "program" and chip.has_power:
+            break
+        assert not chip.has_power and not chip.findings, f"{kind} {at}: no cut: {describe(chip)}"
+        again = bench.chip(settings=flash)
+        start(again)
+        assert node_of(again) == 17, f"{kind} {at}: a setting is lost"
+        again.run_for(14 * SECOND)
+        check_sound(again)
+        # A count that never comes again (the nonces of the service port stand on it).
+        counted = max(count for count in range(number + 4) if starts(count) in bytes(flash.bytes))
+        assert counted > number, f"{kind} {at}: the last count is {counted}, and {number} was before"
 
 
 def survives_an_erase_cut_short(bench):
@@ -60,4 +94,4 @@ def writes_after_an_error(bench):
     assert starts(1) in first, "the start is not counted"
 
 
-CHECKS = [survives_torn_words, survives_an_erase_cut_short, writes_after_an_error]
+CHECKS = [survives_torn_words, survives_a_cut_while_a_page_is_moved, survives_an_erase_cut_short, writes_after_an_error]

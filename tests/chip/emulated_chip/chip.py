@@ -247,7 +247,7 @@ class Chip:
             self.exceptions.memory_fault(address)
             return
         if self.data_flash.covers(address) and self.data_flash.is_apart(address):
-            self._access_torn_page(address, size, is_write, value)
+            self._access_torn_page(address, size, is_write)
             return
         ram = self.ram_at(address)
         if ram and not ram.is_mapped:
@@ -256,7 +256,7 @@ class Chip:
             finding = Finding("reserved", f"a {what} of an address that nobody has", address, pc, self.symbol(pc))
         self.end(finding)
 
-    def _access_torn_page(self, address, size, is_write, value):
+    def _access_torn_page(self, address, size, is_write):
         code = bytes(self.processor.engine.mem_read(self.processor.pc, 4))
         count = max(size, transfer_size(code))
         flash = self.peripherals["FLASH"]
@@ -269,7 +269,7 @@ class Chip:
         if not is_write and not flash.is_bad(word, 2 * WORD) and not self.system.is_cached(address):
             self.data_flash.open_for_a_block(address)
         else:
-            self.data_flash.step_over(address, size, is_write, value)
+            self.data_flash.step_over(address, size if size < 4 else count, is_write)
 
     def track_written_lines(self):
         """From now on every store to cached RAM is a dirty line, until it is cleaned or makes room."""

@@ -151,17 +151,17 @@ class DataFlash:
             self.chip.processor.engine.mem_protect(self.base + self.open_page, PAGE, UC_PROT_NONE)
         self.open_page = None
 
-    def step_over(self, address, size, is_write, value):
-        """Runs the one instruction that meets a page that is apart."""
+    def step_over(self, address, size, is_write):
+        """Runs the one instruction that meets a page that is apart, and moves so many bytes."""
         page = (address - self.base) & ~(PAGE - 1)
         engine = self.chip.processor.engine
-        if is_write:
-            data = bytes(PAGE)
-        else:
-            data = self.seen(page, PAGE)
-        ctypes.memmove(self._apart[page], data, PAGE)
+        ctypes.memmove(self._apart[page], self.seen(page, PAGE), PAGE)
         engine.mem_protect(self.base + page, PAGE, UC_PROT_ALL)
         self.chip.processor.step()
         engine.mem_protect(self.base + page, PAGE, UC_PROT_NONE)
         if is_write:
-            self.bank().store(address - self.base, size, value)
+            place = address - self.base
+            stored = bytes(self._apart[page][place - page : place - page + size])
+            for offset in range(0, size, 4):
+                part = stored[offset : offset + 4]
+                self.bank().store(place + offset, len(part), int.from_bytes(part, "little"))

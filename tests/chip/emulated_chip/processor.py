@@ -130,7 +130,11 @@ class Processor:
     def step(self):
         """One instruction."""
         limit, self.progress.limit = self.progress.limit, NEVER
-        self.engine.emu_start(self.pc | 1, NOWHERE, count=1)
+        here = self.pc
+        # A block that was translated from here on would be run to its end.
+        self.engine.ctl_remove_cache(here, here + 4)
+        self.engine.emu_start(here | 1, NOWHERE, count=1)
+        self.engine.ctl_remove_cache(here, here + 4)
         self.progress.limit = limit
 
     def _on_stop_by_interrupt(self, number):
