@@ -28,7 +28,7 @@ def starts_within_a_second_when_full(bench):
         assert first_pose(chip) is not None, f"no pose of node 17: {describe(chip)}"
         results[room] = round(first_pose(chip) / MILLISECOND, 1)
         bench.note(f"first_pose_ms_with_room_for_{room}", results[room])
-        chip.run_for(12 * SECOND if room == 0 else SECOND)
+        chip.run_for(4 * SECOND if room == 0 else SECOND)
         check_sound(chip)
         # The start was counted all the same, and the setting is still there.
         contents = bytes(flash.bytes[FIRST_PAGE * PAGE :])
@@ -42,7 +42,7 @@ def reads_what_it_has_written(bench):
     """The page is full, so that the other one is written and this one erased; then settings are read again."""
     chip = bench.chip()
     number = fill(chip.settings_flash, FIRST_PAGE, NODE_17)
-    chip.run_for(12 * SECOND)
+    chip.run_for(4 * SECOND)
     check_sound(chip)
     assert chip.settings_flash.erases, "nothing was erased"
     assert starts(number + 1) in bytes(chip.settings_flash.bytes), "the start is not counted"

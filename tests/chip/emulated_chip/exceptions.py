@@ -16,17 +16,17 @@ PRECISE_ERROR, STACKING_ERROR, BUS_ADDRESS_VALID = 1 << 9, 1 << 12, 1 << 15
 UNDEFINED_INSTRUCTION = 1 << 16
 FORCED = 1 << 30
 
-FRAME = [
+FRAME = (
     arm.UC_ARM_REG_R0,
     arm.UC_ARM_REG_R1,
     arm.UC_ARM_REG_R2,
     arm.UC_ARM_REG_R3,
     arm.UC_ARM_REG_R12,
     arm.UC_ARM_REG_LR,
-]
-STATE = [arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_CONTROL]
-FLOATS = [arm.UC_ARM_REG_S0 + number for number in range(16)] + [arm.UC_ARM_REG_FPSCR]
-MASKS = [arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_FAULTMASK, arm.UC_ARM_REG_BASEPRI]
+)
+STATE = (arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_CONTROL)
+FLOATS = (*(arm.UC_ARM_REG_S0 + number for number in range(16)), arm.UC_ARM_REG_FPSCR)
+MASKS = (arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_FAULTMASK, arm.UC_ARM_REG_BASEPRI)
 FPCA = 1 << 2
 PADDED = 1 << 9
 THUMB = 1 << 24
@@ -165,7 +165,7 @@ class Exceptions:
             processor.set_all(FLOATS, words[8:25])
             control |= FPCA
         processor.set_all(STATE, [stack, status & ~PADDED, control])
-        processor.set_all(FRAME, words)
+        processor.set_all(FRAME, words[:6])
         processor.pc = words[6] & ~1
         if number in self.levels:
             self.pend(number)

@@ -74,7 +74,19 @@ class DataFlash:
         self.open_page = None
         self._apart = {}
         self._cached = {}
-        chip.processor.engine.mmio_map(base, self.size, self._read, None, self._write, None)
+        for page in range(0, self.size, PAGE):
+            self._map(page)
+
+    def _map(self, page):
+        """Each page is a region of its own: Unicorn counts offsets from elsewhere where a region is taken apart."""
+        self.chip.processor.engine.mmio_map(
+            self.base + page,
+            PAGE,
+            lambda engine, offset, size, _: self._read(engine, page + offset, size, None),
+            None,
+            lambda engine, offset, size, value, _: self._write(engine, page + offset, size, value, None),
+            None,
+        )
 
     def covers(self, address):
         return self.base <= address < self.base + self.size
@@ -120,14 +132,7 @@ class DataFlash:
         wanted = {word & ~(PAGE - 1) for word in self.flash.bad}
         for page in set(self._apart) - wanted:
             engine.mem_unmap(self.base + page, PAGE)
-            engine.mmio_map(
-                self.base + page,
-                PAGE,
-                lambda engine, offset, size, _, page=page: self._read(engine, page + offset, size, None),
-                None,
-                lambda engine, offset, size, value, _, page=page: self._write(engine, page + offset, size, value, None),
-                None,
-            )
+            self._map(page)
             del self._apart[page]
         for page in wanted - set(self._apart):
             engine.mem_unmap(self.base + page, PAGE)
