@@ -10,6 +10,7 @@ use embassy_futures::block_on;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use heapless::Vec;
 use sequential_storage::Error;
+use sequential_storage::cache::key_pointers::ArrayKeyPointers;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 use serde::{Deserialize, Serialize};
@@ -116,11 +117,16 @@ impl<F: NorFlash> embedded_storage_async::nor_flash::NorFlash for Immediate<F> {
     }
 }
 
-type NoCache = Cache<Uncached, Uncached, Uncached, u16>;
+/// Where the items of that many keys are, those of all leaves among them: a page that is full is moved in one pass over its
+/// items, not in one for each of them.
+const KNOWN_KEYS: usize = 72;
+const _: () = assert!(KNOWN_KEYS > LEAVES.len(), "all leaves are known");
+
+type KnownKeys = Cache<Uncached, Uncached, ArrayKeyPointers<u16, KNOWN_KEYS>, u16>;
 
 /// The storage in a flash of two or more pages, all of it.
 pub struct Store<F: NorFlash> {
-    storage: MapStorage<u16, Immediate<F>, NoCache>,
+    storage: MapStorage<u16, Immediate<F>, KnownKeys>,
     buffer: [u8; BUFFER],
 }
 
@@ -130,7 +136,8 @@ impl<F: NorFlash> Store<F> {
     pub fn new(flash: F) -> Option<Self> {
         let end = u32::try_from(flash.capacity()).ok()?;
         let config = MapConfig::try_new(0..end).ok()?;
-        let storage = MapStorage::new(Immediate(flash), config, Cache::new_uncached());
+        let cache = Cache::new(Uncached, Uncached, ArrayKeyPointers::new());
+        let storage = MapStorage::new(Immediate(flash), config, cache);
         Some(Self { storage, buffer: [0; BUFFER] })
     }
 
@@ -146,27 +153,16 @@ impl<F: NorFlash> Store<F> {
         landmarks: &mut Vec<Landmark, LANDMARKS>,
     ) -> Result<Loaded, StoreError> {
         let mut loaded = Loaded::default();
-        for leaf in &LEAVES {
-            match self.fetch(leaf.key) {
-                Ok(None) => {}
-                Ok(Some(bytes)) => {
-                    let value = postcard::from_bytes::<Value>(bytes).ok();
-                    match value.map(|value| leaf.set(settings, value)) {
-                        Some(Ok(())) => loaded.leaves += 1,
-                        _ => loaded.bad += 1,
-                    }
-                }
-                Err(FetchError::Rubbish) => {
-                    self.format()?;
-                    loaded.was_formatted = true;
-                    break;
-                }
-                Err(FetchError::Item) => loaded.bad += 1,
-                Err(FetchError::Flash) => return Err(StoreError::Flash),
+        let has_items = match self.load_leaves(settings, &mut loaded) {
+            Ok(has_items) => has_items,
+            Err(FetchError::Flash) => return Err(StoreError::Flash),
+            Err(_) => {
+                self.format()?;
+                loaded.was_formatted = true;
+                true
             }
-        }
+        };
         // Rubbish may look like a storage in which nothing was stored, until it is written to.
-        let has_items = [KEY_ITEM, STARTS_ITEM, MAP_ITEM].iter().any(|item| matches!(self.fetch(*item), Ok(Some(_))));
         if loaded.leaves == 0 && !has_items && !self.is_erased()? {
             self.format()?;
             loaded.was_formatted = true;
@@ -179,6 +175,38 @@ impl<F: NorFlash> Store<F> {
             loaded.is_map_damaged = true;
         }
         Ok(loaded)
+    }
+
+    /// Reads all items once, as they follow each other: a page holds thousands, and to look for each leaf takes seconds.
+    /// Returns whether there are items that are no leaf.
+    // One copy: what it works with takes kilobytes of stack.
+    #[inline(never)]
+    fn load_leaves(&mut self, settings: &mut Settings, loaded: &mut Loaded) -> Result<bool, FetchError> {
+        let before = settings.clone();
+        let mut are_good = [None; LEAVES.len()];
+        let mut has_items = false;
+        let mut items = block_on(self.storage.fetch_all_items(&mut self.buffer)).map_err(FetchError::from)?;
+        loop {
+            let (key, bytes) = match block_on(items.next::<&[u8]>(&mut self.buffer)).map_err(FetchError::from) {
+                Ok(Some(item)) => item,
+                Ok(None) => break,
+                // It has no key.
+                Err(FetchError::Item) => continue,
+                Err(error) => return Err(error),
+            };
+            has_items |= [KEY_ITEM, STARTS_ITEM, MAP_ITEM].contains(&key);
+            let found = LEAVES.iter().zip(&mut are_good).find(|(leaf, _)| leaf.key == key);
+            let Some((leaf, is_good)) = found else { continue };
+            let value = postcard::from_bytes::<Value>(bytes).ok();
+            let is_set = value.is_some_and(|value| leaf.set(settings, value).is_ok());
+            if !is_set && let Some(value) = leaf.get(&before) {
+                let _ = leaf.set(settings, value);
+            }
+            *is_good = Some(is_set);
+        }
+        loaded.leaves = are_good.iter().filter(|is_good| **is_good == Some(true)).count() as u16;
+        loaded.bad = are_good.iter().filter(|is_good| **is_good == Some(false)).count() as u16;
+        Ok(has_items)
     }
 
     fn load_map(&mut self, index: MapIndex, landmarks: &mut Vec<Landmark, LANDMARKS>) -> Option<()> {
@@ -328,11 +356,7 @@ impl<F: NorFlash> Store<F> {
     // One copy: what it works with takes kilobytes of stack.
     #[inline(never)]
     fn fetch(&mut self, key: u16) -> Result<Option<&[u8]>, FetchError> {
-        block_on(self.storage.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(|error| match error {
-            Error::Storage { .. } => FetchError::Flash,
-            Error::Corrupted { .. } => FetchError::Rubbish,
-            _ => FetchError::Item,
-        })
+        block_on(self.storage.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(FetchError::from)
     }
 
     // One copy: what it works with takes kilobytes of stack.
@@ -349,4 +373,14 @@ enum FetchError {
     Flash,
     Rubbish,
     Item,
+}
+
+impl<E> From<Error<E>> for FetchError {
+    fn from(error: Error<E>) -> Self {
+        match error {
+            Error::Storage { .. } => Self::Flash,
+            Error::Corrupted { .. } => Self::Rubbish,
+            _ => Self::Item,
+        }
+    }
 }

@@ -78,6 +78,23 @@ fn the_same_settings_wear_nothing_out() {
 }
 
 #[test]
+fn a_full_page_is_read_a_few_times_and_not_once_for_each_setting() {
+    let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
+    store.store_leaves(&changed(0.3)).unwrap();
+    let items = LARGE / (2 * WORD);
+    for _ in LEAVES.len()..items - 2 {
+        store.count_start().unwrap();
+    }
+    let mut flash = store.into_flash();
+    flash.reads = 0;
+    let mut store = Store::new(flash).unwrap();
+    assert_eq!(load(&mut store).0, changed(0.3));
+    let flash = store.into_flash();
+    // A header and its data for each item: once for all leaves, and once each for the map and whatever is looked for.
+    assert!(flash.reads > items && flash.reads < 8 * items, "{} reads for {items} items", flash.reads);
+}
+
+#[test]
 fn a_loss_of_power_at_any_point_leaves_each_setting_old_or_new() {
     let (old, new) = (changed(0.3), changed(0.6));
     let mut store = Store::new(Flash::<SMALL>::new()).unwrap();

@@ -48,6 +48,8 @@ def check_sound(chip, resets=1):
     """Nothing forbidden, no fault, no reset but those that were asked for."""
     assert not chip.findings and not chip.exceptions.taken, describe(chip)
     assert len(chip.resets) == resets, describe(chip)
+    stale = chip.cache.read_lines.stale_reads
+    assert not stale, f"{stale} times the cache gave what the flash holds no more"
 
 
 def poses(chip, since=0):

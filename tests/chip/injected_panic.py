@@ -5,6 +5,8 @@ from unicorn import arm_const as arm
 TEXT = b"injected.rs"
 # WFI, and a jump to it.
 WAIT, BACK = b"\x30\xbf", b"\xfd\xe7"
+# PUSH of nine registers.
+PUSH = b"\xff\xb5"
 MESSAGE = b"index out of bounds: the len is 3 but the index is 7"
 
 
@@ -31,6 +33,15 @@ def fault(chip):
     chip.processor.set(arm.UC_ARM_REG_LR, 0x0801_2345)
     chip.processor.pc = place
     return place
+
+
+def overflow(chip):
+    """What runs now uses more and more of the stack."""
+    ram = chip.rams["AXISRAM"]
+    place = ram.base + ram.size - 32
+    ram.put(place, PUSH + BACK)
+    chip.processor.set(arm.UC_ARM_REG_PRIMASK, 1)
+    chip.processor.pc = place
 
 
 def hang(chip):

@@ -22,7 +22,7 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
     let mut settings = Settings::default();
     let map = MAP.take();
     let mut store = Store::new(flash);
-    let (mut key, mut starts) = (None, 0);
+    let mut key = None;
     if let Some(store) = &mut store {
         match store.load(&mut settings, map) {
             Ok(loaded) => {
@@ -45,7 +45,6 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
             }
         }
         key = store.key();
-        starts = store.count_start().unwrap_or(0);
     }
     if settings.parameters.maps.slam && !HAS_SLAM {
         exchange::set_settings_sound(false);
@@ -55,5 +54,12 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
     if !panic.is_empty() {
         defmt::error!("before this start: {}", panic);
     }
-    Controller { software: SOFTWARE, settings, store, landmarks: map, key, starts, nonces: 0, panic, map: None }
+    Controller { software: SOFTWARE, settings, store, landmarks: map, key, starts: 0, nonces: 0, panic, map: None }
+}
+
+/// Counts this start. When the page is full, this takes as long as a page of flash takes to erase: so nothing waits for it.
+pub fn count_start<F: NorFlash>(controller: &mut Controller<F>) {
+    if let Some(store) = &mut controller.store {
+        controller.starts = store.count_start().unwrap_or(0);
+    }
 }

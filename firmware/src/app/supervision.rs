@@ -1,8 +1,9 @@
 //! Whether every task still runs: the watchdog is fed only then.
-#![allow(unsafe_code, reason = "what was seen before the restart is in memory of its own")]
 
 use embassy_time::{Duration, Instant, Ticker};
-use portable_atomic::{AtomicU32, Ordering};
+use portable_atomic::Ordering;
+
+use crate::board::retained::SEEN;
 
 /// What must run. Each is a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,11 +21,6 @@ const ALL: u32 = Task::Bus as u32 | Task::Network as u32 | Task::Localizer as u3
 
 /// Least time between two meals of the watchdog, and how often the network's executor says that it runs.
 const PERIOD: Duration = Duration::from_secs(1);
-
-/// What has run since the last meal. A reset leaves it, so that what stood still can be told.
-// SAFETY: any word is a value of it.
-#[unsafe(link_section = ".retained")]
-static SEEN: AtomicU32 = AtomicU32::new(0);
 
 /// A task has run.
 pub fn check_in(task: Task) {

@@ -179,7 +179,11 @@ fn start() -> Vehicle {
     };
     board::bus_tasks().spawn(bus_task(can, settings, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
+    // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for.
+    let mut counted = controller.try_lock().expect("nobody else knows the controller");
     board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
+    settings::count_start(&mut counted);
+    drop(counted);
     Vehicle { localization, revolutions, watchdog, supervisor }
 }
 

@@ -19,6 +19,8 @@ pub struct Flash<const PAGE: usize> {
     /// Words and erasures until the power goes, in the middle of one.
     pub power: Option<usize>,
     pub work: usize,
+    /// How often it was read.
+    pub reads: usize,
     /// It held what no storage has written.
     was_rubbish: bool,
 }
@@ -39,6 +41,7 @@ impl<const PAGE: usize> Flash<PAGE> {
             is_written: vec![false; 2 * PAGE / WORD],
             power: None,
             work: 0,
+            reads: 0,
             was_rubbish: false,
         }
     }
@@ -46,7 +49,7 @@ impl<const PAGE: usize> Flash<PAGE> {
     pub fn filled(bytes: Vec<u8>) -> Self {
         assert_eq!(bytes.len(), 2 * PAGE);
         let is_written = bytes.chunks(WORD).map(|word| word.iter().any(|byte| *byte != 0xFF)).collect();
-        Self { is_written, bytes, power: None, work: 0, was_rubbish: true }
+        Self { is_written, bytes, power: None, work: 0, reads: 0, was_rubbish: true }
     }
 
     /// Whether the power lasts for a piece of work. The one in which it goes is half done.
@@ -72,6 +75,7 @@ impl<const PAGE: usize> ReadNorFlash for Flash<PAGE> {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Refused> {
         check_read(self, offset, bytes.len()).map_err(Refused)?;
+        self.reads += 1;
         bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
         Ok(())
     }

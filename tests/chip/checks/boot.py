@@ -1,11 +1,13 @@
 """From reset to the loop."""
 
-from bench import check_sound, describe
+from bench import check_sound, describe, poses
 from emulated_chip.clock import MILLISECOND
 from emulated_chip.system_control import DATA_CACHE_ON, INSTRUCTION_CACHE_ON, CCR
 
 # The whole start with an empty flash: memory at 64 MHz, oscillators, PHY.
 LONGEST_START = 200 * MILLISECOND
+# AXI_TARG7_FN_MOD in the network of buses (2.2.4).
+TARGET_7 = 0x8108
 
 
 def boot(bench, **options):
@@ -65,6 +67,43 @@ def has_the_clocks_of_the_manual(bench):
     bench.note("registers", len(expected))
 
 
+def runs_on_older_silicon(bench):
+    """Revision Y allows 400 MHz at scale 1, and wants a workaround on the bus of its RAM; newer ones want none."""
+    chip = boot(bench, revision="Y")
+    chip.run_for(100 * MILLISECOND)
+    check_sound(chip)
+    rcc, fdcan, flash = (chip.peripherals[name] for name in ("RCC", "FDCAN1", "FLASH"))
+    expected = [
+        # DS12110, "General operating conditions", revision Y.
+        ("processor clock", rcc.processor_clock(), 400_000_000),
+        ("bus clock", rcc.bus_clock(), 200_000_000),
+        ("peripheral clock", rcc.peripheral_clock("D2CFGR", "D2PPRE1"), 100_000_000),
+        ("voltage scale", chip.peripherals["PWR"].scale(), 1),
+        # Table 17 in 4.3.8: scale 1, from 185 to 210 MHz.
+        ("flash wait states", flash.get("ACR", "LATENCY"), 2),
+        ("bit rate", fdcan.bit_rate(), 500_000),
+        # ES0392, 2.2.9: READ_ISS_OVERRIDE of target 7.
+        ("workaround", chip.peripherals["AXI"].words.get(TARGET_7, 0), 1),
+    ]
+    wrong = [f"{name} is {found}, not {wanted}" for name, found, wanted in expected if found != wanted]
+    assert not wrong, "; ".join(wrong)
+    assert poses(chip), "no pose on the bus"
+    newer = boot(bench)
+    assert TARGET_7 not in newer.peripherals["AXI"].words, "the workaround is for older silicon"
+
+
+def asks_for_random_numbers(bench):
+    """What the network begins with comes from the generator; without one the vehicle goes on."""
+    chip = boot(bench)
+    assert chip.peripherals["RNG"].given >= 2, "nobody has asked"
+    mute = bench.chip()
+    mute.peripherals["RNG"]._status = lambda: 0
+    mute.peripherals["RNG"].on_read("SR", lambda: 0)
+    mute.run_for(LONGEST_START, stop=lambda: mute.sleeps > 0)
+    assert mute.sleeps > 0, describe(mute)
+    check_sound(mute)
+
+
 def every_clock_is_needed(bench):
     """Each clock bit that the image sets is missed when the chip ignores it: nothing is switched on for nothing, and
     nothing would go unnoticed if it were left out."""
@@ -89,4 +128,10 @@ def is_well(chip):
     return chip.sleeps > 0 and not chip.findings and not chip.exceptions.taken and chip.listener.heard and has_network
 
 
-CHECKS = [boots, has_the_clocks_of_the_manual, every_clock_is_needed]
+CHECKS = [
+    boots,
+    has_the_clocks_of_the_manual,
+    runs_on_older_silicon,
+    asks_for_random_numbers,
+    every_clock_is_needed,
+]

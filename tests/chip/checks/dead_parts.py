@@ -14,7 +14,7 @@ def lives_with(bench, change, is_told=True):
     assert chip.sleeps > 0, describe(chip)
     begin = chip.clock.now()
     bench.note("start_ms", begin / MILLISECOND)
-    chip.run_for(60 * SECOND if bench.is_long else 10 * SECOND)
+    chip.run_for(60 * SECOND if bench.is_long else 5 * SECOND)
     check_sound(chip)
     gap = longest_gap(poses(chip, begin), begin, chip.clock.now())
     assert gap <= 20 * MILLISECOND, f"no pose for {gap / 1e6:.1f} ms"
@@ -59,7 +59,7 @@ def only_listens_without_a_crystal(bench):
     chip.peripherals["RCC"].has_hse = False
     chip.run_for(2 * SECOND, stop=lambda: chip.sleeps > 0)
     assert chip.sleeps > 0, describe(chip)
-    chip.run_for(12 * SECOND)
+    chip.run_for(60 * SECOND if bench.is_long else 5 * SECOND)
     check_sound(chip)
     assert chip.peripherals["RCC"].processor_clock() == 480_000_000, "the clock is another one"
     fdcan = chip.peripherals["FDCAN1"]

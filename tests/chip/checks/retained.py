@@ -1,8 +1,8 @@
 """What the chip tells after a restart of why it restarted."""
 
-from bench import describe, emergencies, start
+from bench import describe, emergencies
 from emulated_chip.clock import MILLISECOND, SECOND
-from injected_panic import MESSAGE, fault, panic
+from injected_panic import MESSAGE, fault, overflow, panic
 
 INTERNAL_SOFTWARE = 0x6100
 
@@ -46,4 +46,14 @@ def a_fault_is_told(bench):
     assert not missing, f"nothing is told of {', '.join(missing)}"
 
 
-CHECKS = [a_panic_is_told, a_fault_is_told]
+def a_stack_that_is_full_is_told(bench):
+    """The stack comes to its end: nothing else is overwritten, and it is told."""
+    chip = restarted_after(bench, overflow)
+    assert INTERNAL_SOFTWARE in emergencies(chip, chip.before), f"the bus hears of nothing: {describe(chip)}"
+    # CFSR: access refused, at an address that is known, and the frame could not be kept (ARMv7-M ARM, B3.2.15).
+    text = retained_text(chip)
+    told = [part for part in text.split(b"fault: ") if part.startswith(b"CFSR")]
+    assert told and told[0].startswith(b"CFSR 0x00000092"), f"told is {told[:1]}"
+
+
+CHECKS = [a_panic_is_told, a_fault_is_told, a_stack_that_is_full_is_told]

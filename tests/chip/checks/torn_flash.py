@@ -1,16 +1,26 @@
 """Power that goes while the flash is written: the chip starts again, and has lost nothing that was there before."""
 
-from bench import check_sound, describe, emergencies, start
+from bench import check_sound, describe, start
 from emulated_chip.clock import MILLISECOND, SECOND
-from emulated_chip.flash import PowerCut
+from emulated_chip.flash import Flash, PowerCut
+from stored_settings import FIRST_PAGE, NODE_17, fill, starts, write
 
 # Starts in which power goes at each of the words that a start programs.
 WORDS = 6
 
 
+def node_of(chip):
+    """The node that the chip takes part as, by its heartbeat; a setting that is not the default one tells that it is kept."""
+    chip.run_for(200 * MILLISECOND)
+    found = {frame.identifier - 0x700 for _, frame in chip.listener.heard if frame.identifier >= 0x700}
+    assert len(found) == 1, f"nodes {found}: {describe(chip)}"
+    return found.pop()
+
+
 def survives_torn_words(bench):
     """Power goes at each flash word that a start programs, at several starts in a row; the chip starts each time."""
-    flash = None
+    flash = Flash(bench.description.memory["BANK_2"][1])
+    write(flash, FIRST_PAGE, NODE_17)
     torn = 0
     for number in range(1, WORDS + 1 if not bench.is_long else 40):
         for at in (1, 2, 3):
@@ -25,12 +35,37 @@ def survives_torn_words(bench):
     bench.note("torn_words", torn)
     chip = bench.chip(settings=flash)
     start(chip)
+    assert node_of(chip) == 17, "a setting is lost"
     check_sound(chip)
+
+
+def survives_a_cut_while_a_page_is_moved(bench):
+    """Power goes while the items of a page that is full are moved to the other one, and while the old one is erased."""
+    cuts = [("program", 2), ("erase", 1)]
+    if bench.is_long:
+        cuts = [("program", at) for at in range(1, 12)] + [("erase", 1)]
+    for kind, at in cuts:
+        flash = Flash(bench.description.memory["BANK_2"][1])
+        number = fill(flash, FIRST_PAGE, NODE_17)
+        chip = bench.chip(settings=flash)
+        chip.cut = PowerCut(at, kind)
+        chip.run_for(4 * SECOND)
+        if kind == "program" and chip.has_power:
+            break
+        assert not chip.has_power and not chip.findings, f"{kind} {at}: no cut: {describe(chip)}"
+        again = bench.chip(settings=flash)
+        start(again)
+        assert node_of(again) == 17, f"{kind} {at}: a setting is lost"
+        again.run_for(3 * SECOND)
+        check_sound(again)
+        # A count that never comes again (the nonces of the service port stand on it).
+        counted = max(count for count in range(number + 4) if starts(count) in bytes(flash.bytes))
+        assert counted > number, f"{kind} {at}: the last count is {counted}, and {number} was before"
 
 
 def survives_an_erase_cut_short(bench):
     """Both pages hold words with double errors throughout, as an erase that was cut short leaves them."""
-    for pages in ((6,), (7,), (6, 7)):
+    for pages in ((6,), (7,), (6, 7)) if bench.is_long else ((7,),):
         chip = bench.started()
         chip.run_for(50 * MILLISECOND)
         flash = chip.settings_flash.copy()
@@ -48,4 +83,15 @@ def survives_an_erase_cut_short(bench):
         assert not bad, f"pages {pages}: {len(bad)} words are still bad"
 
 
-CHECKS = [survives_torn_words, survives_an_erase_cut_short]
+def writes_after_an_error(bench):
+    """An error of the flash is left over: what is written after it is written."""
+    chip = bench.chip()
+    chip.peripherals["FLASH"].banks[1].fail("PGSERR")
+    start(chip)
+    chip.run_for(50 * MILLISECOND)
+    check_sound(chip)
+    first = bytes(chip.settings_flash.bytes[6 * 128 * 1024 :])
+    assert starts(1) in first, "the start is not counted"
+
+
+CHECKS = [survives_torn_words, survives_a_cut_while_a_page_is_moved, survives_an_erase_cut_short, writes_after_an_error]

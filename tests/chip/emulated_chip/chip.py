@@ -14,7 +14,7 @@ from .ethernet import Ethernet
 from .exceptions import Exceptions
 from .fdcan import Fdcan, MessageRam
 from .finding import Finding
-from .flash import Flash, FlashInterface, PowerCut
+from .flash import WORD, Flash, FlashInterface, PowerCut
 from .gpio import Gpio
 from .loads import transfer_size
 from .memory import PAGE, DataFlash, ProgramFlash, Ram
@@ -177,7 +177,10 @@ class Chip:
             self.exceptions.take()
             due = self.clock.next_due()
             horizon = time if due is None else min(due, time)
-            is_asleep = self.processor.run(max(1, self.clock.cycles_until(horizon)))
+            is_open = self.data_flash.open_page is not None
+            is_asleep = self.processor.run(1 if is_open else max(1, self.clock.cycles_until(horizon)))
+            if is_open:
+                self.data_flash.close()
             if is_asleep and not self.is_ended and not self._reset_cause and not self.exceptions.has_wakeup():
                 self.sleeps += 1
                 self.clock.sleep_until(horizon)
@@ -244,7 +247,7 @@ class Chip:
             self.exceptions.memory_fault(address)
             return
         if self.data_flash.covers(address) and self.data_flash.is_apart(address):
-            self._access_torn_page(address, size, is_write, value)
+            self._access_torn_page(address, size, is_write)
             return
         ram = self.ram_at(address)
         if ram and not ram.is_mapped:
@@ -253,7 +256,7 @@ class Chip:
             finding = Finding("reserved", f"a {what} of an address that nobody has", address, pc, self.symbol(pc))
         self.end(finding)
 
-    def _access_torn_page(self, address, size, is_write, value):
+    def _access_torn_page(self, address, size, is_write):
         code = bytes(self.processor.engine.mem_read(self.processor.pc, 4))
         count = max(size, transfer_size(code))
         flash = self.peripherals["FLASH"]
@@ -262,7 +265,11 @@ class Chip:
             if not self.exceptions.ignores_bus_faults():
                 self.exceptions.bus_fault(address)
                 return
-        self.data_flash.step_over(address, size, is_write, value)
+        word = address & ~(WORD - 1)
+        if not is_write and not flash.is_bad(word, 2 * WORD) and not self.system.is_cached(address):
+            self.data_flash.open_for_a_block(address)
+        else:
+            self.data_flash.step_over(address, size if size < 4 else count, is_write)
 
     def track_written_lines(self):
         """From now on every store to cached RAM is a dirty line, until it is cleaned or makes room."""

@@ -11,21 +11,22 @@ ENABLE_BITS = {MEMORY_FAULT: 1 << 16, BUS_FAULT: 1 << 17, USAGE_FAULT: 1 << 18}
 
 # Bits of CFSR (B3.2.15).
 DATA_VIOLATION, MEMORY_ADDRESS_VALID = 1 << 1, 1 << 7
+MEMORY_STACKING_ERROR = 1 << 4
 PRECISE_ERROR, STACKING_ERROR, BUS_ADDRESS_VALID = 1 << 9, 1 << 12, 1 << 15
 UNDEFINED_INSTRUCTION = 1 << 16
 FORCED = 1 << 30
 
-FRAME = [
+FRAME = (
     arm.UC_ARM_REG_R0,
     arm.UC_ARM_REG_R1,
     arm.UC_ARM_REG_R2,
     arm.UC_ARM_REG_R3,
     arm.UC_ARM_REG_R12,
     arm.UC_ARM_REG_LR,
-]
-STATE = [arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_CONTROL]
-FLOATS = [arm.UC_ARM_REG_S0 + number for number in range(16)] + [arm.UC_ARM_REG_FPSCR]
-MASKS = [arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_FAULTMASK, arm.UC_ARM_REG_BASEPRI]
+)
+STATE = (arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR, arm.UC_ARM_REG_CONTROL)
+FLOATS = (*(arm.UC_ARM_REG_S0 + number for number in range(16)), arm.UC_ARM_REG_FPSCR)
+MASKS = (arm.UC_ARM_REG_PRIMASK, arm.UC_ARM_REG_FAULTMASK, arm.UC_ARM_REG_BASEPRI)
 FPCA = 1 << 2
 PADDED = 1 << 9
 THUMB = 1 << 24
@@ -129,11 +130,14 @@ class Exceptions:
         if has_floats:
             words += list(processor.get_all(FLOATS)) + [0]
         stack = (stack - pad - 4 * len(words)) & 0xFFFF_FFFF
-        if not self.chip.is_stack(stack, 4 * len(words)):
-            self._on_stacking_error(stack)
-            return
-        data = b"".join((word & 0xFFFF_FFFF).to_bytes(4, "little") for word in words)
-        processor.engine.mem_write(stack, data)
+        if self.chip.is_stack(stack, 4 * len(words)):
+            data = b"".join((word & 0xFFFF_FFFF).to_bytes(4, "little") for word in words)
+            processor.engine.mem_write(stack, data)
+        else:
+            # The frame is lost, and the fault of stacking it is taken instead, without another one (B1.5.11).
+            cause = MEMORY_STACKING_ERROR if system.forbids(stack, True) else STACKING_ERROR
+            system.note_fault(cause, FORCED)
+            number = HARD_FAULT
         link = 0xFFFF_FFF1 if self.active else 0xFFFF_FFF9
         processor.set_all(STATE, [stack, THUMB | number, control & ~FPCA])
         processor.set(arm.UC_ARM_REG_LR, link & ~0x10 if has_floats else link)
@@ -142,11 +146,6 @@ class Exceptions:
             self.taken.append((self.chip.clock.now(), number, return_address))
         processor.pc = processor.word(system.vector_table() + 4 * number) & ~1
         processor.progress.is_pending = int(self._candidate() is not None)
-
-    def _on_stacking_error(self, stack):
-        """The frame does not fit the memory of the stack: a bus fault whose own frame does not fit either."""
-        self.chip.system.note_fault(STACKING_ERROR, FORCED)
-        self.chip.lock_up(f"the stack pointer is {stack:#010x} when an exception is to be taken")
 
     def leave(self, link):
         """Returns from the exception that runs (B1.5.8)."""
@@ -166,7 +165,7 @@ class Exceptions:
             processor.set_all(FLOATS, words[8:25])
             control |= FPCA
         processor.set_all(STATE, [stack, status & ~PADDED, control])
-        processor.set_all(FRAME, words)
+        processor.set_all(FRAME, words[:6])
         processor.pc = words[6] & ~1
         if number in self.levels:
             self.pend(number)

@@ -71,9 +71,22 @@ class DataFlash:
         self.flash = flash
         self.size = len(flash.bytes)
         self.reads = 0
+        self.open_page = None
         self._apart = {}
         self._cached = {}
-        chip.processor.engine.mmio_map(base, self.size, self._read, None, self._write, None)
+        for page in range(0, self.size, PAGE):
+            self._map(page)
+
+    def _map(self, page):
+        """Each page is a region of its own: Unicorn counts offsets from elsewhere where a region is taken apart."""
+        self.chip.processor.engine.mmio_map(
+            self.base + page,
+            PAGE,
+            lambda engine, offset, size, _: self._read(engine, page + offset, size, None),
+            None,
+            lambda engine, offset, size, value, _: self._write(engine, page + offset, size, value, None),
+            None,
+        )
 
     def covers(self, address):
         return self.base <= address < self.base + self.size
@@ -119,14 +132,7 @@ class DataFlash:
         wanted = {word & ~(PAGE - 1) for word in self.flash.bad}
         for page in set(self._apart) - wanted:
             engine.mem_unmap(self.base + page, PAGE)
-            engine.mmio_map(
-                self.base + page,
-                PAGE,
-                lambda engine, offset, size, _, page=page: self._read(engine, page + offset, size, None),
-                None,
-                lambda engine, offset, size, value, _, page=page: self._write(engine, page + offset, size, value, None),
-                None,
-            )
+            self._map(page)
             del self._apart[page]
         for page in wanted - set(self._apart):
             engine.mem_unmap(self.base + page, PAGE)
@@ -137,17 +143,30 @@ class DataFlash:
     def is_apart(self, address):
         return (address - self.base) & ~(PAGE - 1) in self._apart
 
-    def step_over(self, address, size, is_write, value):
-        """Runs the one instruction that meets a page that is apart."""
+    def open_for_a_block(self, address):
+        """Lets the block of code that meets a page that is apart read it. The words around are good."""
+        page = (address - self.base) & ~(PAGE - 1)
+        ctypes.memmove(self._apart[page], self.seen(page, PAGE), PAGE)
+        self.chip.processor.engine.mem_protect(self.base + page, PAGE, UC_PROT_ALL)
+        self.open_page = page
+
+    def close(self):
+        """Behind that block."""
+        if self.open_page in self._apart:
+            self.chip.processor.engine.mem_protect(self.base + self.open_page, PAGE, UC_PROT_NONE)
+        self.open_page = None
+
+    def step_over(self, address, size, is_write):
+        """Runs the one instruction that meets a page that is apart, and moves so many bytes."""
         page = (address - self.base) & ~(PAGE - 1)
         engine = self.chip.processor.engine
-        if is_write:
-            data = bytes(PAGE)
-        else:
-            data = self.seen(page, PAGE)
-        ctypes.memmove(self._apart[page], data, PAGE)
+        ctypes.memmove(self._apart[page], self.seen(page, PAGE), PAGE)
         engine.mem_protect(self.base + page, PAGE, UC_PROT_ALL)
         self.chip.processor.step()
         engine.mem_protect(self.base + page, PAGE, UC_PROT_NONE)
         if is_write:
-            self.bank().store(address - self.base, size, value)
+            place = address - self.base
+            stored = bytes(self._apart[page][place - page : place - page + size])
+            for offset in range(0, size, 4):
+                part = stored[offset : offset + 4]
+                self.bank().store(place + offset, len(part), int.from_bytes(part, "little"))

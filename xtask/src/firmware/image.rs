@@ -18,16 +18,44 @@ pub struct Board {
     pub feature: &'static str,
     /// Binaries that are built for it.
     pub images: &'static [&'static str],
+    /// Its RAM.
+    pub ram: &'static [Region],
 }
 
-/// The emulated board.
+/// A part of memory.
+pub struct Region {
+    /// What the manual calls it.
+    pub name: &'static str,
+    /// Its addresses.
+    pub addresses: std::ops::Range<u64>,
+    /// Most that an image may take of it, bytes.
+    pub budget: u64,
+}
+
+impl Region {
+    /// A part of the chip's memory from an address on, of which a tenth is left.
+    const fn of_chip(name: &'static str, start: u64, size: u64) -> Self {
+        Self { name, addresses: start..start + size, budget: size / 10 * 9 }
+    }
+}
+
+/// The emulated board, in as much RAM as the vehicle's had for everything.
 pub const AN500: Board = Board {
     feature: "an500",
     images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
+    ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 320 * 1024 }],
 };
 
-/// The vehicle's board, a Nucleo-H743ZI.
-pub const H743: Board = Board { feature: "h743", images: &["vehicle"] };
+/// The vehicle's board, a Nucleo-H743ZI. The stack has the DTCM for itself.
+pub const H743: Board = Board {
+    feature: "h743",
+    images: &["vehicle"],
+    ram: &[
+        Region::of_chip("AXI", 0x2400_0000, 512 * 1024),
+        Region::of_chip("D2", 0x3000_0000, 128 * 1024),
+        Region::of_chip("D3", 0x3800_0000, 64 * 1024),
+    ],
+};
 
 /// All boards.
 pub const BOARDS: [&Board; 2] = [&AN500, &H743];

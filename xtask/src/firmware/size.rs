@@ -5,45 +5,51 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use object::{Object, ObjectSection, SectionFlags, SectionKind};
 
-use super::image::BOARDS;
+use super::image::{BOARDS, Board};
 
 /// Most flash of an image, bytes.
 const FLASH: u64 = 512 * 1024;
-/// Most static RAM of an image, bytes.
-const RAM: u64 = 320 * 1024;
-
 /// Images that only measure need not fit a vehicle.
 const UNLIMITED: [&str; 7] = ["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart"];
 
 struct Size {
     flash: u64,
-    ram: u64,
+    /// As the board's regions follow each other.
+    ram: Vec<u64>,
 }
 
 /// Prints the table.
 ///
 /// # Errors
-/// If an image is missing, or larger than it may be.
+/// If an image is missing, larger than it may be, or has something where there is no memory.
 pub fn print() -> anyhow::Result<()> {
-    println!("{:<8} {:<10} {:>12} {:>12}", "board", "image", "flash", "RAM");
+    println!("{:<8} {:<16} {:>12}   RAM", "board", "image", "flash");
     let mut too_large = Vec::new();
     for board in BOARDS {
         for name in board.images {
-            let size = read(&board.image(name)?)?;
-            println!("{:<8} {name:<10} {:>12} {:>12}", board.feature, size.flash, size.ram);
-            if !UNLIMITED.contains(name) && (size.flash > FLASH || size.ram > RAM) {
+            let size = read(&board.image(name)?, board)?;
+            println!("{:<8} {name:<16} {:>12}   {}", board.feature, size.flash, in_regions(board, &size.ram));
+            let is_over = board.ram.iter().zip(&size.ram).any(|(region, used)| *used > region.budget);
+            if !UNLIMITED.contains(name) && (size.flash > FLASH || is_over) {
                 too_large.push(format!("{} of {}", name, board.feature));
             }
         }
+        let budgets: Vec<u64> = board.ram.iter().map(|region| region.budget).collect();
+        println!("{:<8} {:<16} {FLASH:>12}   {}", board.feature, "at most", in_regions(board, &budgets));
     }
-    println!("at most  {:<10} {FLASH:>12} {RAM:>12}", "");
     if too_large.is_empty() { Ok(()) } else { bail!("too large: {}", too_large.join(", ")) }
 }
 
-fn read(path: &Path) -> anyhow::Result<Size> {
+fn in_regions(board: &Board, bytes: &[u64]) -> String {
+    let parts: Vec<String> =
+        board.ram.iter().zip(bytes).map(|(region, bytes)| format!("{} {bytes:>7}", region.name)).collect();
+    parts.join("  ")
+}
+
+fn read(path: &Path, board: &Board) -> anyhow::Result<Size> {
     let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes).with_context(|| path.display().to_string())?;
-    let mut size = Size { flash: 0, ram: 0 };
+    let mut size = Size { flash: 0, ram: vec![0; board.ram.len()] };
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
         if sh_flags & u64::from(object::elf::SHF_ALLOC) == 0 {
@@ -54,8 +60,11 @@ fn read(path: &Path) -> anyhow::Result<Size> {
         if !is_empty {
             size.flash += section.size();
         }
-        if is_written {
-            size.ram += section.size();
+        if is_written && section.size() > 0 {
+            let place = board.ram.iter().position(|region| region.addresses.contains(&section.address()));
+            let name = section.name().unwrap_or_default();
+            let place = place.with_context(|| format!("{name} of {} is where there is no RAM", path.display()))?;
+            size.ram[place] += section.size();
         }
     }
     Ok(size)

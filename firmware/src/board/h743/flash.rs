@@ -33,9 +33,6 @@ const WORD: usize = 32;
 const PARALLELISM: u8 = 3;
 /// What unlocks the control register (RM0433, 4.5.2).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// CCR of the processor: data bus faults are ignored while FAULTMASK is set (ARMv7-M ARM, B3.2.8).
-const CCR: *mut u32 = 0xE000_ED14 as *mut u32;
-const BFHFNMIGN: u32 = 1 << 8;
 /// CFSR of the processor, whose flags are cleared by ones.
 const CFSR: *mut u32 = 0xE000_ED28 as *mut u32;
 const BUS_FAULTS: u32 = 0xFF00;
@@ -98,11 +95,9 @@ fn read_word(offset: usize) -> Option<FlashWord> {
     let place = address(offset) as *const u32;
     let mut word = [0; WORD / 4];
     // SAFETY: the address is a whole word within the pages. Nothing else runs while faults are masked, which lasts for
-    // eight loads; a fault that is ignored leaves a mark that is cleared behind.
+    // eight loads; `memory_protection` has set that bus faults are ignored then. One that is leaves a mark, which is cleared.
     let has_error = unsafe {
         asm!("cpsid f", options(nostack));
-        CCR.write_volatile(CCR.read_volatile() | BFHFNMIGN);
-        asm!("dsb", "isb", options(nostack));
         for (part, number) in word.iter_mut().zip(0..) {
             *part = place.add(number).read_volatile();
         }
@@ -112,8 +107,7 @@ fn read_word(offset: usize) -> Option<FlashWord> {
             clear_errors();
             CFSR.write_volatile(BUS_FAULTS);
         }
-        CCR.write_volatile(CCR.read_volatile() & !BFHFNMIGN);
-        asm!("dsb", "isb", "cpsie f", options(nostack));
+        asm!("cpsie f", options(nostack));
         has_error
     };
     (!has_error).then_some(word)

@@ -6,6 +6,11 @@ use cortex_m::peripheral::MPU;
 
 use crate::board::stack;
 
+/// CCR of the processor: data bus faults are ignored while FAULTMASK is set, and in the handler of faults (ARMv7-M ARM,
+/// B3.2.8).
+const CCR: *mut u32 = 0xE000_ED14 as *mut u32;
+const BFHFNMIGN: u32 = 1 << 8;
+
 const ENABLE: u32 = 1;
 const ENABLE_WITH_DEFAULT_MAP: u32 = 0b101;
 const NEVER_RUN: u32 = 1 << 28;
@@ -36,11 +41,12 @@ fn regions() -> [Region; 4] {
     ]
 }
 
-/// Sets all of it up. Before the caches are on.
+/// Sets all of it up, and that words of flash with a double error can be read. Before the caches are on.
 pub fn enable(mpu: &mut MPU) {
     // SAFETY: nothing refers to these parts of memory yet: neither the Ethernet nor the settings have started, and the
     // stack has not come to its end.
     unsafe {
+        CCR.write_volatile(CCR.read_volatile() | BFHFNMIGN);
         mpu.ctrl.write(0);
         for (region, number) in regions().iter().zip(0..) {
             mpu.rnr.write(number);
