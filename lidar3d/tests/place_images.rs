@@ -9,7 +9,7 @@ mod support;
 use std::sync::OnceLock;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Floor, PlaceImage};
+use agv_lidar3d::place::{Asked, Floor, Panorama, PlaceImage, SECTORS, Span, Stored};
 use support::moosmann::{Drive, RINGS};
 use support::scan_context::ScanContext;
 
@@ -33,6 +33,9 @@ const A10B: Protocol = Protocol { name: "A10b", spacing: 10, right: 5.5, wrong: 
 struct Described {
     image: PlaceImage,
     context: ScanContext,
+    panorama: Panorama,
+    /// Levelled, with heights above the floor.
+    points: Vec<[f32; 3]>,
 }
 
 impl Described {
@@ -40,7 +43,12 @@ impl Described {
         let cloud = Cloud::new(points, RINGS).unwrap();
         let floor = Floor::find(&cloud).unwrap();
         let floor = if is_levelled { floor } else { Floor::level(floor.height) };
-        Self { image: PlaceImage::new(&cloud, &floor), context: ScanContext::new(points) }
+        Self {
+            image: PlaceImage::new(&cloud, &floor),
+            context: ScanContext::new(points),
+            panorama: Panorama::new(&cloud, &floor, Span::HDL64E),
+            points: cloud.seen().map(|point| floor.levelled(point)).collect(),
+        }
     }
 }
 
@@ -61,17 +69,14 @@ struct Score {
     f1: f64,
 }
 
-fn score(
-    drive: &Drive,
-    protocol: Protocol,
-    distance: impl Fn(usize, usize) -> f64,
-) -> Score {
+fn score(drive: &Drive, protocol: Protocol, distance: impl Fn(usize, usize) -> f64) -> Score {
     let keys = &drive.keys;
     let apart = |a: usize, b: usize| {
         let ([x, y], [u, v]) = (keys[a].position, keys[b].position);
         (x - u).hypot(y - v)
     };
-    let map: Vec<usize> = (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
+    let map: Vec<usize> =
+        (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
     let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
     let has_answer = |query: &&usize| map.iter().any(|node| apart(**query, *node) <= protocol.right);
     let answerable = queries.iter().filter(has_answer).count();
@@ -80,7 +85,8 @@ fn score(
         let (distance, node) = all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         (distance, apart(*query, node))
     };
-    let mut answers: Vec<(f64, f64)> = queries.iter().map(answer).collect();
+    let mut answers: Vec<(f64, f64)> =
+        queries.iter().map(answer).filter(|(distance, _)| *distance < f64::MAX).collect();
     // Near-misses count neither way.
     answers.retain(|(_, apart)| *apart <= protocol.right || *apart > protocol.wrong);
     answers.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -136,6 +142,35 @@ fn both(map: &[Described], asked: &[Described], protocol: Protocol) -> [Score; 2
     ]
 }
 
+/// The best ten of the images, aligned: one less the greatest score. Answers farther away than right ones are none.
+fn verified(map: &[Described], asked: &[Described], protocol: Protocol) -> Score {
+    let (drive, _) = drive().unwrap();
+    let keys = &drive.keys;
+    let nodes: Vec<usize> =
+        (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
+    let stored: Vec<Option<Stored>> =
+        (0..keys.len()).map(|key| nodes.contains(&key).then(|| Stored::new(&map[key].panorama))).collect();
+    let mut seconds = Vec::new();
+    let mut scores = vec![vec![f64::MAX; keys.len()]; keys.len()];
+    for query in (1..keys.len()).step_by(2) {
+        let alike = |node: &usize| Some((map[*node].image.likeness(&asked[query].image)?, *node));
+        let mut best: Vec<_> = nodes.iter().filter_map(alike).collect();
+        best.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
+        let scan = Asked::new(&asked[query].panorama, asked[query].points.iter().copied());
+        for (likeness, node) in best.into_iter().take(10) {
+            let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
+            let began = std::time::Instant::now();
+            let found = stored[node].as_ref().unwrap().align(&scan, &headings, 6.0);
+            seconds.push(began.elapsed().as_secs_f64());
+            let near = found.filter(|found| found.pose.place[0].hypot(found.pose.place[1]) as f64 <= protocol.right);
+            scores[query][node] = near.map_or(f64::MAX, |found| 1.0 - f64::from(found.score));
+        }
+    }
+    seconds.sort_by(f64::total_cmp);
+    println!("  {} alignments, {:.1} ms at the median", seconds.len(), 1e3 * seconds[seconds.len() / 2]);
+    score(drive, protocol, |query, node| scores[query][node])
+}
+
 fn report(condition: &str, protocol: Protocol, [image, context]: [Score; 2]) {
     println!(
         "{} {condition}: image {:.3} / {:.3}, Scan Context {:.3} / {:.3}",
@@ -152,6 +187,7 @@ fn whole_scans() {
         report("clean", protocol, both(&plain, &plain, protocol));
         report("clean, levelled", protocol, both(&levelled, &levelled, protocol));
     }
+    println!("A10 clean verified {:?}", verified(&levelled, &levelled, A10));
 }
 
 #[test]
@@ -168,6 +204,9 @@ fn stressed_scans() {
                 let asked = ask(&|_, points| masked(points, (direction, width), is_both));
                 let scores = if is_both {
                     let map = ask(&|_, points| masked(points, (direction, width), false));
+                    if direction == 0.0 {
+                        println!("both, reversed, {width} verified {:?}", verified(&map, &asked, A10));
+                    }
                     both(&map, &asked, A10)
                 } else {
                     both(&plain, &asked, A10)

@@ -72,7 +72,8 @@ impl PlaceImage {
             *distance = self.distance_at(asked, turn);
         }
         let best = |except: Option<usize>| {
-            let turns = distances.iter().enumerate().filter(|(turn, _)| except.is_none_or(|best| apart(*turn, best) > 1));
+            let turns =
+                distances.iter().enumerate().filter(|(turn, _)| except.is_none_or(|best| apart(*turn, best) > 1));
             turns.min_by(|a, b| a.1.total_cmp(b.1))
         };
         let (first, distance) = best(None).filter(|(_, distance)| **distance < f32::MAX)?;
