@@ -42,7 +42,7 @@ impl Described {
     fn new(points: &Points, is_levelled: bool) -> Self {
         let cloud = Cloud::new(points, RINGS).unwrap();
         let floor = Floor::find(&cloud).unwrap();
-        let floor = if is_levelled { floor } else { Floor::level(floor.height) };
+        let floor = if is_levelled { floor.without_small_slope() } else { Floor::level(floor.height) };
         Self {
             image: PlaceImage::new(&cloud, &floor),
             context: ScanContext::new(points),

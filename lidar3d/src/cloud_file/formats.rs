@@ -98,13 +98,16 @@ fn scalar(property: &Property) -> Option<f64> {
 
 pub(super) fn las(bytes: Vec<u8>) -> Result<Vec<FilePoint>, String> {
     let mut reader = las::Reader::new(Cursor::new(bytes)).map_err(|error| one_line(&error.to_string()))?;
-    let mut points = Vec::new();
-    for point in reader.points() {
-        let point = point.map_err(|error| one_line(&error.to_string()))?;
-        // The ring stands where the format leaves it to the user.
-        let ring = Some(u16::from(point.user_data));
-        points.push(FilePoint { position: [point.x, point.y, point.z], intensity: f64::from(point.intensity), ring });
-    }
+    let data = reader.read_all().map_err(|error| one_line(&error.to_string()))?;
+    let places = data.x().zip(data.y()).zip(data.z());
+    // The ring stands where the format leaves it to the user.
+    let values = data.intensity().zip(data.user_data());
+    let point = |(((x, y), z), (intensity, ring)): (((f64, f64), f64), (u16, u8))| FilePoint {
+        position: [x, y, z],
+        intensity: f64::from(intensity),
+        ring: Some(u16::from(ring)),
+    };
+    let mut points: Vec<FilePoint> = places.zip(values).map(point).collect();
     if points.iter().all(|point| point.ring == Some(0)) {
         points.iter_mut().for_each(|point| point.ring = None);
     }

@@ -42,6 +42,8 @@ const GAINED: f64 = 0.9;
 /// laser's own on a wall.
 const COMMON_ERROR: f64 = 0.01;
 const OWN_ERROR: f64 = 0.005;
+/// A plane is found to about this, rad and m, before its points say more.
+const PLANE_STEP: f64 = 0.3;
 /// Below this they are none, m.
 const NO_ERROR: f64 = 1e-5;
 
@@ -296,7 +298,7 @@ impl Problem<'_> {
         }
         let part = |deviation: f64| (deviation / noise).powi(2);
         for (sums, (_, bias)) in sums.iter_mut().zip(&state.planes) {
-            sums.close(part(state.own), part(state.common), *bias);
+            sums.close((part(state.own), part(state.common)), *bias, (noise / PLANE_STEP).powi(2));
         }
         if has_settled_once {
             state.common = common_error(&sums, &state.planes, noise);
