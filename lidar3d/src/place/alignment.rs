@@ -48,7 +48,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    fn of(&self, [x, y, up]: [f32; 3]) -> [f32; 3] {
+    pub(super) fn of(&self, [x, y, up]: [f32; 3]) -> [f32; 3] {
         let (sin, cos) = libm::sincosf(self.heading);
         [x * cos - y * sin + self.place[0], x * sin + y * cos + self.place[1], up]
     }

@@ -13,6 +13,8 @@ mod normals;
 mod orientation;
 mod panorama;
 mod plane_fit;
+#[cfg(feature = "std")]
+mod recognition;
 mod threshold;
 
 #[cfg(feature = "std")]
@@ -28,4 +30,6 @@ pub use normals::{Neighbours, surfaces, vertical_parts};
 pub use orientation::{DIRECTIONS, Orientation};
 pub use panorama::{Panorama, Span};
 pub use plane_fit::fitted_surfaces;
+#[cfg(feature = "std")]
+pub use recognition::{Answer, Place, PlaceIndex, Query};
 pub use threshold::from_key_scans;
