@@ -56,12 +56,12 @@ impl Drive {
 fn keys(path: &Path) -> Vec<Key> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut keys: Vec<Key> = Vec::new();
-    let (mut last, mut travelled) = (None, 0.0);
+    let (mut last, mut travelled): (Option<[f64; 2]>, f64) = (None, 0.0);
     for (scan, line) in text.lines().enumerate().take(501) {
         let values: Vec<f64> = line.split_whitespace().map(|value| value.parse().unwrap()).collect();
         let (x, y) = (values[3], values[7]);
         if let Some([a, b]) = last.replace([x, y]) {
-            travelled += (x - a as f64).hypot(y - b as f64);
+            travelled += (x - a).hypot(y - b);
         }
         if keys.last().is_none_or(|key| travelled - key.travelled >= 1.0) {
             keys.push(Key { position: [x, y], travelled, scan });
