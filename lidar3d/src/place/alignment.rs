@@ -8,7 +8,6 @@
 use std::vec;
 use std::vec::Vec;
 
-use super::floor::solved;
 use super::panorama::Panorama;
 
 /// What stands on the floor, m above it.
@@ -30,9 +29,6 @@ const STARTS: usize = 4;
 /// Steps of the climb: m and rad, and how often they are halved.
 const CLIMB: [f32; 2] = [0.4, 0.0175];
 const HALVINGS: usize = 5;
-/// Rounds of point to line, by how far a point may be off its line, m, and the points that they need.
-const GATES: [f32; 6] = [0.8, 0.8, 0.8, 0.35, 0.35, 0.35];
-const LEAST_LINES: usize = 50;
 /// Points that vote, at the most.
 const VOTERS: usize = 2500;
 /// Edge of a cell that votes, m.
@@ -183,9 +179,7 @@ impl<'a> Stored<'a> {
             (self.plans[1].fit(&many, &pose), pose)
         });
         let (_, pose) = climbed.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let refined = GATES.iter().fold(pose, |pose, gate| refined(self.panorama, &many, pose, *gate));
-        let scored = [pose, refined].map(|pose| Alignment { pose, score: self.score(asked, &pose) });
-        scored.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))
+        Some(Alignment { pose, score: self.score(asked, &pose) })
     }
 
     /// Part of the cells that agree, the mean of both ways.
@@ -229,34 +223,6 @@ fn climb(plan: &Plan, points: &[[f32; 3]], start: Pose) -> Pose {
         turn /= 2.0;
     }
     best.1
-}
-
-/// One round of point to line: each point against the line through the neighbours of what the panorama sees there. Where
-/// too few points are near, the pose stays.
-fn refined(panorama: &Panorama, points: &[[f32; 3]], pose: Pose, gate: f32) -> Pose {
-    let mut normal_equations = [[0.0_f32; 4]; 3];
-    let mut count = 0;
-    for point in points {
-        let at = pose.of(*point);
-        let Some((residual, [a, b])) = panorama.line_near(at, gate) else { continue };
-        count += 1;
-        let row = [a, b, b * (at[0] - pose.place[0]) - a * (at[1] - pose.place[1]), -residual];
-        for (sums, factor) in normal_equations.iter_mut().zip(row) {
-            for (sum, value) in sums.iter_mut().zip(row) {
-                *sum += factor * value;
-            }
-        }
-    }
-    let Some([x, y, turn]) =
-        (count >= LEAST_LINES).then(|| solved(normal_equations.map(|row| row.map(f64::from)))).flatten()
-    else {
-        return pose;
-    };
-    let step = [x, y, turn].map(|value| value as f32);
-    if step[0].abs() > gate || step[1].abs() > gate {
-        return pose;
-    }
-    Pose { place: [pose.place[0] + step[0], pose.place[1] + step[1]], heading: pose.heading + step[2] }
 }
 
 /// What the points of a cell are: there, seen through, hidden.

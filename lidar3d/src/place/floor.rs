@@ -117,7 +117,7 @@ fn lowest_plane(cloud: &Cloud<'_>) -> Option<f32> {
 }
 
 /// The solution of three equations by elimination; None if they have none.
-pub(super) fn solved(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
+fn solved(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
     for pivot in 0..3 {
         let best = (pivot..3).max_by(|a, b| libm::fabs(rows[*a][pivot]).total_cmp(&libm::fabs(rows[*b][pivot])))?;
         rows.swap(pivot, best);

@@ -91,42 +91,4 @@ impl Panorama {
             })
         })
     }
-
-    /// How far a point with its height above the floor lies from the upright plane that the panorama shows there, m, and the
-    /// level normal of that plane: through what is seen in the same row, to the left and to the right of the direction. None
-    /// if nothing within `gate` is seen, or no plane.
-    #[must_use]
-    pub fn line_near(&self, point: [f32; 3], gate: f32) -> Option<(f32, [f32; 2])> {
-        let (row, column, range) = self.direction(point)?;
-        let near = |(row, column): (usize, usize)| {
-            let seen = self.range(row, column)?;
-            Some((libm::fabsf(seen - range), row, column))
-        };
-        let around = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
-        let cells = around.filter_map(|(i, j)| Some(((row + i).checked_sub(1)?, (column + COLUMNS + j - 1) % COLUMNS)));
-        let (off, row, column) = cells.filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        if off > gate {
-            return None;
-        }
-        let [left, right] = [self.at(row, column + 1)?, self.at(row, column + COLUMNS - 1)?];
-        let along = [left[0] - right[0], left[1] - right[1]];
-        let length = libm::hypotf(along[0], along[1]);
-        // The step across three columns, and as much again where a wall is seen obliquely.
-        if length > 0.3 + 0.2 * range || length < 1e-3 {
-            return None;
-        }
-        let normal = [-along[1] / length, along[0] / length];
-        let residual = (point[0] - right[0]) * normal[0] + (point[1] - right[1]) * normal[1];
-        (libm::fabsf(residual) < gate).then_some((residual, normal))
-    }
-
-    /// What is seen in a direction: x and y, m.
-    fn at(&self, row: usize, column: usize) -> Option<[f32; 2]> {
-        let column = column % COLUMNS;
-        let range = self.range(row, column)?;
-        let share = (row as f32 + 0.5) / ROWS as f32;
-        let level = range * libm::cosf(self.span.most - share * (self.span.most - self.span.least));
-        let (y, x) = libm::sincosf((column as f32 + 0.5) / COLUMNS as f32 * TAU);
-        Some([level * x, level * y])
-    }
 }
