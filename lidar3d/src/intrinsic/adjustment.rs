@@ -30,8 +30,9 @@ const MEDIAN_DEVIATE: f64 = 0.6745;
 /// Steps below this part of a parameter's standard deviation end it.
 const SMALL: f64 = 0.02;
 /// So do steps below this part of the standard deviation to which a parameter is known before: where surfaces are not quite
-/// planes, which points count changes a little for ever.
-const SMALL_TO_KNOWN: f64 = 0.002;
+/// planes, which points count changes a little for ever. The second holds while that deviation itself is learnt.
+const SMALL_TO_KNOWN: f64 = 0.05;
+const SMALL_TO_BELIEVED: f64 = 0.002;
 /// To which part of the factory's the deviation of a point must fall at 10 m.
 const GAINED: f64 = 0.9;
 /// Errors of ranges to begin with, standard deviations, m: of all in a scan (the accuracy that makers state), and of a
@@ -221,10 +222,11 @@ impl Problem<'_> {
         if has_settled_once && self.is_learning {
             state.known = self.learnt(state, &covariances);
         }
+        let part = if self.is_learning { SMALL_TO_BELIEVED } else { SMALL_TO_KNOWN };
         let is_small = |(step, covariance): (&LaserVector, &LaserMatrix)| {
             (0..OF_LASER).all(|parameter| {
                 let deviation = covariance[(parameter, parameter)].sqrt();
-                step[parameter].abs() < (SMALL * deviation).max(SMALL_TO_KNOWN * self.prior[parameter])
+                step[parameter].abs() < (SMALL * deviation).max(part * self.prior[parameter])
             })
         };
         let is_settled = steps.iter().zip(&covariances).all(is_small);
