@@ -9,7 +9,7 @@ mod support;
 use std::sync::OnceLock;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Floor, PlaceImage};
+use agv_lidar3d::place::{Asked, Floor, Panorama, PlaceImage, SECTORS, Span, Stored};
 use support::moosmann::{Drive, RINGS};
 use support::scan_context::ScanContext;
 
@@ -33,14 +33,22 @@ const A10B: Protocol = Protocol { name: "A10b", spacing: 10, right: 5.5, wrong: 
 struct Described {
     image: PlaceImage,
     context: ScanContext,
+    panorama: Panorama,
+    /// Levelled, with heights above the floor.
+    points: Vec<[f32; 3]>,
 }
 
 impl Described {
     fn new(points: &Points, is_levelled: bool) -> Self {
         let cloud = Cloud::new(points, RINGS).unwrap();
         let floor = Floor::find(&cloud).unwrap();
-        let floor = if is_levelled { floor } else { Floor::level(floor.height) };
-        Self { image: PlaceImage::new(&cloud, &floor), context: ScanContext::new(points) }
+        let floor = if is_levelled { floor.without_small_slope() } else { Floor::level(floor.height) };
+        Self {
+            image: PlaceImage::new(&cloud, &floor),
+            context: ScanContext::new(points),
+            panorama: Panorama::new(&cloud, &floor, Span::HDL64E),
+            points: cloud.seen().map(|point| floor.levelled(point)).collect(),
+        }
     }
 }
 
@@ -77,7 +85,8 @@ fn score(drive: &Drive, protocol: Protocol, distance: impl Fn(usize, usize) -> f
         let (distance, node) = all.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         (distance, apart(*query, node))
     };
-    let mut answers: Vec<(f64, f64)> = queries.iter().map(answer).collect();
+    let mut answers: Vec<(f64, f64)> =
+        queries.iter().map(answer).filter(|(distance, _)| *distance < f64::MAX).collect();
     // Near-misses count neither way.
     answers.retain(|(_, apart)| *apart <= protocol.right || *apart > protocol.wrong);
     answers.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -133,6 +142,35 @@ fn both(map: &[Described], asked: &[Described], protocol: Protocol) -> [Score; 2
     ]
 }
 
+/// The best ten of the images, aligned: one less the greatest score. Answers farther away than right ones are none.
+fn verified(map: &[Described], asked: &[Described], protocol: Protocol) -> Score {
+    let (drive, _) = drive().unwrap();
+    let keys = &drive.keys;
+    let nodes: Vec<usize> =
+        (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
+    let stored: Vec<Option<Stored>> =
+        (0..keys.len()).map(|key| nodes.contains(&key).then(|| Stored::new(&map[key].panorama))).collect();
+    let mut seconds = Vec::new();
+    let mut scores = vec![vec![f64::MAX; keys.len()]; keys.len()];
+    for query in (1..keys.len()).step_by(2) {
+        let alike = |node: &usize| Some((map[*node].image.likeness(&asked[query].image)?, *node));
+        let mut best: Vec<_> = nodes.iter().filter_map(alike).collect();
+        best.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
+        let scan = Asked::new(&asked[query].panorama, asked[query].points.iter().copied());
+        for (likeness, node) in best.into_iter().take(10) {
+            let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
+            let began = std::time::Instant::now();
+            let found = stored[node].as_ref().unwrap().align(&scan, &headings, 6.0);
+            seconds.push(began.elapsed().as_secs_f64());
+            let near = found.filter(|found| found.pose.place[0].hypot(found.pose.place[1]) as f64 <= protocol.right);
+            scores[query][node] = near.map_or(f64::MAX, |found| 1.0 - f64::from(found.score));
+        }
+    }
+    seconds.sort_by(f64::total_cmp);
+    println!("  {} alignments, {:.1} ms at the median", seconds.len(), 1e3 * seconds[seconds.len() / 2]);
+    score(drive, protocol, |query, node| scores[query][node])
+}
+
 fn report(condition: &str, protocol: Protocol, [image, context]: [Score; 2]) {
     println!(
         "{} {condition}: image {:.3} / {:.3}, Scan Context {:.3} / {:.3}",
@@ -141,44 +179,84 @@ fn report(condition: &str, protocol: Protocol, [image, context]: [Score; 2]) {
 }
 
 #[test]
-fn whole_scans() {
+fn whole_scans_are_recognised_better_than_by_scan_context() {
     let Some((_, points)) = drive() else { return };
-    let plain: Vec<Described> = points.iter().map(|points| Described::new(points, false)).collect();
-    let levelled: Vec<Described> = points.iter().map(|points| Described::new(points, true)).collect();
-    for protocol in [A, A10, A10B] {
-        report("clean", protocol, both(&plain, &plain, protocol));
-        report("clean, levelled", protocol, both(&levelled, &levelled, protocol));
+    let described: Vec<Described> = points.iter().map(|points| Described::new(points, true)).collect();
+    for (protocol, least) in [(A, [0.93, 0.98]), (A10, [0.807, 0.947]), (A10B, [0.94, 0.97])] {
+        let [image, context] = both(&described, &described, protocol);
+        report("clean", protocol, [image, context]);
+        assert!(image.r1 >= least[0] && image.f1 >= least[1], "{image:?}");
+        if protocol.name == "A10" {
+            // What the paper's method reaches here, so that the peer is one.
+            assert!(context.r1 >= 0.775 && context.f1 >= 0.917, "{context:?}");
+        }
+    }
+    let found = verified(&described, &described, A10);
+    println!("A10 clean, verified: {:.3} / {:.3}", found.r1, found.f1);
+    assert!(found.r1 >= 0.98 && found.f1 >= 0.99, "{found:?}");
+}
+
+fn at_least_as_scan_context(condition: &str, scores: [Score; 2]) {
+    report(condition, A10, scores);
+    let [image, context] = scores;
+    assert!(image.r1 >= context.r1 && image.f1 >= context.f1, "{condition}: {image:?} {context:?}");
+}
+
+fn described(change: impl Fn(usize, &Points) -> Points) -> Vec<Described> {
+    let (_, points) = drive().unwrap();
+    points.iter().enumerate().map(|(number, points)| Described::new(&change(number, points), true)).collect()
+}
+
+/// Masks of a width, the mean of eight directions: in the question alone, or in the map as well and the heading reversed.
+fn with_masks(width: f32, is_both: bool) -> [Score; 2] {
+    let whole = if is_both { Vec::new() } else { described(|_, points| points.clone()) };
+    let mut mean = [Score { r1: 0.0, f1: 0.0 }; 2];
+    for direction in (0..8).map(|eighth| 45.0 * eighth as f32) {
+        let asked = described(|_, points| masked(points, (direction, width), is_both));
+        let scores = if is_both {
+            both(&described(|_, points| masked(points, (direction, width), false)), &asked, A10)
+        } else {
+            both(&whole, &asked, A10)
+        };
+        for (mean, score) in mean.iter_mut().zip(scores) {
+            mean.r1 += score.r1 / 8.0;
+            mean.f1 += score.f1 / 8.0;
+        }
+    }
+    mean
+}
+
+#[test]
+fn masked_scans_are_recognised_at_least_as_well_as_by_scan_context() {
+    if drive().is_none() {
+        return;
+    }
+    for width in [60.0, 120.0] {
+        at_least_as_scan_context(&format!("query {width}"), with_masks(width, false));
+        at_least_as_scan_context(&format!("both, reversed, {width}"), with_masks(width, true));
     }
 }
 
 #[test]
-fn stressed_scans() {
-    let Some((_, points)) = drive() else { return };
-    let plain: Vec<Described> = points.iter().map(|points| Described::new(points, true)).collect();
-    let ask = |change: &dyn Fn(usize, &Points) -> Points| -> Vec<Described> {
-        points.iter().enumerate().map(|(number, points)| Described::new(&change(number, points), true)).collect()
-    };
-    for width in [60.0, 120.0] {
-        for is_both in [false, true] {
-            let mut mean = [Score { r1: 0.0, f1: 0.0 }; 2];
-            for direction in (0..8).map(|eighth| 45.0 * eighth as f32) {
-                let asked = ask(&|_, points| masked(points, (direction, width), is_both));
-                let scores = if is_both {
-                    let map = ask(&|_, points| masked(points, (direction, width), false));
-                    both(&map, &asked, A10)
-                } else {
-                    both(&plain, &asked, A10)
-                };
-                for (mean, score) in mean.iter_mut().zip(scores) {
-                    mean.r1 += score.r1 / 8.0;
-                    mean.f1 += score.f1 / 8.0;
-                }
-            }
-            report(&format!("{} {width}", if is_both { "both, reversed" } else { "query" }), A10, mean);
-        }
+fn masked_scans_are_verified() {
+    if drive().is_none() {
+        return;
     }
-    let asked = ask(&|number, points| tilted(points, 2.4 * number as f32));
-    report("tilt 3 deg", A10, both(&plain, &asked, A10));
-    let asked = ask(&|_, points| thinned(points));
-    report("16 of 64 rings", A10, both(&plain, &asked, A10));
+    let map = described(|_, points| masked(points, (0.0, 120.0), false));
+    let asked = described(|_, points| masked(points, (0.0, 120.0), true));
+    let found = verified(&map, &asked, A10);
+    println!("A10 both, reversed, 120, ahead, verified: {:.3} / {:.3}", found.r1, found.f1);
+    // Short of what whole scans reach: a third of what the map and the question see is not the same third.
+    assert!(found.r1 >= 0.8 && found.f1 >= 0.92, "{found:?}");
+}
+
+#[test]
+fn leaning_and_coarse_scans_are_recognised() {
+    if drive().is_none() {
+        return;
+    }
+    let whole = described(|_, points| points.clone());
+    let leaning = described(|number, points| tilted(points, 2.4 * number as f32));
+    report("tilt 3 deg", A10, both(&whole, &leaning, A10));
+    at_least_as_scan_context("16 of 64 rings", both(&whole, &described(|_, points| thinned(points)), A10));
 }

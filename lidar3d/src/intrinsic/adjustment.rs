@@ -13,9 +13,9 @@ use std::vec::Vec;
 
 use super::normal_equations::{LaserEquations, LaserMatrix, PlaneSums};
 use super::sight::{LaserVector, OF_LASER, Sight};
-use super::{Plane, Target};
+use super::{Adjustment, Deviation, Plane, Target};
 use crate::calibration::Laser;
-use crate::geometry::{Offsets, jacobian, offset_jacobian};
+use crate::geometry::Offsets;
 
 /// Rounds at most.
 const ROUNDS: usize = 60;
@@ -30,18 +30,17 @@ const MEDIAN_DEVIATE: f64 = 0.6745;
 /// Steps below this part of a parameter's standard deviation end it.
 const SMALL: f64 = 0.02;
 /// So do steps below this part of the standard deviation to which a parameter is known before: where surfaces are not quite
-/// planes, which points count changes a little for ever.
-const SMALL_TO_KNOWN: f64 = 0.002;
-/// A parameter whose deviation is not below this part of that of the start is held at the factory's value, as good as.
-const HELD: f64 = 0.7;
-/// At which distance a calibration must be better than the factory's, m, and to which part the deviation of a point must
-/// fall there.
-const JUDGED_AT: f64 = 10.0;
+/// planes, which points count changes a little for ever. The second holds while that deviation itself is learnt.
+const SMALL_TO_KNOWN: f64 = 0.05;
+const SMALL_TO_BELIEVED: f64 = 0.002;
+/// To which part of the factory's the deviation of a point must fall at 10 m.
 const GAINED: f64 = 0.9;
 /// Errors of ranges to begin with, standard deviations, m: of all in a scan (the accuracy that makers state), and of a
 /// laser's own on a wall.
 const COMMON_ERROR: f64 = 0.01;
 const OWN_ERROR: f64 = 0.005;
+/// A plane is found to about this, rad and m, before its points say more.
+const PLANE_STEP: f64 = 0.3;
 /// Below this they are none, m.
 const NO_ERROR: f64 = 1e-5;
 
@@ -82,104 +81,6 @@ pub enum AdjustmentError {
     /// It does not settle.
     #[error("it does not settle within {ROUNDS} rounds: the start is too far off, or the targets are no planes")]
     Unsettled,
-}
-
-/// Standard deviations of one laser's parameters, against the gauge.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Deviation {
-    /// Of D_corr, m.
-    pub distance: f64,
-    /// Of theta, rad.
-    pub elevation: f64,
-    /// Of alpha, rad; the mean of all alpha is held.
-    pub rotation: f64,
-    /// Of V_o, m.
-    pub vertical_offset: f64,
-    /// Of H_o, m.
-    pub horizontal_offset: f64,
-}
-
-impl Deviation {
-    /// Those that a factory's values are believed to have: 2 cm, 0.1 deg, 0.3 deg, and 5 mm of the offsets.
-    pub const FACTORY: Self = Self {
-        distance: 0.02,
-        elevation: 0.1 * core::f64::consts::PI / 180.0,
-        rotation: 0.3 * core::f64::consts::PI / 180.0,
-        vertical_offset: 0.005,
-        horizontal_offset: 0.005,
-    };
-
-    fn vector(&self) -> LaserVector {
-        let Self { distance, elevation, rotation, vertical_offset, horizontal_offset } = *self;
-        LaserVector::new(distance, elevation, rotation, vertical_offset, horizontal_offset)
-    }
-
-    fn of_vector(vector: LaserVector) -> Self {
-        let [distance, elevation, rotation, vertical_offset, horizontal_offset] = vector.into();
-        Self { distance, elevation, rotation, vertical_offset, horizontal_offset }
-    }
-}
-
-/// Which parameters of a laser the scans hardly show, so that they are the factory's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Held {
-    /// D_corr.
-    pub distance: bool,
-    /// Theta.
-    pub elevation: bool,
-    /// Alpha.
-    pub rotation: bool,
-    /// V_o.
-    pub vertical_offset: bool,
-    /// H_o.
-    pub horizontal_offset: bool,
-}
-
-/// A calibration found.
-#[derive(Clone, Debug)]
-pub struct Adjustment {
-    /// The lasers; those that were not observed are as at the start.
-    pub lasers: Vec<Laser>,
-    /// How well each is known; None for a laser that was not observed.
-    pub deviations: Vec<Option<Deviation>>,
-    /// Standard deviation of the residuals, m.
-    pub noise: f64,
-    /// Standard deviation of the error that the ranges of one laser on one target have together, m.
-    pub range_error: f64,
-    /// By how much all ranges of each target's scan are too long, m, as far as the targets contradict each other.
-    pub common_range_errors: Vec<f64>,
-    /// Rounds that it took.
-    pub rounds: usize,
-    /// How far the values of the start are off, as the scans of all lasers together tell: standard deviations.
-    pub start_deviation: Deviation,
-    covariances: Vec<Option<LaserMatrix>>,
-}
-
-impl Adjustment {
-    /// Which parameters of a laser are the factory's, as the scans hardly show them. Of a laser that was not observed, all.
-    #[must_use]
-    pub fn held(&self, laser: usize) -> Held {
-        let Some(found) = self.deviations.get(laser).copied().flatten() else {
-            return Held {
-                distance: true,
-                elevation: true,
-                rotation: true,
-                vertical_offset: true,
-                horizontal_offset: true,
-            };
-        };
-        let [distance, elevation, rotation, vertical_offset, horizontal_offset] =
-            found.vector().zip_map(&self.start_deviation.vector(), |found, start| found > HELD * start).into();
-        Held { distance, elevation, rotation, vertical_offset, horizontal_offset }
-    }
-
-    /// Standard deviation of the place of a point that a laser sees at a distance, m, all three coordinates together,
-    /// without the noise of its range. None for a laser that was not observed.
-    #[must_use]
-    pub fn point_deviation(&self, laser: usize, offsets: Offsets, distance: f64) -> Option<f64> {
-        let covariance = self.covariances.get(laser)?.as_ref()?;
-        Some(point_deviation(self.lasers.get(laser)?, offsets, distance, covariance))
-    }
 }
 
 /// Finds D_corr, theta and alpha of all lasers, and V_o and H_o. What the start is off is learnt, from
@@ -296,7 +197,7 @@ impl Problem<'_> {
         }
         let part = |deviation: f64| (deviation / noise).powi(2);
         for (sums, (_, bias)) in sums.iter_mut().zip(&state.planes) {
-            sums.close(part(state.own), part(state.common), *bias);
+            sums.close((part(state.own), part(state.common)), *bias, (noise / PLANE_STEP).powi(2));
         }
         if has_settled_once {
             state.common = common_error(&sums, &state.planes, noise);
@@ -321,10 +222,11 @@ impl Problem<'_> {
         if has_settled_once && self.is_learning {
             state.known = self.learnt(state, &covariances);
         }
+        let part = if self.is_learning { SMALL_TO_BELIEVED } else { SMALL_TO_KNOWN };
         let is_small = |(step, covariance): (&LaserVector, &LaserMatrix)| {
             (0..OF_LASER).all(|parameter| {
                 let deviation = covariance[(parameter, parameter)].sqrt();
-                step[parameter].abs() < (SMALL * deviation).max(SMALL_TO_KNOWN * self.prior[parameter])
+                step[parameter].abs() < (SMALL * deviation).max(part * self.prior[parameter])
             })
         };
         let is_settled = steps.iter().zip(&covariances).all(is_small);
@@ -440,30 +342,4 @@ fn off((laser, start): (&Laser, &Laser)) -> LaserVector {
 fn common_error(sums: &[PlaneSums], planes: &[(Plane, f64)], noise: f64) -> f64 {
     let squares = sums.iter().zip(planes).map(|(sums, (_, bias))| bias * bias + sums.bias_variance() * noise * noise);
     (squares.sum::<f64>() / planes.len().max(1) as f64).sqrt().max(NO_ERROR)
-}
-
-impl Adjustment {
-    /// Deviation of the points at 10 m, as a part of that with the factory's values.
-    fn part_left(&self, offsets: Offsets) -> f64 {
-        let before = LaserMatrix::from_diagonal(&Deviation::FACTORY.vector().map(|deviation| deviation * deviation));
-        let (mut left, mut known) = (0.0, 0.0);
-        for (laser, covariance) in self.lasers.iter().zip(&self.covariances) {
-            let Some(covariance) = covariance else { continue };
-            left += point_deviation(laser, offsets, JUDGED_AT, covariance).powi(2);
-            known += point_deviation(laser, offsets, JUDGED_AT, &before).powi(2);
-        }
-        (left / known).sqrt()
-    }
-}
-
-fn point_deviation(laser: &Laser, offsets: Offsets, distance: f64, covariance: &LaserMatrix) -> f64 {
-    let ahead = laser.rotation;
-    let main = jacobian(laser, offsets, ahead, distance - laser.distance);
-    let [vertical, horizontal] = offset_jacobian(laser, offsets, ahead);
-    let variance = |axis: usize| {
-        let [distance, elevation, rotation] = main[axis];
-        let by = LaserVector::new(distance, elevation, rotation, vertical[axis], horizontal[axis]);
-        by.dot(&(covariance * by))
-    };
-    (0..3).map(variance).sum::<f64>().max(0.0).sqrt()
 }

@@ -4,13 +4,15 @@
 //! moves D_corr, theta, alpha and the offsets of all lasers, and every plane, until the points lie on their planes.
 
 mod adjustment;
+mod found;
 mod normal_equations;
 mod plane;
 mod scan;
 mod segmentation;
 mod sight;
 
-pub use adjustment::{Adjustment, AdjustmentError, Deviation, Held, Residual, calibrate, calibrate_near};
+pub use adjustment::{AdjustmentError, Residual, calibrate, calibrate_near};
+pub use found::{Adjustment, Deviation, Held};
 pub use plane::Plane;
 pub use scan::{Flatness, Return, Target, flatness};
 pub use segmentation::{SegmentationError, segment};

@@ -84,8 +84,9 @@ impl PlaneSums {
     }
 
     /// Closes the sums: the ranges of each laser may have an error of their own on this plane, and all ranges on it one
-    /// in common; both as variances for residuals of unit variance. `bias` is the common one so far.
-    pub(super) fn close(&mut self, own: f64, common: f64, bias: f64) {
+    /// in common; both as variances for residuals of unit variance. `bias` is the common one so far. `damping` keeps a plane
+    /// whose points are nearly on a line from turning about it.
+    pub(super) fn close(&mut self, (own, common): (f64, f64), bias: f64, damping: f64) {
         for shared in &mut self.by_laser {
             let part = own / (1.0 + own * shared.range);
             shared.laser -= shared.range_laser * shared.range_laser.transpose() * part;
@@ -95,6 +96,9 @@ impl PlaneSums {
             shared.plane_gradient -= shared.range_plane * (shared.range_residual * part);
             self.plane += shared.plane;
             self.plane_gradient += shared.plane_gradient;
+        }
+        for parameter in 0..OF_PLANE {
+            self.plane[(parameter, parameter)] += damping;
         }
         self.plane[(OF_PLANE - 1, OF_PLANE - 1)] += 1.0 / common;
         self.plane_gradient[OF_PLANE - 1] += bias / common;

@@ -19,6 +19,9 @@ const POINTS: u32 = 50;
 /// A floor does not lean more, as the tangent of the angle.
 const STEEPEST: f32 = 0.3;
 
+/// A slope that may be the ground's, as the tangent of 2.2 deg.
+const SMALL_SLOPE: f32 = 0.038;
+
 /// The plane z = `height` below the sensor, with its leaning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
@@ -45,6 +48,14 @@ impl Floor {
             }
         }
         (floor.slope.iter().all(|slope| libm::fabsf(*slope) < STEEPEST) && floor.height > 0.0).then_some(floor)
+    }
+
+    /// Without a slope of less than 2.2 deg, which is more often the ground's than the sensor's: the images of places are
+    /// made from scans of the same ground.
+    #[must_use]
+    pub fn without_small_slope(self) -> Self {
+        let [a, b] = self.slope;
+        if a * a + b * b < SMALL_SLOPE * SMALL_SLOPE { Self::level(self.height) } else { self }
     }
 
     /// A point as it is above this floor: turned so that the floor is level, with its height above it, m.

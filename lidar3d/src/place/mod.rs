@@ -1,5 +1,7 @@
 //! Qualitative localisation: has this place been seen (M chapter 5)?
 
+#[cfg(feature = "std")]
+mod alignment;
 mod enriched;
 mod facing;
 mod floor;
@@ -9,9 +11,14 @@ mod key_signatures;
 mod loop_closure;
 mod normals;
 mod orientation;
+mod panorama;
 mod plane_fit;
+#[cfg(feature = "std")]
+mod recognition;
 mod threshold;
 
+#[cfg(feature = "std")]
+pub use alignment::{Alignment, Asked, Pose, Stored};
 pub use enriched::{ENRICHED_LENGTH, Enriched};
 pub use facing::{Facing, relative_turn};
 pub use floor::Floor;
@@ -21,5 +28,8 @@ pub use key_signatures::KeySignatures;
 pub use loop_closure::{Limits, loop_closure};
 pub use normals::{Neighbours, surfaces, vertical_parts};
 pub use orientation::{DIRECTIONS, Orientation};
+pub use panorama::{Panorama, Span};
 pub use plane_fit::fitted_surfaces;
+#[cfg(feature = "std")]
+pub use recognition::{Answer, Place, PlaceIndex, Query};
 pub use threshold::from_key_scans;

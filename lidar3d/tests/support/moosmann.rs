@@ -56,7 +56,7 @@ impl Drive {
 fn keys(path: &Path) -> Vec<Key> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut keys: Vec<Key> = Vec::new();
-    let (mut last, mut travelled) = (None, 0.0);
+    let (mut last, mut travelled): (Option<[f64; 2]>, f64) = (None, 0.0);
     for (scan, line) in text.lines().enumerate().take(501) {
         let values: Vec<f64> = line.split_whitespace().map(|value| value.parse().unwrap()).collect();
         let (x, y) = (values[3], values[7]);
