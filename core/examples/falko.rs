@@ -1,4 +1,5 @@
 //! FALKO keypoints of one scan: the corners of a room of 8 m x 6 m, and the edges of a pillar in it.
+#![allow(clippy::indexing_slicing, reason = "a panic is how an example ends that does not do what it says")]
 
 use std::f64::consts::{PI, TAU};
 

@@ -1,5 +1,6 @@
 //! A tricycle that reports the counters of its two encoders a hundred times a second, and a laser that sees reflectors eight
 //! times a second.
+#![allow(clippy::expect_used, reason = "a panic is how an example ends that does not do what it says")]
 
 use agv_core::geometry::{Point, Pose, Twist};
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix};
