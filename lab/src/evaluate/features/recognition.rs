@@ -57,20 +57,3 @@ fn thinned(points: &[RecognitionPoint]) -> Vec<RecognitionPoint> {
     }
     kept
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_curve_counts_what_a_threshold_lets_through() {
-        let compare = |distance, is_same| Comparison { distance, is_same };
-        let mut comparisons = [compare(3.0, true), compare(1.0, true), compare(2.0, false), compare(2.0, true)];
-        let points = curve(&mut comparisons);
-        let expected = [(1.0, 1.0, 1.0 / 3.0), (2.0, 2.0 / 3.0, 2.0 / 3.0), (3.0, 0.75, 1.0)];
-        for (point, (threshold, precision, recall)) in points.iter().zip(expected) {
-            assert_eq!((point.threshold, point.precision, point.recall), (threshold, precision, recall));
-        }
-        assert_eq!(points.len(), 3);
-    }
-}

@@ -68,21 +68,3 @@ fn scatter(points: &[Point]) -> Option<(f64, f64)> {
     let root = |value: f64| value.max(0.0).sqrt();
     Some((root(values.min()), root(values.max())))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_landmark_scatters_as_its_keypoints_do() {
-        // Four keypoints at +-3 cm and +-1 cm from the first one's place, and one far away.
-        let offsets = [(0.0, 0.0), (0.03, 0.0), (-0.03, 0.0), (0.0, 0.01), (0.0, -0.01)];
-        let mut scans: Vec<Vec<Point>> = offsets.iter().map(|&(x, y)| vec![Point::new(1.0 + x, 2.0 + y)]).collect();
-        scans.push(vec![Point::new(5.0, 5.0), Point::new(5.1, 5.0)]);
-        let found = stability(&scans, 0.05);
-        assert_eq!((found.landmarks, found.single_share), (2, 0.5));
-        // Sample variances: 2 * 0.03^2 / 4 and 2 * 0.01^2 / 4.
-        assert!((found.lambda_max_m - 0.03 / 2_f64.sqrt()).abs() < 1e-12);
-        assert!((found.lambda_mean_m - (0.03 * 0.01 / 2.0_f64).sqrt()).abs() < 1e-12);
-    }
-}
