@@ -1,6 +1,6 @@
 """The bus when it is not as it should be."""
 
-from bench import check_sound, describe, emergencies, longest_gap, poses
+from bench import check_sound, emergencies, longest_gap, poses
 from emulated_chip.can_bus import CanFrame
 from emulated_chip.clock import MILLISECOND, SECOND
 

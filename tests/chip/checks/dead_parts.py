@@ -1,6 +1,6 @@
 """Parts that are dead from the start: the pose goes on, and the bus is told."""
 
-from bench import LONGEST_START, check_sound, describe, emergencies, longest_gap, poses
+from bench import check_sound, describe, emergencies, longest_gap, poses
 from emulated_chip.clock import MILLISECOND, SECOND
 
 HARDWARE = 0x5000

@@ -1,6 +1,6 @@
 """A page of settings that is full."""
 
-from bench import LONGEST_START, check_sound, describe, poses
+from bench import LONGEST_START, check_sound, describe
 from emulated_chip.clock import MILLISECOND, SECOND
 from emulated_chip.flash import Flash
 from stored_settings import FIRST_PAGE, NODE_17, PAGE, fill, starts

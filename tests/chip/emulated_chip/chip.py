@@ -8,7 +8,7 @@ from unicorn import arm_const as arm
 from . import system_control
 from .cache import LINE, Cache
 from .can_bus import CanBus
-from .clock import SECOND, Clock
+from .clock import Clock
 from .debug import DebugUnit
 from .ethernet import Ethernet
 from .exceptions import Exceptions

@@ -1,7 +1,6 @@
 """The Ethernet controller (chapter 58): management of the PHY, rings of descriptors, frames as messages with times."""
 
 from .clock import MICROSECOND
-from .finding import Finding
 from .registers import RegisterFile
 
 # DMACSR and DMACIER (58.11.2): transmitted, received, their summary.

@@ -2,8 +2,6 @@
 
 from unicorn import arm_const as arm
 
-from .finding import Finding
-
 HARD_FAULT, MEMORY_FAULT, BUS_FAULT, USAGE_FAULT = 3, 4, 5, 6
 SVCALL, PENDSV, SYSTICK = 11, 14, 15
 FIRST_INTERRUPT = 16

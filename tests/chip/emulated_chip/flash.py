@@ -5,9 +5,7 @@ A word whose programming or erasing was cut short has a double error, and readin
 the data sheet's most (DS12110, "Flash memory programming"), by the parallelism that PSIZE selects.
 """
 
-from .cache import LINE
 from .clock import MICROSECOND, MILLISECOND
-from .finding import Finding
 from .registers import RegisterFile
 
 WORD = 32

@@ -210,7 +210,6 @@ class Rcc(RegisterFile):
     def _reset_peripherals(self, name, word):
         before = self.get(name)
         self.set(name, word)
-        register = self.register(name)
         for peripheral in self.chip.description.peripherals.values():
             bit = peripheral["reset"]
             if bit and bit["register"] == name and word >> bit["bit"] & 1 and not before >> bit["bit"] & 1:

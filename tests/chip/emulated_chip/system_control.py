@@ -1,6 +1,6 @@
 """The processor's own registers: interrupts, faults, protection of memory, caches (ARMv7-M ARM, B3; Cortex-M7 TRM r1p1)."""
 
-from .exceptions import ENABLE_BITS, BUS_FAULT, MEMORY_FAULT
+from .exceptions import BUS_FAULT, MEMORY_FAULT
 
 BASE = 0xE000_E000
 CPUID = 0x411F_C271
