@@ -16,8 +16,9 @@ use crate::repository;
 /// there, too.
 const CARGO_TEST: [&str; 6] = ["test", "--workspace", "--release", "--features", "agv/full", "--no-fail-fast"];
 
-/// Programs whose tests wait for networks and for boards that are emulated in real time.
-const WAITING: [&str; 6] = ["vehicle", "firmware", "vehicle_on_can", "view", "bad_network", "service_attacks"];
+/// Programs whose tests wait for networks and for boards that are emulated, in real time or on one core.
+const WAITING: [&str; 7] =
+    ["vehicle", "firmware", "vehicle_on_can", "view", "bad_network", "service_attacks", "chip"];
 
 /// A program of tests.
 #[derive(Debug, PartialEq)]
