@@ -21,6 +21,8 @@ use crate::geometry::Offsets;
 const ROUNDS: usize = 60;
 /// Rounds before the residuals tell how great the errors of the ranges are: at first they show those of the start.
 const FIRST_ROUNDS: usize = 4;
+/// From here on what was learnt stays: on surfaces that are not quite planes it would change a little for ever.
+const LEARNT_ROUNDS: usize = 30;
 /// A laser with fewer points is held where it is.
 const LEAST_POINTS: usize = 100;
 /// From here on points do not count, in deviations of the noise (Tukey's biweight, 95 % as efficient as least squares).
@@ -143,7 +145,8 @@ fn adjust(
         known: prior.vector(),
     };
     for round in 1..=ROUNDS {
-        let outcome = problem.step(&mut state, round > FIRST_ROUNDS)?;
+        let is_learning = (FIRST_ROUNDS + 1..=LEARNT_ROUNDS).contains(&round);
+        let outcome = problem.step(&mut state, is_learning)?;
         if outcome.is_settled && round > FIRST_ROUNDS {
             return Ok(problem.found(state, outcome, round));
         }
@@ -184,7 +187,7 @@ struct Outcome {
 
 impl Problem<'_> {
     /// One round of Gauss and Newton.
-    fn step(&self, state: &mut State, has_settled_once: bool) -> Result<Outcome, AdjustmentError> {
+    fn step(&self, state: &mut State, is_learning: bool) -> Result<Outcome, AdjustmentError> {
         let noise = self.noise(state);
         let mut sums: Vec<PlaneSums> = self
             .targets
@@ -192,14 +195,14 @@ impl Problem<'_> {
             .zip(&state.planes)
             .map(|(target, plane)| self.sums(&state.lasers, target, (&plane.0, plane.1), noise))
             .collect();
-        if has_settled_once {
+        if is_learning {
             state.own = self.own_error(&sums, noise);
         }
         let part = |deviation: f64| (deviation / noise).powi(2);
         for (sums, (_, bias)) in sums.iter_mut().zip(&state.planes) {
             sums.close((part(state.own), part(state.common)), *bias, (noise / PLANE_STEP).powi(2));
         }
-        if has_settled_once {
+        if is_learning {
             state.common = common_error(&sums, &state.planes, noise);
         }
         let (steps, covariances) = self.equations(state, &sums, noise).solve().ok_or(AdjustmentError::Undetermined)?;
@@ -219,7 +222,7 @@ impl Problem<'_> {
         }
         let covariances: Vec<LaserMatrix> =
             covariances.into_iter().map(|covariance| covariance * noise.powi(2)).collect();
-        if has_settled_once && self.is_learning {
+        if is_learning && self.is_learning {
             state.known = self.learnt(state, &covariances);
         }
         let part = if self.is_learning { SMALL_TO_BELIEVED } else { SMALL_TO_KNOWN };
