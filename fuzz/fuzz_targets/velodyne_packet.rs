@@ -2,7 +2,8 @@
 
 use agv_lidar3d::calibration::{Full, Laser};
 use agv_lidar3d::geometry::Offsets;
-use agv_lidar3d::packet::{Decoder, LENGTH, Model, Packet, Sensor, calibration_from_stream};
+use agv_lidar3d::calibration::calibration_from_stream;
+use agv_lidar3d::packet::{Decoder, LENGTH, Model, Packet, Sensor};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

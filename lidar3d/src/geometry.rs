@@ -1,6 +1,6 @@
 //! From a distance and an angle to a point, and back (M 3.2-3.6).
 
-use crate::calibration::Laser;
+use crate::laser::Laser;
 
 /// How the offsets of a beam are measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

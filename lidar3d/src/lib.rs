@@ -14,5 +14,6 @@ pub mod cloud_file;
 pub mod geometry;
 #[cfg(feature = "std")]
 pub mod intrinsic;
+mod laser;
 pub mod packet;
 pub mod place;

@@ -1,10 +1,10 @@
 //! Packets: literal bytes, there and back, and bytes that are none.
 
-use agv_lidar3d::calibration::{Calibration, Full, Laser};
+use agv_lidar3d::calibration::{Calibration, Full, Laser, calibration_from_stream};
 use agv_lidar3d::geometry::{Offsets, point_with_two_points};
 use agv_lidar3d::packet::{
     BLOCKS, Decoder, Filter, LENGTH, Model, OtherSensor, Packet, PacketError, Point, RETURNS, Return, ReturnKind,
-    ReturnMode, STATUS_CYCLE, Sensor, Tail, Tally, calibration_from_stream,
+    ReturnMode, STATUS_CYCLE, Sensor, Tail, Tally,
 };
 use proptest::prelude::*;
 

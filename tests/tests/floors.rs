@@ -47,7 +47,14 @@ const HOUSES: [House; 7] = [
     House { folder: "settings", floors: &[&["settings"], &["leaf"], &["leaves"], &["store"], &["service"]] },
     House {
         folder: "lidar3d",
-        floors: &[&["calibration"], &["geometry"], &["intrinsic", "packet"], &["cloud"], &["place"]],
+        floors: &[
+            &["laser"],
+            &["geometry"],
+            &["packet"],
+            &["calibration"],
+            &["cloud", "cloud_file", "intrinsic"],
+            &["place"],
+        ],
     },
     House {
         folder: "host-sim",

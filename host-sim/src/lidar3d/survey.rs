@@ -5,7 +5,8 @@ use std::path::Path;
 
 use agv_core::measurement::Time;
 use agv_lidar3d::calibration::Calibration;
-use agv_lidar3d::packet::{Packet, Sensor, Tail, calibration_from_stream, counts_between, hesai};
+use agv_lidar3d::calibration::calibration_from_stream;
+use agv_lidar3d::packet::{Packet, Sensor, Tail, counts_between, hesai};
 
 use super::capture::{self, CaptureError};
 use super::kind::{Datagram, Kind};

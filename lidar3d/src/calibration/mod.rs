@@ -6,10 +6,14 @@ mod db_xml;
 mod file;
 #[cfg(feature = "std")]
 mod hesai_csv;
-mod laser;
 #[cfg(feature = "std")]
 mod ros_yaml;
+#[cfg(feature = "std")]
+mod stream;
 
 #[cfg(feature = "std")]
 pub use file::{Calibration, CalibrationError};
-pub use laser::{Full, Laser};
+#[cfg(feature = "std")]
+pub use stream::calibration_from_stream;
+
+pub use crate::laser::{Full, Laser};

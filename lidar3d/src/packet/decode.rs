@@ -2,8 +2,8 @@
 
 use super::{BLOCKS, Filter, OtherSensor, Packet, Point, RETURNS, Return, ReturnKind, ReturnMode, Sensor, Tail, Tally};
 use super::{Block, rings};
-use crate::calibration::Laser;
 use crate::geometry::{self, FAR_POINT, Offsets, near_corrections};
+use crate::laser::Laser;
 
 /// Most lasers of a sensor.
 const LASERS: usize = 128;

@@ -12,7 +12,5 @@ pub use decode::{Decoder, Model};
 pub(crate) use point::rings;
 pub use point::{Filter, Point, ReturnKind, Tally};
 pub use sensor::{OtherSensor, Sensor};
-#[cfg(feature = "std")]
-pub use status::calibration_from_stream;
 pub use status::{ReturnMode, STATUS_CYCLE, Tail};
 pub use view::{BLOCKS, Block, LENGTH, PORT, Packet, PacketError, RETURNS, Return, counts_between};

@@ -1,7 +1,7 @@
 //! From packets to points.
 
 use super::{Packet, Sensor};
-use crate::calibration::Laser;
+use crate::laser::Laser;
 use crate::packet::{Filter, Point, ReturnKind, Tally, rings};
 
 /// Most lasers of a sensor.

@@ -1,7 +1,7 @@
 //! A sensor as its metadata state it.
 
 use super::Profile;
-use crate::calibration::Laser;
+use crate::laser::Laser;
 
 /// Most pixels of a column.
 pub const PIXELS: usize = 128;
