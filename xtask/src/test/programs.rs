@@ -17,7 +17,8 @@ use crate::repository;
 const CARGO_TEST: [&str; 6] = ["test", "--workspace", "--release", "--features", "agv/full", "--no-fail-fast"];
 
 /// Programs whose tests wait for networks and for boards that are emulated, in real time or on one core.
-const WAITING: [&str; 7] = ["vehicle", "firmware", "vehicle_on_can", "view", "bad_network", "service_attacks", "chip"];
+const WAITING: [&str; 8] =
+    ["vehicle", "firmware", "vehicle_on_can", "view", "bad_network", "service_attacks", "busy_bus", "chip"];
 
 /// A program of tests.
 #[derive(Debug, PartialEq)]
