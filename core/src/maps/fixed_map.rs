@@ -66,18 +66,21 @@ impl<const LANDMARKS: usize> FixedMap<LANDMARKS> {
     }
 
     /// The map without its capacity.
+    #[inline]
     #[must_use]
     pub fn view(&self) -> MapView<'_> {
         MapView { landmarks: &self.landmarks, grid: self.grid.view() }
     }
 
     /// See [`MapView::nearest`].
+    #[inline]
     #[must_use]
     pub fn nearest(&self, point: Point, radius: f64) -> Option<(&Landmark, f64)> {
         self.view().nearest(point, radius)
     }
 
     /// See [`MapView::near`].
+    #[inline]
     pub fn near(&self, point: Point, radius: f64) -> impl Iterator<Item = &Landmark> {
         self.view().near(point, radius)
     }
@@ -98,6 +101,7 @@ impl<'a> MapView<'a> {
     }
 
     /// The landmark nearest to `point` and the squared distance, m^2; none beyond `radius` (m, at most three cells of 2 m).
+    #[inline]
     #[must_use]
     pub fn nearest(&self, point: Point, radius: f64) -> Option<(&'a Landmark, f64)> {
         let mut limit = radius * radius;
@@ -113,6 +117,7 @@ impl<'a> MapView<'a> {
     }
 
     /// The landmarks within `radius` (m, at most three cells of 2 m) of `point`.
+    #[inline]
     pub fn near(&self, point: Point, radius: f64) -> impl Iterator<Item = &'a Landmark> + use<'a> {
         let landmarks = self.landmarks;
         self.grid

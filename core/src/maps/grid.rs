@@ -46,6 +46,7 @@ impl<const POINTS: usize> Grid<POINTS> {
     }
 
     /// The index without its capacity.
+    #[inline]
     #[must_use]
     pub fn view(&self) -> GridView<'_> {
         GridView { cells: self.cells, places: &self.places }
@@ -62,6 +63,7 @@ pub struct GridView<'a> {
 impl<'a> GridView<'a> {
     /// Numbers of the points in the cells that a square of half width `radius` (m) around `point` touches: all points
     /// within `radius`, and some that are not. The radius counts as at most four cells.
+    #[inline]
     pub fn near(&self, point: Point, radius: f64) -> impl Iterator<Item = usize> + use<'a> {
         let Self { cells, places } = *self;
         let radius = radius.min(cells.edge * (REACH - 1) as f64);
@@ -83,6 +85,7 @@ impl<'a> GridView<'a> {
 
 impl Cells {
     /// Row and column of a point.
+    #[inline]
     fn place(&self, point: &Point) -> (i16, i16) {
         let offset = (point - self.corner) / self.edge;
         (round_down(offset.y), round_down(offset.x))
@@ -90,6 +93,7 @@ impl Cells {
 }
 
 /// The whole number below, as far as there are rows and columns: by hand, at a tenth of the general function's cost.
+#[inline]
 fn round_down(number: f64) -> i16 {
     let towards_zero = number as i32;
     let down = if f64::from(towards_zero) > number { towards_zero.saturating_sub(1) } else { towards_zero };
