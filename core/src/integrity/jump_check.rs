@@ -100,8 +100,8 @@ impl JumpCheck {
         let jump = self.corrected.and_then(|last| {
             // What was extrapolated behind the last sample is in both.
             let is_same = before.odometry_pose == after.odometry_pose;
-            let moved = before.odometry_pose.between(&after.odometry_pose);
-            let expected = if is_same { before.pose } else { before.pose.compose(&moved) };
+            let moved = || before.odometry_pose.between(&after.odometry_pose);
+            let expected = if is_same { before.pose } else { before.pose.compose(&moved()) };
             let correction = expected.between(&after.pose);
             // What was not known of the pose before is nothing that the distance since has shown.
             last.is_sure.then(|| {
