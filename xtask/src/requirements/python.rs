@@ -17,7 +17,10 @@ const CHIP: [Package; 2] = [
     ("pyelftools>=0.31,<1", "elftools"),
 ];
 
-const PACKAGES: [Package; 14] = [
+/// It asks for an older `rosbags` than others do, and works without; so it is installed before them.
+const OUSTER: Package = ("ouster-sdk>=1,<2", "ouster.sdk");
+
+const PACKAGES: [Package; 13] = [
     CHIP[0],
     CHIP[1],
     ("numpy>=1.24,<3", "numpy"),
@@ -30,7 +33,6 @@ const PACKAGES: [Package; 14] = [
     ("rosbags>=0.10,<1", "rosbags"),
     ("evo>=1.30,<2", "evo"),
     ("velodyne-decoder>=3.1,<4", "velodyne_decoder"),
-    ("ouster-sdk>=1,<2", "ouster.sdk"),
     (include_str!("../../../lab/ray/requirements.txt").trim_ascii(), "ray"),
 ];
 
@@ -48,7 +50,14 @@ pub fn interpreter() -> PathBuf {
 
 /// Makes the environment. Returns what is still missing, one line each.
 pub fn prepare() -> Vec<String> {
-    install_all(&PACKAGES)
+    let had_ouster = has(&interpreter(), OUSTER.1);
+    let mut missing = install_all(&[OUSTER]);
+    if !had_ouster {
+        // What it has put in the place of newer ones is replaced; what cannot be had is told below.
+        let _ = pip(&interpreter(), &PACKAGES.map(|(package, _)| package));
+    }
+    missing.extend(install_all(&PACKAGES));
+    missing
 }
 
 /// The same for the emulated chip alone.
