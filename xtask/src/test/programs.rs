@@ -1,5 +1,5 @@
-//! Builds the programs of the tests and runs them: those that wait for real time in one row, those that compute in another
-//! beside it.
+//! Builds the programs of the tests and runs them: those that wait beside those that compute, then those that emulate a board
+//! in real time.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -16,9 +16,11 @@ use crate::repository;
 /// there, too.
 const CARGO_TEST: [&str; 6] = ["test", "--workspace", "--release", "--features", "agv/full", "--no-fail-fast"];
 
-/// Programs whose tests wait for networks and for boards that are emulated, in real time or on one core.
-const WAITING: [&str; 8] =
-    ["vehicle", "firmware", "vehicle_on_can", "view", "bad_network", "service_attacks", "busy_bus", "chip"];
+/// Programs whose tests wait for networks, or run on one core: they run beside those that compute.
+const WAITING: [&str; 2] = ["bad_network", "chip"];
+
+/// Programs whose tests emulate a board in real time: they have the machine to themselves.
+const EMULATED: [&str; 6] = ["vehicle", "firmware", "vehicle_on_can", "view", "service_attacks", "busy_bus"];
 
 /// A program of tests.
 #[derive(Debug, PartialEq)]
@@ -43,8 +45,10 @@ pub fn run(is_long: bool) -> anyhow::Result<Outcome> {
             command.env("AGV_LONG", "1").arg("--include-ignored");
         }
     };
+    let (emulated, others): (Vec<_>, Vec<_>) =
+        programs.iter().partition(|program| EMULATED.contains(&program.name.as_str()));
     let (waiting, computing): (Vec<_>, Vec<_>) =
-        programs.iter().partition(|program| WAITING.contains(&program.name.as_str()));
+        others.into_iter().partition(|program| WAITING.contains(&program.name.as_str()));
     let outcome = Mutex::new(Outcome::new());
     let run_row = |row: &[&Program]| -> anyhow::Result<()> {
         for program in row {
@@ -63,6 +67,7 @@ pub fn run(is_long: bool) -> anyhow::Result<Outcome> {
         run_row(&computing)?;
         beside.join().unwrap_or_else(|_| bail!("a row of tests broke down"))
     })?;
+    run_row(&emulated)?;
     let mut outcome = outcome.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     let mut examples = cargo_test();
     examples.arg("--doc").arg("--");
