@@ -29,11 +29,6 @@ impl<const BYTES: usize> Laser<BYTES> {
         self.session.closed();
     }
 
-    /// The other side has closed the connection in good order.
-    pub fn closed(&mut self) {
-        self.session.closed();
-    }
-
     /// Takes bytes, and returns how many; the rest is for the next call, after [`Laser::poll`].
     pub fn receive(&mut self, bytes: &[u8], now: Time) -> usize {
         self.session.receive(bytes, now)

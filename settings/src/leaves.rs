@@ -1,9 +1,17 @@
 //! The leaves, by the rooms of the code that they are for.
 
-use agv_core::localizer::bounds;
+use agv_core::localizer;
 use agv_core::odometry::CounterRange;
 
 use crate::leaf::{Leaf, Value, tricycle, tricycle_mut};
+
+/// The bounds that the core has for a number; a name that it does not know ends the compilation.
+const fn bounds(name: &str) -> (f64, f64) {
+    match localizer::bounds(name) {
+        Some(bounds) => bounds,
+        None => panic!("the core has no bounds for a number of that name"),
+    }
+}
 
 /// A measure.
 macro_rules! number {

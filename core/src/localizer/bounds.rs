@@ -251,39 +251,28 @@ const BOUNDS: [Bound; 41] = [
     },
 ];
 
-/// The least and the largest value of a number, by the name that the settings have for it. To be asked when a program is
-/// compiled: a name that no number has is an error then.
-///
-/// # Panics
-/// If no number has that name.
+/// The least and the largest value of a number, by the name that the settings have for it. None if no number has that name.
 #[must_use]
-pub const fn bounds(leaf: &str) -> (f64, f64) {
-    let mut index = 0;
-    while index < BOUNDS.len() {
-        #[allow(clippy::indexing_slicing, reason = "it is computed by the compiler, which has no other way")]
-        let bound = &BOUNDS[index];
+pub const fn bounds(leaf: &str) -> Option<(f64, f64)> {
+    let mut left: &[Bound] = &BOUNDS;
+    while let Some((bound, others)) = left.split_first() {
         if is_same(bound.leaf.as_bytes(), leaf.as_bytes()) {
-            return (bound.least, bound.most);
+            return Some((bound.least, bound.most));
         }
-        index += 1;
+        left = others;
     }
-    #[allow(clippy::panic, reason = "this is how the compiler is told")]
-    {
-        panic!("no number of the parameters has that name")
-    }
+    None
 }
 
-const fn is_same(one: &[u8], other: &[u8]) -> bool {
+const fn is_same(mut one: &[u8], mut other: &[u8]) -> bool {
     if one.len() != other.len() {
         return false;
     }
-    let mut index = 0;
-    while index < one.len() {
-        #[allow(clippy::indexing_slicing, reason = "it is computed by the compiler, which has no other way")]
-        if one[index] != other[index] {
+    while let (Some((first, rest)), Some((second, others))) = (one.split_first(), other.split_first()) {
+        if *first != *second {
             return false;
         }
-        index += 1;
+        (one, other) = (rest, others);
     }
     true
 }
