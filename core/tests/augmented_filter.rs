@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use agv_core::filter::{
-    Augmented, BiasDeviations, BiasWalk, Cartesian, Ekf, RelativePose, augmented_states, packed_entries,
+    BiasDeviations, BiasModel, BiasWalk, Cartesian, Ekf, Landmark, PoseAndSlots, RelativePose, packed_entries,
+    slot_states,
 };
 use agv_core::geometry::{Point, Pose, wrap};
 use agv_core::measurement::Time;
@@ -10,10 +11,12 @@ use agv_core::odometry::{Motion, OdometryBias};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use proptest::prelude::*;
 
+use super::support::view::observe;
+
 const KEYS: usize = 2;
 const LANDMARKS: usize = 4;
-const STATES: usize = augmented_states(KEYS, LANDMARKS);
-type Filter = Augmented<KEYS, LANDMARKS, STATES, { packed_entries(STATES) }>;
+const STATES: usize = slot_states(KEYS, LANDMARKS);
+type Filter = Ekf<PoseAndSlots<KEYS, LANDMARKS, STATES, { packed_entries(STATES) }>>;
 
 const LASER: Pose = Pose { x: 0.9, y: -0.1, theta: 0.2 };
 const LEVER: Option<f64> = Some(1.5);
@@ -64,7 +67,7 @@ impl Dense {
         mean[1] = start.pose.y;
         mean[2] = start.pose.theta;
         let mut covariance = Square::zeros();
-        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&start.covariance);
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&start.covariance());
         let biases = deviations();
         for (state, deviation) in [(3, biases.scale), (4, biases.steering), (YAW, biases.laser_yaw)] {
             covariance[(state, state)] = deviation * deviation;
@@ -226,14 +229,14 @@ fn step() -> impl Strategy<Value = Step> {
 
 fn start() -> (Filter, Dense) {
     let state = Ekf::new(Pose::new(3.0, -2.0, 0.7), 0.01, 0.005);
-    let mut filter = Filter::new();
+    let mut filter = Filter::empty();
     filter.begin_biases(&deviations());
     filter.begin(&state);
     (filter, Dense::new(&state))
 }
 
 fn dense_covariance(filter: &Filter) -> Square {
-    Square::from_fn(|row, column| filter.covariance().get(row, column))
+    Square::from_fn(|row, column| filter.packed_covariance().get(row, column))
 }
 
 proptest! {
@@ -245,11 +248,11 @@ proptest! {
         for step in steps {
             match step {
                 Step::Move(x, y, theta) => {
-                    filter.predict(&motion(x, y, theta), LEVER, &WALK);
+                    filter.predict_with(&motion(x, y, theta), &BiasModel { lever: LEVER, walk: WALK });
                     dense.predict(&motion(x, y, theta));
                 }
                 Step::Add(slot, x, y) => {
-                    filter.add_landmark(slot, &seen(x, y), &LASER);
+                    filter.add_landmark(slot, &filter.viewpoint(&LASER), &seen(x, y));
                     dense.add_landmark(slot, &seen(x, y));
                 }
                 Step::Remove(slot) => {
@@ -259,7 +262,7 @@ proptest! {
                 Step::See(slot, x, y) => {
                     let expected = sight(&dense.mean, slot);
                     let observation = seen(expected[0] + x, expected[1] + y);
-                    if let Some(linearised) = filter.observe_landmark(slot, &observation, &LASER) {
+                    if let Some(linearised) = observe(&filter, &LASER, &observation, Landmark::Slot(slot)) {
                         prop_assert!(filter.correct(&linearised));
                         dense.correct(&observation.position, &observation.covariance, |at| sight(at, slot));
                     }
@@ -299,16 +302,16 @@ proptest! {
 fn a_known_landmark_is_not_learnt_better_than_the_map_states() {
     // Twice the same landmark, a thousand times: its own error stays in the pose.
     let (mut filter, _) = start();
-    let there = filter.locate(&Point::new(4.0, 1.0), &LASER);
+    let there = filter.viewpoint(&LASER).locate(&Point::new(4.0, 1.0));
     filter.add_known_landmark(0, there, 1e-4);
     for _ in 0..1000 {
-        let linearised = filter.observe_landmark(0, &seen(4.0, 1.0), &LASER).unwrap();
+        let linearised = observe(&filter, &LASER, &seen(4.0, 1.0), Landmark::Slot(0)).unwrap();
         assert!(filter.correct(&linearised));
     }
     let state = filter.state();
     // The landmark's variance and the start pose's, with little from the heading.
     let expected = 1.0 / (1.0 / 1e-4 + 1.0 / 1e-4);
-    assert!(state.covariance.m11 > 0.9 * expected && state.covariance.m22 > 0.9 * expected, "{state:?}");
+    assert!(state.covariance().m11 > 0.9 * expected && state.covariance().m22 > 0.9 * expected, "{state:?}");
 }
 
 /// Normally distributed numbers from a fixed sequence.
@@ -334,7 +337,7 @@ fn wander(run: u64, turns: usize, speed: f64, turn: f64, start_deviation: f64, m
     let landmarks = [(4.0, 1.0), (-3.0, 5.0), (1.0, -6.0), (7.0, 6.0)].map(|(x, y)| Point::new(x, y));
     let mut truth = Pose::default();
     let begin = Pose::new(0.01 * random.next(), 0.01 * random.next(), start_deviation * random.next());
-    let mut filter = Filter::new();
+    let mut filter = Filter::empty();
     filter.begin_biases(&deviations());
     filter.begin(&Ekf::new(begin, 0.01, start_deviation));
     let biases = deviations();
@@ -348,7 +351,7 @@ fn wander(run: u64, turns: usize, speed: f64, turn: f64, start_deviation: f64, m
         let noise = [deviation.x, deviation.y, deviation.z].map(|deviation| deviation * random.next());
         let moved = reported.corrected(&bias, LEVER).displacement;
         truth = truth.compose(&Pose::new(moved.x + noise[0], moved.y + noise[1], moved.theta + noise[2]));
-        filter.predict(&believed, LEVER, &BiasWalk::NONE);
+        filter.predict_with(&believed, &BiasModel { lever: LEVER, walk: BiasWalk::NONE });
         let sensor = truth.compose(&Pose { theta: LASER.theta + yaw, ..LASER });
         for (slot, point) in landmarks.iter().enumerate() {
             let exact = sensor.inverse_transform(point);
@@ -357,9 +360,9 @@ fn wander(run: u64, turns: usize, speed: f64, turn: f64, start_deviation: f64, m
                 covariance: Matrix2::identity() * 2.5e-5,
             };
             if scan == 0 {
-                filter.add_landmark(slot, &observation, &LASER);
+                filter.add_landmark(slot, &filter.viewpoint(&LASER), &observation);
             } else {
-                let linearised = filter.observe_landmark(slot, &observation, &LASER).unwrap();
+                let linearised = observe(&filter, &LASER, &observation, Landmark::Slot(slot)).unwrap();
                 assert!(filter.correct(&linearised));
             }
         }
@@ -374,7 +377,7 @@ fn the_heading_is_never_known_better_than_at_the_start() {
         for start in [0.002, 0.1] {
             for run in 1..6 {
                 wander(run, 200, speed, turn, start, |filter, _| {
-                    let variance = filter.state().covariance.m33;
+                    let variance = filter.covariance().m33;
                     assert!(variance >= 0.999_999 * start * start, "{variance} from {}", start * start);
                 });
             }
@@ -392,7 +395,7 @@ fn errors_are_as_large_as_the_filter_says() {
                 let state = filter.state();
                 let error =
                     Vector3::new(state.pose.x - truth.x, state.pose.y - truth.y, wrap(state.pose.theta - truth.theta));
-                last = (error.transpose() * state.covariance.try_inverse().unwrap() * error).x;
+                last = (error.transpose() * state.covariance().try_inverse().unwrap() * error).x;
             });
             sum += last;
         }

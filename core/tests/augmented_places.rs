@@ -1,15 +1,17 @@
 //! Places of the augmented filter: how they are taken and freed, and what an observation without a place says.
 
 use agv_core::filter::{
-    Augmented, BiasDeviations, Cartesian, Ekf, RelativePose, SparseLinearisation, augmented_states, packed_entries,
+    BiasDeviations, Cartesian, Ekf, Landmark, Linearisation, PoseAndSlots, RelativePose, packed_entries, slot_states,
 };
 use agv_core::geometry::{Point, Pose};
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
 
+use super::support::view::observe;
+
 const KEYS: usize = 2;
 const LANDMARKS: usize = 3;
-const STATES: usize = augmented_states(KEYS, LANDMARKS);
-type Filter = Augmented<KEYS, LANDMARKS, STATES, { packed_entries(STATES) }>;
+const STATES: usize = slot_states(KEYS, LANDMARKS);
+type Filter = Ekf<PoseAndSlots<KEYS, LANDMARKS, STATES, { packed_entries(STATES) }>>;
 type Square = SMatrix<f64, STATES, STATES>;
 
 const LASER: Pose = Pose { x: 0.9, y: -0.1, theta: 0.2 };
@@ -17,15 +19,19 @@ const BIASES: BiasDeviations = BiasDeviations { scale: 0.01, steering: 0.005, la
 
 fn state(pose: Pose) -> Ekf {
     let covariance = Matrix3::new(4e-4, 1e-4, 2e-5, 1e-4, 3e-4, -1e-5, 2e-5, -1e-5, 1e-4);
-    Ekf { pose, covariance }
+    Ekf::with_covariance(pose, &covariance)
 }
 
 fn seen(x: f64, y: f64) -> Cartesian {
     Cartesian { position: Point::new(x, y), covariance: Matrix2::new(4e-5, 1e-5, 1e-5, 3e-5) }
 }
 
+fn known(filter: &Filter, position: Point, variance: f64, seen: &Cartesian) -> Linearisation<2> {
+    observe(filter, &LASER, seen, Landmark::Known { position, variance }).unwrap()
+}
+
 fn begun() -> Filter {
-    let mut filter = Filter::default();
+    let mut filter = Filter::empty();
     filter.begin_biases(&BIASES);
     filter.begin(&state(Pose::new(3.0, -2.0, 0.7)));
     filter
@@ -38,20 +44,20 @@ fn full() -> Filter {
         filter.remember_pose(key);
     }
     for landmark in 0..LANDMARKS {
-        filter.add_landmark(landmark, &seen(4.0 - 3.0 * landmark as f64, 2.0), &LASER);
+        filter.add_landmark(landmark, &filter.viewpoint(&LASER), &seen(4.0 - 3.0 * landmark as f64, 2.0));
     }
-    let known = filter.observe_known(&filter.locate(&Point::new(3.0, 1.0), &LASER), 1e-4, &seen(3.01, 1.02), &LASER);
+    let known = known(&filter, filter.viewpoint(&LASER).locate(&Point::new(3.0, 1.0)), 1e-4, &seen(3.01, 1.02));
     assert!(filter.correct(&known));
     filter
 }
 
 fn covariance(filter: &Filter) -> Square {
-    Square::from_fn(|row, column| filter.covariance().get(row, column))
+    Square::from_fn(|row, column| filter.packed_covariance().get(row, column))
 }
 
 #[test]
 fn a_filter_has_six_states_of_its_own_and_three_a_pose_and_two_a_landmark() {
-    assert_eq!([(0, 0), (1, 0), (0, 1), (4, 64)].map(|(keys, places)| augmented_states(keys, places)), [6, 9, 8, 146]);
+    assert_eq!([(0, 0), (1, 0), (0, 1), (4, 64)].map(|(keys, places)| slot_states(keys, places)), [6, 9, 8, 146]);
     assert_eq!([0, 1, 2, 3, 146].map(packed_entries), [0, 1, 3, 6, 10_731]);
 }
 
@@ -66,7 +72,7 @@ fn a_new_beginning_keeps_what_is_known_of_the_biases_and_nothing_else() {
     filter.begin(&new);
     assert_eq!((filter.state(), filter.bias(), filter.laser_yaw()), (new, bias, yaw));
     let mut expected = Square::zeros();
-    expected.fixed_view_mut::<3, 3>(0, 0).copy_from(&new.covariance);
+    expected.fixed_view_mut::<3, 3>(0, 0).copy_from(&new.covariance());
     expected.fixed_view_mut::<3, 3>(3, 3).copy_from(&before.fixed_view::<3, 3>(3, 3));
     assert_eq!(covariance(&filter), expected);
     assert!((0..KEYS).all(|key| filter.past_pose(key).is_none()));
@@ -111,10 +117,10 @@ fn what_is_freed_has_neither_variance_nor_correlation() {
     filter.remember_pose(KEYS);
     filter.remove_landmark(LANDMARKS);
     filter.add_known_landmark(LANDMARKS, Point::new(1.0, 1.0), 1.0);
-    filter.add_landmark(LANDMARKS, &seen(1.0, 1.0), &LASER);
+    filter.add_landmark(LANDMARKS, &filter.viewpoint(&LASER), &seen(1.0, 1.0));
     assert_eq!(covariance(&filter), before);
     assert_eq!((filter.past_pose(KEYS), filter.landmark(LANDMARKS)), (None, None));
-    assert!(filter.observe_landmark(LANDMARKS, &seen(1.0, 1.0), &LASER).is_none());
+    assert!(observe(&filter, &LASER, &seen(1.0, 1.0), Landmark::Slot(LANDMARKS)).is_none());
     let relative = RelativePose { pose: Pose::default(), covariance: Matrix3::identity() };
     assert!(filter.observe_relative_pose(KEYS, &relative, &LASER).is_none());
 }
@@ -123,13 +129,13 @@ fn what_is_freed_has_neither_variance_nor_correlation() {
 fn landmarks_and_past_poses_are_where_they_were_put() {
     let mut filter = begun();
     let there = filter.state().pose.compose(&LASER).transform(&Point::new(4.0, 1.0));
-    assert!((filter.locate(&Point::new(4.0, 1.0), &LASER) - there).norm() < 1e-12);
-    filter.add_landmark(1, &seen(4.0, 1.0), &LASER);
+    assert!((filter.viewpoint(&LASER).locate(&Point::new(4.0, 1.0)) - there).norm() < 1e-12);
+    filter.add_landmark(1, &filter.viewpoint(&LASER), &seen(4.0, 1.0));
     assert!(filter.landmark(1).is_some_and(|place| (place - there).norm() < 1e-12));
     filter.add_known_landmark(0, Point::new(7.0, -3.0), 2e-4);
     assert_eq!(filter.landmark(0), Some(Point::new(7.0, -3.0)));
     assert_eq!(
-        [(12, 12), (13, 13), (12, 13), (12, 0)].map(|(a, b)| filter.covariance().get(a, b)),
+        [(12, 12), (13, 13), (12, 13), (12, 0)].map(|(a, b)| filter.packed_covariance().get(a, b)),
         [2e-4, 2e-4, 0.0, 0.0]
     );
     filter.remember_pose(1);
@@ -139,7 +145,7 @@ fn landmarks_and_past_poses_are_where_they_were_put() {
 }
 
 /// `H P H' + R` with all zeros.
-fn dense<const SIZE: usize>(filter: &Filter, told: &SparseLinearisation<SIZE>) -> SMatrix<f64, SIZE, SIZE> {
+fn dense<const SIZE: usize>(filter: &Filter, told: &Linearisation<SIZE>) -> SMatrix<f64, SIZE, SIZE> {
     let mut jacobian = SMatrix::<f64, SIZE, STATES>::zeros();
     for (place, derivative) in &told.terms {
         jacobian.set_column(*place, derivative);
@@ -155,7 +161,7 @@ fn a_known_landmark_needs_no_place() {
     let mounted = Pose { theta: LASER.theta + filter.laser_yaw(), ..LASER };
     let expected = pose.compose(&mounted).inverse_transform(&landmark);
     let observation = seen(expected.x + 0.01, expected.y - 0.02);
-    let told = filter.observe_known(&landmark, 3e-4, &observation, &LASER);
+    let told = known(&filter, landmark, 3e-4, &observation);
     assert!((told.residual - Vector2::new(0.01, -0.02)).norm() < 1e-12);
     assert!((told.covariance - observation.covariance - Matrix2::identity() * 3e-4).norm() < 1e-18);
     assert!((filter.residual_covariance(&told) - dense(&filter, &told)).norm() < 1e-15);
@@ -163,13 +169,13 @@ fn a_known_landmark_needs_no_place() {
     let mut placed = filter.clone();
     placed.add_known_landmark(2, landmark, 3e-4);
     filter.remove_landmark(2);
-    let by_place = placed.observe_landmark(2, &observation, &LASER);
+    let by_place = observe(&placed, &LASER, &observation, Landmark::Slot(2));
     assert!(by_place.is_some_and(|told| {
         assert!((placed.residual_covariance(&told) - dense(&placed, &told)).norm() < 1e-15);
         placed.correct(&told)
     }));
     assert!(filter.correct(&told));
-    assert!((filter.state().covariance - placed.state().covariance).norm() < 1e-12);
+    assert!((filter.covariance() - placed.covariance()).norm() < 1e-12);
     let off = filter.state().pose.between(&placed.state().pose);
     assert!(off.x.hypot(off.y) < 1e-10 && off.theta.abs() < 1e-10, "{off:?}");
 }
@@ -178,14 +184,14 @@ fn a_known_landmark_needs_no_place() {
 fn what_cannot_be_corrected_by_changes_nothing() {
     let filter = full();
     let before = (filter.state(), covariance(&filter));
-    let sound = filter.observe_known(&Point::new(6.0, 1.0), 1e-4, &seen(3.0, 1.0), &LASER);
+    let sound = known(&filter, Point::new(6.0, 1.0), 1e-4, &seen(3.0, 1.0));
     let mut nowhere = sound.clone();
     nowhere.terms[0].0 = STATES;
     let cases = [
-        SparseLinearisation { covariance: -Matrix2::identity(), ..sound.clone() },
-        SparseLinearisation { covariance: Matrix2::identity() * f64::NAN, ..sound.clone() },
-        SparseLinearisation { residual: Vector2::new(f64::NAN, 0.0), ..sound.clone() },
-        SparseLinearisation { residual: Vector2::new(0.0, f64::INFINITY), ..sound },
+        Linearisation { covariance: -Matrix2::identity(), ..sound.clone() },
+        Linearisation { covariance: Matrix2::identity() * f64::NAN, ..sound.clone() },
+        Linearisation { residual: Vector2::new(f64::NAN, 0.0), ..sound.clone() },
+        Linearisation { residual: Vector2::new(0.0, f64::INFINITY), ..sound },
         nowhere,
     ];
     for case in cases {

@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::falko::scene::Random;
 
 fn said(covariance: Matrix3<f64>) -> Matrix3<f64> {
-    let [xx, xy, yy, xh, yh, hh] = Ekf { pose: Pose::default(), covariance }.covariance_entries();
+    let [xx, xy, yy, xh, yh, hh] = Ekf::with_covariance(Pose::default(), &covariance).covariance_entries();
     Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh)
 }
 

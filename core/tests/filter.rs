@@ -8,6 +8,8 @@ use agv_core::odometry::Motion;
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 use proptest::prelude::*;
 
+use super::support::view::{by_pose, linearise};
+
 fn range_bearing(range: f64, bearing: f64) -> Observation {
     Observation::RangeBearing(RangeBearing { range, bearing, range_variance: 1e-4, bearing_variance: 1e-6 })
 }
@@ -34,7 +36,7 @@ proptest! {
         let laser = Pose::new(laser_x, laser_y, laser_theta);
         let landmark = pose.compose(&laser).position() + Point::new(direction.cos(), direction.sin()) * distance;
         let observation = perfect(kind, &pose, &laser, &landmark);
-        let here = observation.linearise(&pose, &laser, &landmark, 0.0).unwrap();
+        let here = linearise(&observation, &pose, &laser, &landmark, 0.0).unwrap();
         prop_assert!(here.residual.norm() < 1e-9);
         let step = 1e-6;
         for column in 0..3 {
@@ -42,14 +44,14 @@ proptest! {
                 let mut values = [pose.x, pose.y, pose.theta];
                 values[column] += by;
                 let moved = Pose::new(values[0], values[1], values[2]);
-                observation.linearise(&moved, &laser, &landmark, 0.0).unwrap().residual
+                linearise(&observation, &moved, &laser, &landmark, 0.0).unwrap().residual
             };
             // The residual is observation minus expectation.
             let (above, below) = (moved(step), moved(-step));
             let second = if kind == 0 { difference(above.y, below.y) } else { above.y - below.y };
             let slope = [-(above.x - below.x) / (2.0 * step), -second / (2.0 * step)];
             for (row, slope) in slope.into_iter().enumerate() {
-                prop_assert!((here.jacobian[(row, column)] - slope).abs() < 1e-6 * (1.0 + slope.abs()));
+                prop_assert!((by_pose(&here)[(row, column)] - slope).abs() < 1e-6 * (1.0 + slope.abs()));
             }
         }
         let back = observation.locate(&pose, &laser);
@@ -63,8 +65,8 @@ proptest! {
         // The same landmark and the same doubt, once in polar and once in Cartesian coordinates.
         let landmark = Point::new(direction.cos(), direction.sin()) * distance;
         let polar = perfect(0, &Pose::default(), &Pose::default(), &landmark);
-        let exact = polar.linearise(&Pose::default(), &Pose::default(), &landmark, 0.0).unwrap();
-        let doubtful = polar.linearise(&Pose::default(), &Pose::default(), &landmark, deviation * deviation).unwrap();
+        let exact = linearise(&polar, &Pose::default(), &Pose::default(), &landmark, 0.0).unwrap();
+        let doubtful = linearise(&polar, &Pose::default(), &Pose::default(), &landmark, deviation * deviation).unwrap();
         let added = doubtful.covariance - exact.covariance;
         prop_assert!((added.m11 - deviation.powi(2)).abs() < 1e-12);
         prop_assert!((added.m22 - (deviation / distance).powi(2)).abs() < 1e-12);
@@ -78,12 +80,12 @@ proptest! {
         let mut state = Ekf::new(Pose::default(), deviation, heading_deviation);
         let landmark = Point::new(direction.cos(), direction.sin()) * distance;
         let observation = perfect(kind, &Pose::new(0.01, -0.02, 0.003), &Pose::default(), &landmark);
-        let before = state.covariance.determinant();
-        let linearisation = observation.linearise(&state.pose, &Pose::default(), &landmark, 0.0).unwrap();
+        let before = state.covariance().determinant();
+        let linearisation = linearise(&observation, &state.pose, &Pose::default(), &landmark, 0.0).unwrap();
         prop_assert!(state.correct(&linearisation));
-        prop_assert_eq!(state.covariance, state.covariance.transpose());
-        prop_assert!(state.covariance.symmetric_eigenvalues().min() > 0.0);
-        prop_assert!(state.covariance.determinant() < before);
+        prop_assert_eq!(state.covariance(), state.covariance().transpose());
+        prop_assert!(state.covariance().symmetric_eigenvalues().min() > 0.0);
+        prop_assert!(state.covariance().determinant() < before);
     }
 }
 
@@ -92,16 +94,16 @@ fn one_correction_is_the_weighted_least_squares_solution() {
     let landmark = Point::new(3.0, 1.0);
     let prior = Ekf::new(Pose::new(0.1, -0.2, 0.05), 0.02, 0.01);
     let linearisation =
-        cartesian(Point::new(2.9, 1.05)).linearise(&prior.pose, &Pose::new(0.5, 0.0, 0.0), &landmark, 1e-4).unwrap();
+        linearise(&cartesian(Point::new(2.9, 1.05)), &prior.pose, &Pose::new(0.5, 0.0, 0.0), &landmark, 1e-4).unwrap();
     let mut state = prior;
     assert!(state.correct(&linearisation));
     // Information form, in which the gain does not occur.
     let weight = linearisation.covariance.try_inverse().unwrap();
-    let prior_information = prior.covariance.try_inverse().unwrap();
-    let information = prior_information + linearisation.jacobian.transpose() * weight * linearisation.jacobian;
+    let prior_information = prior.covariance().try_inverse().unwrap();
+    let information = prior_information + by_pose(&linearisation).transpose() * weight * by_pose(&linearisation);
     let covariance = information.try_inverse().unwrap();
-    let change = covariance * linearisation.jacobian.transpose() * weight * linearisation.residual;
-    assert!((state.covariance - covariance).norm() < 1e-12);
+    let change = covariance * by_pose(&linearisation).transpose() * weight * linearisation.residual;
+    assert!((state.covariance() - covariance).norm() < 1e-12);
     let moved =
         Vector3::new(state.pose.x - prior.pose.x, state.pose.y - prior.pose.y, state.pose.theta - prior.pose.theta);
     assert!((moved - change).norm() < 1e-12);
@@ -148,7 +150,7 @@ fn observations() -> Vec<(Time, Correction)> {
 fn assert_close(a: &Ekf, b: &Ekf, tolerance: f64) {
     let difference = (a.pose.x - b.pose.x).abs() + (a.pose.y - b.pose.y).abs() + (a.pose.theta - b.pose.theta).abs();
     assert!(difference < tolerance, "{:?} and {:?}", a.pose, b.pose);
-    assert!((a.covariance - b.covariance).norm() < tolerance * a.covariance.norm());
+    assert!((a.covariance() - b.covariance()).norm() < tolerance * a.covariance().norm());
 }
 
 /// The same filter without a past: every motion is cut at the observations beforehand.
@@ -161,7 +163,7 @@ fn in_order(observations: &[(Time, Correction)], steps: u64) -> Ekf {
             let (first, second) = rest.split(*time);
             state.predict(&first);
             let linearisation =
-                correction.observation.linearise(&state.pose, &laser(), &correction.landmark, 1e-6).unwrap();
+                linearise(&correction.observation, &state.pose, &laser(), &correction.landmark, 1e-6).unwrap();
             assert!(state.correct(&linearisation));
             rest = second;
         }
@@ -184,7 +186,7 @@ fn late_measurements_give_what_timely_ones_would_have_given() {
         }
         for index in order {
             let (time, correction) = seen[index];
-            assert_eq!(timeline.correct(time, |_| Some(correction)), Ok(true));
+            assert_eq!(timeline.fuse(time, |state| correction.apply(state, &laser()).then_some(correction)), Ok(true));
         }
         assert_close(&timeline.state(), &expected, 1e-9);
     }
@@ -211,11 +213,15 @@ fn at_a_thousand_motions_a_second_the_past_is_as_long_and_the_order_of_measureme
         late.advance(&motion(step));
         timely.advance(&motion(step));
         while let Some((time, correction)) = pending.next_if(|(time, _)| *time <= motion(step).end) {
-            assert_eq!(timely.correct(*time, |_| Some(*correction)), Ok(true));
+            assert_eq!(timely.fuse(*time, |state| correction.apply(state, &laser()).then_some(*correction)), Ok(true));
         }
     }
     for (time, correction) in seen.iter().rev() {
-        assert_eq!(late.correct(*time, |_| Some(*correction)), Ok(true), "{time:?} is remembered");
+        assert_eq!(
+            late.fuse(*time, |state| correction.apply(state, &laser()).then_some(*correction)),
+            Ok(true),
+            "{time:?} is remembered"
+        );
     }
     assert!(pending.next().is_none());
     let (timely, late) = (timely.state().pose, late.state().pose);
@@ -232,7 +238,10 @@ fn measurements_ahead_of_the_odometry_are_extrapolated_and_set_right() {
     timeline.advance(&motion(0));
     for step in 1..30 {
         while let Some((time, correction)) = pending.next_if(|(time, _)| *time <= motion(step).end) {
-            assert_eq!(timeline.correct(*time, |_| Some(*correction)), Ok(true));
+            assert_eq!(
+                timeline.fuse(*time, |state| correction.apply(state, &laser()).then_some(*correction)),
+                Ok(true)
+            );
         }
         timeline.advance(&motion(step));
     }
@@ -250,7 +259,10 @@ fn the_total_displacement_survives_a_wrong_extrapolation() {
     if let Observation::Cartesian(seen) = &mut correction.observation {
         seen.covariance = Matrix2::identity() * 1e12;
     }
-    assert_eq!(timeline.correct(Time::from_micros(17_000), |_| Some(correction)), Ok(true));
+    assert_eq!(
+        timeline.fuse(Time::from_micros(17_000), |state| correction.apply(state, &laser()).then_some(correction)),
+        Ok(true)
+    );
     let stop = Motion { displacement: Pose::new(0.001, 0.0, 0.0), ..motion(1) };
     timeline.advance(&stop);
     let expected = motion(0).displacement.compose(&stop.displacement);
@@ -265,11 +277,17 @@ fn what_is_too_old_or_too_new_is_refused() {
         timeline.advance(&motion(step));
     }
     let (_, correction) = observations()[0];
-    assert_eq!(timeline.correct(Time::from_micros(1_000), |_| Some(correction)), Err(TimelineError::TooLate));
+    assert_eq!(
+        timeline.fuse(Time::from_micros(1_000), |state| correction.apply(state, &laser()).then_some(correction)),
+        Err(TimelineError::TooLate)
+    );
     let ahead = motion(399).end.offset(0.2);
-    assert_eq!(timeline.correct(ahead, |_| Some(correction)), Err(TimelineError::TooEarly));
+    assert_eq!(
+        timeline.fuse(ahead, |state| correction.apply(state, &laser()).then_some(correction)),
+        Err(TimelineError::TooEarly)
+    );
     let before = timeline.state();
-    assert_eq!(timeline.correct(motion(399).end, |_| None), Ok(false));
+    assert_eq!(timeline.fuse(motion(399).end, |_| None), Ok(false));
     assert_eq!(timeline.state(), before);
 }
 
@@ -322,13 +340,16 @@ fn the_filter_is_consistent() {
                 let observation =
                     range_bearing(seen.norm() + 1e-2 * random.next(), seen.y.atan2(seen.x) + 1e-3 * random.next());
                 let correction = Correction { observation, landmark, landmark_variance: 0.0 };
-                assert_eq!(timeline.correct(believed.end, |_| Some(correction)), Ok(true));
+                assert_eq!(
+                    timeline.fuse(believed.end, |state| correction.apply(state, &laser()).then_some(correction)),
+                    Ok(true)
+                );
             }
         }
         let state = timeline.state();
         let error =
             Vector3::new(truth.x - state.pose.x, truth.y - state.pose.y, difference(truth.theta, state.pose.theta));
-        sum += (error.transpose() * state.covariance.try_inverse().unwrap() * error).x;
+        sum += (error.transpose() * state.covariance().try_inverse().unwrap() * error).x;
     }
     // Chi-square with 150 degrees of freedom: 99 per cent lie between these.
     assert!((109.1..198.4).contains(&sum), "sum of normalised errors squared {sum:.1}");
@@ -351,7 +372,7 @@ impl Normal {
 #[test]
 fn prediction_is_the_first_order_transport_of_the_covariance() {
     let mut state = Ekf::new(Pose::new(1.0, 2.0, 0.7), 0.05, 0.02);
-    let prior = state.covariance;
+    let prior = state.covariance();
     state.predict(&motion(0));
     let displacement = motion(0).displacement;
     let start = Pose::new(1.0, 2.0, 0.7);
@@ -368,7 +389,7 @@ fn prediction_is_the_first_order_transport_of_the_covariance() {
     let mut joint = SMatrix::<f64, 6, 6>::zeros();
     joint.fixed_view_mut::<3, 3>(0, 0).copy_from(&prior);
     joint.fixed_view_mut::<3, 3>(3, 3).copy_from(&motion(0).covariance);
-    assert!((state.covariance - stacked * joint * stacked.transpose()).norm() < 1e-15);
+    assert!((state.covariance() - stacked * joint * stacked.transpose()).norm() < 1e-15);
 }
 
 /// Least eigenvalue of the correlations.
@@ -379,7 +400,7 @@ fn least_eigenvalue([xx, xy, yy, xh, yh, hh]: [f64; 6]) -> f64 {
 }
 
 fn with_entries([xx, xy, yy, xh, yh, hh]: [f64; 6]) -> Ekf {
-    Ekf { pose: Pose::new(1.0, 2.0, 0.5), covariance: Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh) }
+    Ekf::with_covariance(Pose::new(1.0, 2.0, 0.5), &Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh))
 }
 
 /// What very sure observations have left of very unsure states: less than rounding did.

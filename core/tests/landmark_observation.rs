@@ -5,6 +5,8 @@ use agv_core::geometry::{Point, Pose};
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 
+use super::support::view::linearise;
+
 proptest! {
     #[test]
     fn distance_and_direction_become_a_position_with_its_covariance(
@@ -36,7 +38,8 @@ fn a_landmark_at_the_sensor_has_no_direction() {
         bearing_variance: 1e-6,
     });
     let laser = Pose::new(0.9, 0.2, 0.4);
-    let at = |distance: f64| seen.linearise(&Pose::default(), &laser, &Point::new(0.9 + distance, 0.2), 0.0).is_some();
+    let at =
+        |distance: f64| linearise(&seen, &Pose::default(), &laser, &Point::new(0.9 + distance, 0.2), 0.0).is_some();
     assert_eq!([0.0, 0.0009, 0.0011, 0.5, f64::NAN].map(at), [false, false, true, true, false]);
 }
 
@@ -74,7 +77,7 @@ fn a_correction_that_is_not_finite_changes_nothing() {
     };
     for (range, variance) in [(f64::NAN, 1e-4), (f64::INFINITY, 1e-4), (5.0, f64::NAN), (5.0, -1e9)] {
         let mut corrected = state;
-        let told = seen(range, variance).linearise(&state.pose, &Pose::default(), &landmark, 0.0);
+        let told = linearise(&seen(range, variance), &state.pose, &Pose::default(), &landmark, 0.0);
         assert!(told.is_some_and(|told| !corrected.correct(&told)), "{range} {variance}");
         assert_eq!(corrected, state);
     }
@@ -86,9 +89,9 @@ fn deviations_are_those_of_the_worst_direction() {
         let (sine, cosine) = angle.sin_cos();
         let turn = nalgebra::Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0);
         let covariance = turn * nalgebra::Matrix3::from_diagonal(&[0.09, 0.01, 0.04].into()) * turn.transpose();
-        let state = Ekf { pose: Pose::default(), covariance };
+        let state = Ekf::with_covariance(Pose::default(), &covariance);
         assert!((state.position_deviation() - 0.3).abs() < 1e-12 && (state.heading_deviation() - 0.2).abs() < 1e-12);
     }
-    let broken = Ekf { pose: Pose::default(), covariance: -nalgebra::Matrix3::identity() };
+    let broken = Ekf::with_covariance(Pose::default(), &-nalgebra::Matrix3::identity());
     assert_eq!((broken.position_deviation(), broken.heading_deviation()), (0.0, 0.0));
 }

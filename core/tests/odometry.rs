@@ -124,7 +124,7 @@ proptest! {
         let both = first.then(&second);
         together.predict(&both);
         prop_assert!(same(&apart.pose, &together.pose, 1e-12));
-        prop_assert!((apart.covariance - together.covariance).norm() < 1e-12);
+        prop_assert!((apart.covariance() - together.covariance()).norm() < 1e-12);
         prop_assert_eq!((both.start, both.end), (first.start, second.end));
         prop_assert!((both.distance - x.abs() - next.abs()).abs() < 1e-15);
     }

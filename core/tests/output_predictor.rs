@@ -69,7 +69,7 @@ fn predictor(count: u64) -> OutputPredictor {
 fn assert_is(said: Option<PoseOutput>, base: &PoseOutput, since: &[Motion]) {
     let [xx, xy, yy, xh, yh, hh] = base.covariance;
     let covariance = Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh);
-    let mut state = Ekf { pose: base.pose, covariance };
+    let mut state = Ekf::with_covariance(base.pose, &covariance);
     for motion in since {
         state.predict(motion);
     }

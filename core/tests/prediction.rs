@@ -38,10 +38,10 @@ fn a_prediction_carries_the_whole_covariance() {
         let mut joint = SMatrix::<f64, 6, 6>::zeros();
         joint.fixed_view_mut::<3, 3>(0, 0).copy_from(&prior);
         joint.fixed_view_mut::<3, 3>(3, 3).copy_from(&noise);
-        let mut state = Ekf { pose, covariance: prior };
+        let mut state = Ekf::with_covariance(pose, &prior);
         state.predict(&Motion { displacement, covariance: noise, ..Motion::none(Time::default()) });
         let expected = jacobian * joint * jacobian.transpose();
-        assert!((state.covariance - expected).norm() < 1e-7 * expected.norm(), "{} {expected}", state.covariance);
+        assert!((state.covariance() - expected).norm() < 1e-7 * expected.norm(), "{} {expected}", state.covariance());
         let off = pose.compose(&displacement).between(&state.pose);
         assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12);
     }

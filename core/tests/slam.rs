@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::support::hall::{cast, corners};
-use agv_core::filter::{augmented_states, packed_entries};
+use agv_core::filter::{packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::LandmarkKind;
@@ -15,7 +15,7 @@ use agv_core::sensing::ReflectorDetection;
 const BEAMS: usize = 1440;
 const KEYS: usize = 2;
 const PLACES: usize = 16;
-const STATES: usize = augmented_states(KEYS, PLACES);
+const STATES: usize = slot_states(KEYS, PLACES);
 type Mapper = Localizer<BEAMS, 64, 64, 4, KEYS, PLACES, STATES, { packed_entries(STATES) }>;
 
 /// Seconds of a revolution, and samples of the odometry in it.

@@ -7,6 +7,7 @@ use agv_core::odometry::Motion;
 use nalgebra::{Matrix2, Matrix3};
 
 use super::falko::scene::Random;
+use super::support::view::linearise;
 
 const LASER: Pose = Pose { x: 0.9, y: 0.1, theta: 0.2 };
 const STEP: u64 = 10_000;
@@ -49,7 +50,7 @@ fn correction(random: &mut Random) -> Correction {
 
 fn apply(state: &mut Ekf, correction: &Correction) {
     let Correction { observation, landmark, landmark_variance } = correction;
-    let linearisation = observation.linearise(&state.pose, &LASER, landmark, *landmark_variance);
+    let linearisation = linearise(observation, &state.pose, &LASER, landmark, *landmark_variance);
     assert!(linearisation.is_some_and(|linearisation| state.correct(&linearisation)));
 }
 
@@ -87,7 +88,7 @@ fn in_order(told: &[(Time, Told)], steps: u64, until: Time) -> Ekf {
 fn assert_same(a: &Ekf, b: &Ekf) {
     let off = a.pose.between(&b.pose);
     assert!(off.x.hypot(off.y) < 1e-9 && off.theta.abs() < 1e-9, "{:?} {:?}", a.pose, b.pose);
-    assert!((a.covariance - b.covariance).norm() < 1e-9 * b.covariance.norm(), "{} {}", a.covariance, b.covariance);
+    assert!((a.covariance() - b.covariance()).norm() < 1e-9 * b.covariance().norm(), "{a:?} {b:?}");
 }
 
 #[test]
@@ -112,9 +113,9 @@ fn the_state_at_any_time_is_that_of_what_was_told_until_then() {
             } else {
                 let correction = correction(&mut random);
                 let before = in_order(&told, 30, at);
-                let answer = timeline.correct(at, |state| {
+                let answer = timeline.fuse(at, |state| {
                     assert_same(state, &before);
-                    Some(correction)
+                    correction.apply(state, &LASER).then_some(correction)
                 });
                 assert_eq!(answer, Ok(true));
                 told.push((at, Told::Correction(correction)));
@@ -152,7 +153,7 @@ fn a_past_that_is_too_short_forgets_the_oldest_and_nothing_else() {
                 let at = time(step - late, 1 + (random.unit() * 9_998.0) as u64);
                 let correction = correction(&mut random);
                 // What is inserted into a full ring may itself be too old.
-                if timeline.correct(at, |_| Some(correction)) == Ok(true) {
+                if timeline.fuse(at, |state| correction.apply(state, &LASER).then_some(correction)) == Ok(true) {
                     told.push((at, Told::Correction(correction)));
                     told.sort_by_key(|(at, _)| *at);
                 }

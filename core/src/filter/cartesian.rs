@@ -1,9 +1,9 @@
 //! Position of a landmark.
 
-use nalgebra::{Matrix2, Matrix2x3};
+use nalgebra::Matrix2;
 
-use super::Linearisation;
-use crate::geometry::{Point, Pose};
+use super::observation::{Believed, Model, Viewpoint, left};
+use crate::geometry::Point;
 
 /// Position of a landmark in S.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,28 +15,16 @@ pub struct Cartesian {
 }
 
 impl Cartesian {
-    /// The two-dimensional Cartesian observation model that K 5.3 mentions, for a sensor at `laser`.
-    pub(super) fn linearise(
-        &self,
-        pose: &Pose,
-        laser: &Pose,
-        landmark: &Point,
-        landmark_variance: f64,
-    ) -> Linearisation {
-        let (sine, cosine) = libm::sincos(pose.theta + laser.theta);
-        let (heading_sine, heading_cosine) = libm::sincos(pose.theta);
-        let (dx, dy) = (landmark.x - pose.x, landmark.y - pose.y);
-        let arm = Point::new(
-            heading_cosine * laser.x - heading_sine * laser.y,
-            heading_sine * laser.x + heading_cosine * laser.y,
-        );
-        let (ex, ey) = (dx - arm.x, dy - arm.y);
-        let expected = Point::new(cosine * ex + sine * ey, cosine * ey - sine * ex);
-        let jacobian = Matrix2x3::new(-cosine, -sine, cosine * dy - sine * dx, sine, -cosine, -sine * dy - cosine * dx);
-        Linearisation {
+    /// The two-dimensional Cartesian observation model that K 5.3 mentions.
+    pub(super) fn model(&self, from: &Viewpoint, landmark: &Believed) -> Model {
+        let expected = from.inwards(&(landmark.position - from.position - from.arm));
+        let reach = landmark.anchor - from.anchor;
+        Model {
             residual: self.position - expected,
-            jacobian,
-            covariance: self.covariance + Matrix2::identity() * landmark_variance,
+            by_position: [Point::new(1.0, 0.0), Point::new(0.0, 1.0)].map(|axis| -from.inwards(&axis)),
+            by_heading: -from.inwards(&left(&reach)),
+            by_yaw: -from.inwards(&left(&(reach - from.arm))),
+            covariance: self.covariance + Matrix2::identity() * landmark.variance,
         }
     }
 }

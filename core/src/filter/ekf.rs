@@ -1,19 +1,53 @@
-//! State and covariance of the pose, and the two steps of the filter.
+//! The state and its covariance, and the two steps of the filter.
+//!
+//! One filter for all modes: the pose alone, or together with what it depends on, which are biases of odometry and laser, past
+//! poses, and landmarks found on the way. All correlations are kept, so that a landmark which was placed with a wrong heading
+//! is known to be wrong with it. The angle of a map that the vehicle has made itself cannot be observed, and linearisation
+//! at ever new estimates would invent knowledge of it; so with slots the Jacobians are those of first estimates (Huang,
+//! Mourikis and Roumeliotis, "Observability-based rules for designing consistent EKF SLAM estimators", IJRR 2010).
 
-use nalgebra::{Matrix2, Matrix3, Vector2};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
-use super::Linearisation;
+use super::biases::{BiasModel, SCALE, STEERING, YAW};
+use super::observation::{Believed, Viewpoint};
 use super::positive_semidefinite::make_positive_semidefinite;
-use crate::geometry::{Pose, wrap};
-use crate::odometry::Motion;
+use super::slots::{PoseOnly, Slots, Storage, pose_state, slot_states};
+use super::{Linearisation, Observation, PackedCovariance};
+use crate::geometry::{Point, Pose, wrap};
+use crate::odometry::{BiasJacobian, Motion, OdometryBias};
 
-/// A pose with its covariance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ekf {
+/// The extended Kalman filter (K 5.3) with room for `S` beside the pose.
+#[derive(Clone, Debug)]
+pub struct Ekf<S: Slots = PoseOnly> {
     /// Pose of R in W (K 5.1).
     pub pose: Pose,
-    /// Covariance of x, y (m) and heading (rad), in W.
-    pub covariance: Matrix3<f64>,
+    pub(super) anchor: S::Anchor,
+    pub(super) biases: S::Biases,
+    pub(super) poses: S::Poses,
+    pub(super) landmarks: S::Landmarks,
+    pub(super) covariance: PackedCovariance<S>,
+}
+
+impl Copy for Ekf {}
+
+impl PartialEq for Ekf {
+    fn eq(&self, other: &Self) -> bool {
+        self.pose == other.pose && self.covariance() == other.covariance()
+    }
+}
+
+/// The landmark that an observation is compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Landmark {
+    /// It is not in the state.
+    Known {
+        /// Position in W, m.
+        position: Point,
+        /// Variance of the position an axis, m^2.
+        variance: f64,
+    },
+    /// It is in this slot of the state.
+    Slot(usize),
 }
 
 /// How far an observation is from what was expected.
@@ -42,76 +76,37 @@ impl Ekf {
     pub fn new(pose: Pose, position_deviation: f64, heading_deviation: f64) -> Self {
         let position = position_deviation * position_deviation;
         let heading = heading_deviation * heading_deviation;
-        Self { pose, covariance: Matrix3::from_diagonal(&nalgebra::Vector3::new(position, position, heading)) }
+        Self::with_covariance(pose, &Matrix3::from_diagonal(&Vector3::new(position, position, heading)))
+    }
+
+    /// A pose with the covariance of x, y (m) and heading (rad), in W.
+    #[must_use]
+    pub fn with_covariance(pose: Pose, covariance: &Matrix3<f64>) -> Self {
+        let mut filter = Self::empty();
+        filter.pose = pose;
+        filter.set_pose_covariance(covariance);
+        filter
+    }
+
+    /// Prediction of the pose, K 5.3 and 5.4.
+    pub fn predict(&mut self, motion: &Motion) {
+        self.predict_with(motion, &BiasModel::NONE);
     }
 
     /// The covariance as outputs state it: xx, xy, yy, x-heading, y-heading, heading-heading; m^2, m rad, rad^2. It is
     /// positive semidefinite, but for 1e-4 in a correlation.
     #[must_use]
     pub fn covariance_entries(&self) -> [f64; 6] {
-        let mut covariance = self.covariance;
+        let mut covariance = self.covariance();
         make_positive_semidefinite(&mut covariance);
         [covariance.m11, covariance.m12, covariance.m22, covariance.m13, covariance.m23, covariance.m33]
-    }
-
-    /// Prediction, K 5.3 and 5.4: `F P F' + G Q G'`, written out, as `F` differs from identity in two places and `G`
-    /// turns by the heading.
-    pub fn predict(&mut self, motion: &Motion) {
-        let (sine, cosine) = libm::sincos(self.pose.theta);
-        let step = motion.displacement;
-        let (x, y) = (cosine * step.x - sine * step.y, sine * step.x + cosine * step.y);
-        let (p, q) = (&self.covariance, &motion.covariance);
-        // The heading's error moves the end of the step sideways.
-        let (x_heading, y_heading) = (p.m13 - y * p.m33, p.m23 + x * p.m33);
-        let xx = p.m11 - y * (p.m13 + x_heading);
-        let xy = p.m12 - y * p.m23 + x * x_heading;
-        let yy = p.m22 + x * (p.m23 + y_heading);
-        let (cross_x, cross_y) = (cosine * q.m13 - sine * q.m23, sine * q.m13 + cosine * q.m23);
-        let (along, across, both) = (cosine * cosine, sine * sine, sine * cosine);
-        let xx = xx + along * q.m11 - 2.0 * both * q.m12 + across * q.m22;
-        let xy = xy + both * (q.m11 - q.m22) + (along - across) * q.m12;
-        let yy = yy + across * q.m11 + 2.0 * both * q.m12 + along * q.m22;
-        let (x_heading, y_heading) = (x_heading + cross_x, y_heading + cross_y);
-        self.covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, p.m33 + q.m33);
-        self.pose = Pose::new(self.pose.x + x, self.pose.y + y, self.pose.theta + step.theta);
-    }
-
-    /// The innovation of an observation that was linearised at this pose. None if its covariance is singular or not
-    /// finite.
-    #[must_use]
-    pub fn innovation(&self, observation: &Linearisation) -> Option<Innovation> {
-        let covariance =
-            observation.jacobian * self.covariance * observation.jacobian.transpose() + observation.covariance;
-        Innovation::new(observation.residual, covariance)
-    }
-
-    /// Correction, K 5.5 to 5.7, the last in Joseph's form, which stays symmetric and positive whatever the gain. False,
-    /// and nothing changed, if the innovation's covariance is singular or not finite.
-    pub fn correct(&mut self, observation: &Linearisation) -> bool {
-        let cross = self.covariance * observation.jacobian.transpose();
-        let Some(information) = invert(&(observation.jacobian * cross + observation.covariance)) else {
-            return false;
-        };
-        let gain = cross * information;
-        let change = gain * observation.residual;
-        if !change.iter().all(|entry| entry.is_finite()) {
-            return false;
-        }
-        self.pose.x += change.x;
-        self.pose.y += change.y;
-        self.pose.theta = wrap(self.pose.theta + change.z);
-        let remaining = Matrix3::identity() - gain * observation.jacobian;
-        self.covariance =
-            remaining * self.covariance * remaining.transpose() + gain * observation.covariance * gain.transpose();
-        self.symmetrise();
-        make_positive_semidefinite(&mut self.covariance);
-        true
     }
 
     /// Standard deviation of the position in its worst direction, m.
     #[must_use]
     pub fn position_deviation(&self) -> f64 {
-        let (xx, xy, yy) = (self.covariance.m11, self.covariance.m12, self.covariance.m22);
+        let of = |row, column| self.covariance.get(row, column);
+        let (xx, xy, yy) = (of(0, 0), of(0, 1), of(1, 1));
         let mean = 0.5 * (xx + yy);
         libm::sqrt((mean + libm::hypot(0.5 * (xx - yy), xy)).max(0.0))
     }
@@ -119,12 +114,286 @@ impl Ekf {
     /// Standard deviation of the heading, rad.
     #[must_use]
     pub fn heading_deviation(&self) -> f64 {
-        libm::sqrt(self.covariance.m33.max(0.0))
+        libm::sqrt(self.covariance.get(2, 2).max(0.0))
+    }
+}
+
+impl<S: Slots> Ekf<S> {
+    /// A filter that knows its pose, the origin, exactly, and no bias.
+    #[must_use]
+    #[inline(always)]
+    pub fn empty() -> Self {
+        Self {
+            pose: Pose { x: 0.0, y: 0.0, theta: 0.0 },
+            anchor: S::Anchor::filled(Point::new(0.0, 0.0)),
+            biases: S::Biases::filled(0.0),
+            poses: S::Poses::filled(None),
+            landmarks: S::Landmarks::filled(None),
+            covariance: PackedCovariance::zero(),
+        }
     }
 
-    fn symmetrise(&mut self) {
-        self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
+    /// The pose and its covariance.
+    #[must_use]
+    pub fn state(&self) -> Ekf {
+        Ekf::with_covariance(self.pose, &self.covariance())
     }
+
+    /// Covariance of x, y (m) and heading (rad), in W.
+    #[must_use]
+    pub fn covariance(&self) -> Matrix3<f64> {
+        let of = |row, column| self.covariance.get(row, column);
+        let (xy, xh, yh) = (of(0, 1), of(0, 2), of(1, 2));
+        Matrix3::new(of(0, 0), xy, xh, xy, of(1, 1), yh, xh, yh, of(2, 2))
+    }
+
+    /// Covariance of all states, free slots included.
+    #[must_use]
+    pub fn packed_covariance(&self) -> &PackedCovariance<S> {
+        &self.covariance
+    }
+
+    /// What is known of the odometry's bias.
+    #[must_use]
+    pub fn bias(&self) -> OdometryBias {
+        match self.biases.as_ref() {
+            [scale, steering, _] => OdometryBias { scale: *scale, steering: *steering },
+            _ => OdometryBias::default(),
+        }
+    }
+
+    /// True yaw of the laser minus the assumed one, rad.
+    #[must_use]
+    pub fn laser_yaw(&self) -> f64 {
+        self.biases.as_ref().get(YAW - SCALE).copied().unwrap_or(0.0)
+    }
+
+    pub(super) fn set_pose_covariance(&mut self, covariance: &Matrix3<f64>) {
+        let entries = [
+            (0, 0, covariance.m11),
+            (1, 0, covariance.m21),
+            (1, 1, covariance.m22),
+            (2, 0, covariance.m31),
+            (2, 1, covariance.m32),
+            (2, 2, covariance.m33),
+        ];
+        for (row, column, value) in entries {
+            self.covariance.set(row, column, value);
+        }
+    }
+
+    /// Position of the pose for the Jacobians, m.
+    pub(super) fn anchor(&self) -> Point {
+        self.anchor.as_ref().first().copied().unwrap_or(self.pose.position())
+    }
+
+    pub(super) fn has_biases(&self) -> bool {
+        !self.biases.as_ref().is_empty()
+    }
+
+    /// States up to the last slot that is in use.
+    pub(super) fn states_in_use(&self) -> usize {
+        let poses = self.poses.as_ref();
+        if let Some(last) = self.landmarks.as_ref().iter().rposition(Option::is_some) {
+            return slot_states(poses.len(), last + 1);
+        }
+        let last = poses.iter().rposition(Option::is_some);
+        last.map_or(if self.has_biases() { pose_state(0) } else { SCALE }, |last| pose_state(last + 1))
+    }
+
+    /// Prediction, K 5.3 and 5.4: `F P F' + G Q G'`, written out, as `F` differs from identity in the pose's rows only and
+    /// `G` turns by the heading. The bias has been taken from the motion already.
+    pub fn predict_with(&mut self, motion: &Motion, model: &BiasModel) {
+        let (sine, cosine) = libm::sincos(self.pose.theta);
+        let turn = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
+        let step = &motion.displacement;
+        let (x, y) = turn(step.x, step.y);
+        let pose = Pose::new(self.pose.x + x, self.pose.y + y, self.pose.theta + step.theta);
+        let moved = self.anchor.as_ref().first().map_or(Point::new(x, y), |anchor| pose.position() - anchor);
+        let count = self.states_in_use();
+        let jacobian = if self.has_biases() { Some(BiasJacobian::of(step, model.lever)) } else { None };
+        let by_bias = jacobian.map(|jacobian| {
+            [(SCALE, jacobian.scale), (STEERING, jacobian.steering)].map(|(state, [along, across, theta])| {
+                let (x, y) = turn(along, across);
+                (state, Vector3::new(x, y, theta))
+            })
+        });
+        // F P: the heading and the biases move the pose.
+        let mut rows = S::Rows::<3>::filled(Vector3::zeros());
+        for (other, row) in rows.as_mut().iter_mut().enumerate().take(count) {
+            let of = |state| self.covariance.get(state, other);
+            let heading = of(2);
+            *row = Vector3::new(of(0) - moved.y * heading, of(1) + moved.x * heading, heading);
+            for (state, derivative) in by_bias.iter().flatten() {
+                *row += derivative * of(*state);
+            }
+        }
+        // (F P) F' for the pose itself.
+        let rows = rows.as_ref();
+        let column = |state: usize| rows.get(state).copied().unwrap_or_default();
+        let heading = column(2);
+        let mut own = [column(0) - heading * moved.y, column(1) + heading * moved.x, heading];
+        for (state, derivative) in by_bias.iter().flatten() {
+            let bias = column(*state);
+            for (value, factor) in own.iter_mut().zip(derivative.iter()) {
+                *value += bias * *factor;
+            }
+        }
+        for (other, row) in rows.iter().enumerate().take(count).skip(SCALE) {
+            for (axis, value) in row.iter().enumerate() {
+                self.covariance.set(axis, other, *value);
+            }
+        }
+        let [by_x, by_y, by_heading] = own;
+        let noise = turned(&motion.covariance, sine, cosine);
+        self.set_pose_covariance(&(Matrix3::from_columns(&[by_x, by_y, by_heading]) + noise));
+        if self.has_biases() {
+            let walk = &model.walk;
+            for (state, deviation) in [(SCALE, walk.scale), (STEERING, walk.steering), (YAW, walk.laser_yaw)] {
+                let variance = f64::from(deviation) * f64::from(deviation) * motion.distance;
+                self.covariance.set(state, state, self.covariance.get(state, state) + variance);
+            }
+        }
+        self.pose = pose;
+        self.anchor.as_mut().fill(pose.position());
+    }
+
+    /// Where a sensor at `mount` in R is.
+    #[must_use]
+    pub fn viewpoint(&self, mount: &Pose) -> Viewpoint {
+        Viewpoint::new(&self.pose, self.anchor(), mount, self.laser_yaw())
+    }
+
+    /// Compares an observation from a viewpoint of this state with a landmark. None if the landmark is at the sensor, or in
+    /// no slot.
+    #[must_use]
+    pub fn observe(
+        &self,
+        from: &Viewpoint,
+        observation: &Observation,
+        landmark: &Landmark,
+    ) -> Option<Linearisation<2>> {
+        let (believed, slot) = match landmark {
+            Landmark::Known { position, variance } => {
+                (Believed { position: *position, anchor: *position, variance: *variance }, None)
+            }
+            Landmark::Slot(slot) => {
+                let landmark = self.landmarks.as_ref().get(*slot).copied().flatten()?;
+                (Believed { position: landmark.position, anchor: landmark.anchor, variance: 0.0 }, Some(*slot))
+            }
+        };
+        let model = observation.model(from, &believed)?;
+        let [by_x, by_y] = model.by_position;
+        let mut linearisation =
+            Linearisation::new(model.residual, model.covariance).with(0, by_x).with(1, by_y).with(2, model.by_heading);
+        if self.has_biases() {
+            linearisation = linearisation.with(YAW, model.by_yaw);
+        }
+        if let Some(slot) = slot {
+            let state = self.landmark_state(slot);
+            linearisation = linearisation.with(state, -by_x).with(state + 1, -by_y);
+        }
+        Some(linearisation)
+    }
+
+    /// First state of a landmark.
+    pub(super) fn landmark_state(&self, slot: usize) -> usize {
+        slot_states(self.poses.as_ref().len(), slot)
+    }
+
+    /// Covariance of an observation's residual.
+    #[must_use]
+    pub fn residual_covariance<const SIZE: usize>(
+        &self,
+        observation: &Linearisation<SIZE>,
+    ) -> SMatrix<f64, SIZE, SIZE> {
+        let mut covariance = observation.covariance;
+        for (first, by_first) in &observation.terms {
+            let mut cross = SVector::<f64, SIZE>::zeros();
+            for (second, by_second) in &observation.terms {
+                cross += by_second * self.covariance.get(*first, *second);
+            }
+            covariance += by_first * cross.transpose();
+        }
+        covariance
+    }
+
+    /// The innovation of an observation that was linearised at this state. None if its covariance is singular or not
+    /// finite.
+    #[must_use]
+    pub fn innovation(&self, observation: &Linearisation<2>) -> Option<Innovation> {
+        Innovation::new(observation.residual, self.residual_covariance(observation))
+    }
+
+    /// Correction of all states, K 5.5 to 5.7, by an observation that was linearised at this state. False, and nothing
+    /// changed, if the residual's covariance is singular or not finite.
+    pub fn correct<const SIZE: usize>(&mut self, observation: &Linearisation<SIZE>) -> bool {
+        let count = self.states_in_use();
+        let mut rows = self.covariance.cross(observation, count);
+        let shares = rows.as_mut();
+        let mut residual_covariance = observation.covariance;
+        for (state, derivative) in &observation.terms {
+            let Some(cross) = shares.get(*state) else { return false };
+            residual_covariance += derivative * cross.transpose();
+        }
+        let Some(root) = residual_covariance.cholesky() else { return false };
+        let root = root.unpack();
+        let Some(residual) = root.solve_lower_triangular(&observation.residual) else { return false };
+        if !residual.iter().all(|value| value.is_finite()) {
+            return false;
+        }
+        // P - P H' S^-1 H P, symmetric whatever the rounding.
+        for share in shares.iter_mut().take(count) {
+            let Some(whitened) = root.solve_lower_triangular(share) else { return false };
+            *share = whitened;
+        }
+        self.covariance.subtract(shares, count);
+        self.shift(shares, &residual);
+        if S::STATES == SCALE {
+            let mut covariance = self.covariance();
+            make_positive_semidefinite(&mut covariance);
+            self.set_pose_covariance(&covariance);
+        }
+        true
+    }
+
+    /// Adds the gain times the residual to all states, both given in units in which the residual has unit covariance.
+    fn shift<const SIZE: usize>(&mut self, shares: &[SVector<f64, SIZE>], residual: &SVector<f64, SIZE>) {
+        let change = |state: usize| shares.get(state).map_or(0.0, |share| share.dot(residual));
+        let moved = |pose: &Pose, state: usize| {
+            Pose::new(pose.x + change(state), pose.y + change(state + 1), pose.theta + change(state + 2))
+        };
+        self.pose = moved(&self.pose, 0);
+        if let [scale, steering, yaw] = self.biases.as_mut() {
+            *scale += change(SCALE);
+            *steering += change(STEERING);
+            *yaw = wrap(*yaw + change(YAW));
+        }
+        let poses = self.poses.as_mut();
+        let landmarks_from = slot_states(poses.len(), 0);
+        for (slot, past) in poses.iter_mut().enumerate() {
+            if let Some(past) = past {
+                past.pose = moved(&past.pose, pose_state(slot));
+            }
+        }
+        for (slot, landmark) in self.landmarks.as_mut().iter_mut().enumerate() {
+            if let Some(landmark) = landmark {
+                let state = landmarks_from + 2 * slot;
+                landmark.position += Point::new(change(state), change(state + 1));
+            }
+        }
+    }
+}
+
+/// A covariance of x, y and heading in R, seen from W.
+fn turned(covariance: &Matrix3<f64>, sine: f64, cosine: f64) -> Matrix3<f64> {
+    let q = covariance;
+    let (xh, yh) = (cosine * q.m13 - sine * q.m23, sine * q.m13 + cosine * q.m23);
+    let (along, across, both) = (cosine * cosine, sine * sine, sine * cosine);
+    let xx = along * q.m11 - 2.0 * both * q.m12 + across * q.m22;
+    let xy = both * (q.m11 - q.m22) + (along - across) * q.m12;
+    let yy = across * q.m11 + 2.0 * both * q.m12 + along * q.m22;
+    Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, q.m33)
 }
 
 /// The inverse of a symmetric positive matrix; None if it is not one.

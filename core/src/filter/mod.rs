@@ -1,22 +1,25 @@
-//! The extended Kalman filter of the pose (K 5.3).
+//! The extended Kalman filter (K 5.3): one for all modes, with room for as much as a vehicle needs.
 
-mod augmented;
-mod augmented_observation;
+mod biases;
 mod cartesian;
 mod ekf;
+mod linearisation;
 mod observation;
 mod packed_covariance;
 mod positive_semidefinite;
 mod range_bearing;
-mod sparse_linearisation;
+mod relative_pose;
+mod slot_states;
+mod slots;
 mod timeline;
 
-pub use augmented::{Augmented, BiasDeviations, BiasWalk, augmented_states};
-pub use augmented_observation::RelativePose;
+pub use biases::{BiasDeviations, BiasModel, BiasWalk};
 pub use cartesian::Cartesian;
-pub use ekf::{Ekf, Innovation};
-pub use observation::{Linearisation, Observation};
+pub use ekf::{Ekf, Innovation, Landmark};
+pub use linearisation::{Linearisation, TERMS};
+pub use observation::{Observation, Viewpoint};
 pub use packed_covariance::{PackedCovariance, packed_entries};
 pub use range_bearing::RangeBearing;
-pub use sparse_linearisation::{SparseLinearisation, TERMS};
+pub use relative_pose::RelativePose;
+pub use slots::{PoseAndSlots, PoseOnly, Slots, Storage, slot_states};
 pub use timeline::{Correction, Timeline, TimelineError};

@@ -1,6 +1,6 @@
 //! What a landmark looks like from the vehicle.
 
-use nalgebra::{Matrix2, Matrix2x3, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
 use super::{Cartesian, RangeBearing};
 use crate::geometry::{Point, Pose};
@@ -14,38 +14,84 @@ pub enum Observation {
     Cartesian(Cartesian),
 }
 
-/// An observation model, linearised at a pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linearisation {
+/// Where S is in W, and how that turns.
+#[derive(Clone, Copy, Debug)]
+pub struct Viewpoint {
+    /// Position of R, m.
+    pub(super) position: Point,
+    /// Position of R for the Jacobians, m.
+    pub(super) anchor: Point,
+    /// Position of S minus that of R, m, in W.
+    pub(super) arm: Point,
+    /// Direction of S in W, rad, not wrapped.
+    pub(super) theta: f64,
+    /// Its sine.
+    pub(super) sine: f64,
+    /// Its cosine.
+    pub(super) cosine: f64,
+}
+
+/// A landmark, as it is believed to be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Believed {
+    /// Position in W, m.
+    pub position: Point,
+    /// Position for the Jacobians, m.
+    pub anchor: Point,
+    /// Variance of the position an axis, m^2, if the landmark is not in the state.
+    pub variance: f64,
+}
+
+/// What an observation says of the pose, the yaw of S and the landmark.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Model {
     /// Observation minus expectation.
     pub residual: Vector2<f64>,
-    /// Derivative of the expectation by the pose of R (K: H).
-    pub jacobian: Matrix2x3<f64>,
-    /// Covariance of the observation (K: Q) and of the landmark's position, seen from S.
+    /// Derivative of the expectation by the position of R, an axis each; by that of the landmark it is the same, negative.
+    pub by_position: [Vector2<f64>; 2],
+    /// By the heading of R.
+    pub by_heading: Vector2<f64>,
+    /// By the yaw of S.
+    pub by_yaw: Vector2<f64>,
+    /// Covariance of the observation, and of a landmark that is not in the state.
     pub covariance: Matrix2<f64>,
 }
 
-impl Observation {
-    /// Compares the observation with a landmark at `landmark` (m, in W, known to `landmark_variance` m^2 an axis) for a
-    /// vehicle at `pose` with its sensor at `laser` in R. None if the landmark is at the sensor.
-    #[must_use]
-    pub fn linearise(
-        &self,
-        pose: &Pose,
-        laser: &Pose,
-        landmark: &Point,
-        landmark_variance: f64,
-    ) -> Option<Linearisation> {
-        match self {
-            Self::RangeBearing(seen) => seen.linearise(pose, laser, landmark, landmark_variance),
-            Self::Cartesian(seen) => Some(seen.linearise(pose, laser, landmark, landmark_variance)),
-        }
+impl Viewpoint {
+    /// S is mounted at `mount` in R, turned by `yaw` (rad) from there.
+    pub(super) fn new(pose: &Pose, anchor: Point, mount: &Pose, yaw: f64) -> Self {
+        let (heading_sine, heading_cosine) = libm::sincos(pose.theta);
+        let theta = pose.theta + mount.theta + yaw;
+        let (sine, cosine) = libm::sincos(theta);
+        let arm = Point::new(
+            heading_cosine * mount.x - heading_sine * mount.y,
+            heading_sine * mount.x + heading_cosine * mount.y,
+        );
+        Self { position: pose.position(), anchor, arm, theta, sine, cosine }
     }
 
+    /// From W to S.
+    pub(super) fn inwards(&self, vector: &Point) -> Vector2<f64> {
+        Vector2::new(self.cosine * vector.x + self.sine * vector.y, self.cosine * vector.y - self.sine * vector.x)
+    }
+
+    /// From S to W.
+    pub(super) fn outwards(&self, vector: &Point) -> Point {
+        Point::new(self.cosine * vector.x - self.sine * vector.y, self.sine * vector.x + self.cosine * vector.y)
+    }
+
+    /// Where a point that is seen at `position` in S is in W, m.
+    #[must_use]
+    pub fn locate(&self, position: &Point) -> Point {
+        self.position + self.arm + self.outwards(position)
+    }
+}
+
+impl Observation {
     /// Where the landmark is in W if the vehicle is at `pose`, m.
     #[must_use]
-    pub fn locate(&self, pose: &Pose, laser: &Pose) -> Point {
-        pose.compose(laser).transform(&self.position())
+    pub fn locate(&self, pose: &Pose, mount: &Pose) -> Point {
+        pose.compose(mount).transform(&self.position())
     }
 
     /// Where the landmark is in S, m.
@@ -59,4 +105,26 @@ impl Observation {
             Self::Cartesian(seen) => seen.position,
         }
     }
+
+    /// The observation as a position.
+    #[must_use]
+    pub fn cartesian(&self) -> Cartesian {
+        match self {
+            Self::RangeBearing(seen) => seen.cartesian(),
+            Self::Cartesian(seen) => *seen,
+        }
+    }
+
+    /// Compares the observation with a landmark. None if the landmark is at the sensor.
+    pub(super) fn model(&self, from: &Viewpoint, landmark: &Believed) -> Option<Model> {
+        match self {
+            Self::RangeBearing(seen) => seen.model(from, landmark),
+            Self::Cartesian(seen) => Some(seen.model(from, landmark)),
+        }
+    }
+}
+
+/// A vector turned to the left by a right angle.
+pub(super) fn left(vector: &Point) -> Point {
+    Point::new(-vector.y, vector.x)
 }

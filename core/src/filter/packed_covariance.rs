@@ -2,7 +2,8 @@
 
 use nalgebra::SVector;
 
-use super::SparseLinearisation;
+use super::Linearisation;
+use super::slots::{PoseOnly, Slots, Storage};
 
 /// Entries of the lower triangle of a square matrix with that many rows.
 #[must_use]
@@ -10,37 +11,38 @@ pub const fn packed_entries(states: usize) -> usize {
     states * (states + 1) / 2
 }
 
-/// The covariance of `STATES` states, row by row up to the diagonal; `ENTRIES` is [`packed_entries`] of `STATES`.
+/// The covariance of all states of a filter with room for `S`, row by row up to the diagonal.
 #[derive(Clone, Debug)]
-pub struct PackedCovariance<const STATES: usize, const ENTRIES: usize> {
-    entries: [f64; ENTRIES],
+pub struct PackedCovariance<S: Slots> {
+    entries: S::Covariance,
 }
 
-impl<const STATES: usize, const ENTRIES: usize> PackedCovariance<STATES, ENTRIES> {
+impl Copy for PackedCovariance<PoseOnly> {}
+
+impl<S: Slots> PackedCovariance<S> {
     /// All states are known exactly.
     #[must_use]
     #[inline(always)]
-    pub const fn zero() -> Self {
-        const { assert!(ENTRIES == packed_entries(STATES)) }
-        Self { entries: [0.0; ENTRIES] }
+    pub fn zero() -> Self {
+        Self { entries: S::Covariance::filled(0.0) }
     }
 
     /// Covariance of two states; zero if one of them does not exist.
     #[must_use]
     pub fn get(&self, first: usize, second: usize) -> f64 {
-        self.entries.get(place(first, second)).copied().unwrap_or(0.0)
+        self.entries.as_ref().get(place(first, second)).copied().unwrap_or(0.0)
     }
 
     /// Sets the covariance of two states, and so of the second and the first.
     pub fn set(&mut self, first: usize, second: usize, value: f64) {
-        if let Some(entry) = self.entries.get_mut(place(first, second)) {
+        if let Some(entry) = self.entries.as_mut().get_mut(place(first, second)) {
             *entry = value;
         }
     }
 
     /// Makes a state exactly known and independent of all others.
     pub fn clear(&mut self, state: usize) {
-        for other in 0..STATES {
+        for other in 0..S::STATES {
             self.set(state, other, 0.0);
         }
     }
@@ -48,31 +50,28 @@ impl<const STATES: usize, const ENTRIES: usize> PackedCovariance<STATES, ENTRIES
     /// Covariance of the first `count` states with the expectation of an observation: `P H'`, with the zeros of `H` left
     /// out.
     #[must_use]
-    pub fn cross<const SIZE: usize>(
-        &self,
-        observation: &SparseLinearisation<SIZE>,
-        count: usize,
-    ) -> [SVector<f64, SIZE>; STATES] {
-        let mut cross = [SVector::zeros(); STATES];
+    pub fn cross<const SIZE: usize>(&self, observation: &Linearisation<SIZE>, count: usize) -> S::Rows<SIZE> {
+        let mut rows = S::Rows::<SIZE>::filled(SVector::zeros());
+        let cross = rows.as_mut();
         for (state, derivative) in &observation.terms {
             // The row of the state up to the diagonal, then its column.
             let start = place(*state, 0);
-            let row = self.entries.get(start..=start + state).unwrap_or_default();
-            for (entry, sum) in row.iter().zip(&mut cross) {
+            let row = self.entries.as_ref().get(start..=start + state).unwrap_or_default();
+            for (entry, sum) in row.iter().zip(cross.iter_mut()) {
                 *sum += derivative * *entry;
             }
             let mut below = start + 2 * state + 1;
             for (other, sum) in cross.iter_mut().enumerate().take(count).skip(state + 1) {
-                *sum += derivative * self.entries.get(below).copied().unwrap_or(0.0);
+                *sum += derivative * self.entries.as_ref().get(below).copied().unwrap_or(0.0);
                 below += other + 1;
             }
         }
-        cross
+        rows
     }
 
     /// Subtracts `W W'` from the covariance of the first `count` states; a row of `W` is a state's share.
-    pub fn subtract<const SIZE: usize>(&mut self, shares: &[SVector<f64, SIZE>; STATES], count: usize) {
-        let mut rest = self.entries.as_mut_slice();
+    pub fn subtract<const SIZE: usize>(&mut self, shares: &[SVector<f64, SIZE>], count: usize) {
+        let mut rest = self.entries.as_mut();
         for (state, share) in shares.iter().enumerate().take(count) {
             let Some((row, below)) = rest.split_at_mut_checked(state + 1) else { return };
             for (entry, other) in row.iter_mut().zip(shares) {

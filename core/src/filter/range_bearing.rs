@@ -1,9 +1,10 @@
 //! Distance and direction of a landmark.
 
-use nalgebra::{Matrix2, Matrix2x3, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
-use super::{Cartesian, Linearisation};
-use crate::geometry::{Point, Pose, difference};
+use super::Cartesian;
+use super::observation::{Believed, Model, Viewpoint};
+use crate::geometry::{Point, difference};
 
 /// Nearer than this, m, the direction of a landmark means nothing.
 const NEAREST: f64 = 1e-3;
@@ -39,40 +40,31 @@ impl RangeBearing {
         }
     }
 
-    /// K 5.14 to 5.16, which are printed for a sensor at the logical point; here the sensor sits at `laser`.
-    pub(super) fn linearise(
-        &self,
-        pose: &Pose,
-        laser: &Pose,
-        landmark: &Point,
-        landmark_variance: f64,
-    ) -> Option<Linearisation> {
-        let (sine, cosine) = libm::sincos(pose.theta);
-        // The sensor's position relative to R, turned into W.
-        let arm = Point::new(cosine * laser.x - sine * laser.y, sine * laser.x + cosine * laser.y);
-        let (dx, dy) = (landmark.x - pose.x - arm.x, landmark.y - pose.y - arm.y);
+    /// K 5.14 to 5.16, which are printed for a sensor at the logical point; here the sensor sits elsewhere.
+    pub(super) fn model(&self, from: &Viewpoint, landmark: &Believed) -> Option<Model> {
+        let (dx, dy) =
+            (landmark.position.x - from.position.x - from.arm.x, landmark.position.y - from.position.y - from.arm.y);
         let square = dx * dx + dy * dy;
         let range = libm::sqrt(square);
         if range.is_nan() || range <= NEAREST {
             return None;
         }
-        let bearing = libm::atan2(dy, dx) - pose.theta - laser.theta;
-        let jacobian = Matrix2x3::new(
-            -dx / range,
-            -dy / range,
-            (dx * arm.y - dy * arm.x) / range,
-            dy / square,
-            -dx / square,
-            -(dx * arm.x + dy * arm.y) / square - 1.0,
-        );
-        Some(Linearisation {
+        let bearing = libm::atan2(dy, dx) - from.theta;
+        // How range and bearing change if everything turns to the left about a point from which the landmark is seen there.
+        let by_turn = |reach: &Point| {
+            Vector2::new((dx * reach.y - dy * reach.x) / range, -(dx * reach.x + dy * reach.y) / square)
+        };
+        let reach = landmark.anchor - from.anchor;
+        Some(Model {
             residual: Vector2::new(self.range - range, difference(self.bearing, bearing)),
-            jacobian,
+            by_position: [Vector2::new(-dx / range, dy / square), Vector2::new(-dy / range, -dx / square)],
+            by_heading: by_turn(&reach),
+            by_yaw: by_turn(&(reach - from.arm)),
             covariance: Matrix2::new(
-                self.range_variance + landmark_variance,
+                self.range_variance + landmark.variance,
                 0.0,
                 0.0,
-                self.bearing_variance + landmark_variance / square,
+                self.bearing_variance + landmark.variance / square,
             ),
         })
     }

@@ -12,7 +12,7 @@
 
 use heapless::Deque;
 
-use super::{Ekf, Observation};
+use super::{Ekf, Landmark, Observation};
 use crate::geometry::{Point, Pose};
 use crate::measurement::Time;
 use crate::odometry::Motion;
@@ -74,8 +74,10 @@ impl Entry {
 }
 
 impl Correction {
-    fn apply(&self, state: &mut Ekf, laser: &Pose) -> bool {
-        match self.observation.linearise(&state.pose, laser, &self.landmark, self.landmark_variance) {
+    /// Corrects a state, with the laser at `laser` in R. False, and nothing changed, if the filter refuses it as singular.
+    pub fn apply(&self, state: &mut Ekf, laser: &Pose) -> bool {
+        let landmark = Landmark::Known { position: self.landmark, variance: self.landmark_variance };
+        match state.observe(&state.viewpoint(laser), &self.observation, &landmark) {
             Some(linearisation) => state.correct(&linearisation),
             None => false,
         }
@@ -277,27 +279,24 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         Ok(state)
     }
 
-    /// Makes a correction at the time at which it was true: `choose` is given the state of that time and answers which
-    /// correction it is, if any. True if one was made; false if none was chosen or the filter refused it as singular.
+    /// Fuses what was true at `time`: `correct` is given the state of that time, and answers the correction that it has made
+    /// of it, if any. True if one was made.
     ///
     /// # Errors
-    /// See [`TimelineError`]; `choose` has then not been called.
-    pub fn correct(
+    /// See [`TimelineError`]; `correct` has then not been called.
+    pub fn fuse(
         &mut self,
         time: Time,
-        choose: impl FnOnce(&Ekf) -> Option<Correction>,
+        correct: impl FnOnce(&mut Ekf) -> Option<Correction>,
     ) -> Result<bool, TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         self.settle(position + 1);
         let mut state = self.entries.get(position).ok_or(TimelineError::TooLate)?.state;
         let (motion, rest) = self.motion_to(position, time)?;
         state.predict(&motion);
-        let Some(correction) = choose(&state) else {
+        let Some(correction) = correct(&mut state) else {
             return Ok(false);
         };
-        if !correction.apply(&mut state, &self.laser) {
-            return Ok(false);
-        }
         self.divide(position, (motion, rest), Fusion::Correction(correction), state);
         Ok(true)
     }

@@ -37,7 +37,7 @@ const UNSURE: f64 = 3.0;
 #[must_use]
 pub fn is_sure(state: &Ekf) -> bool {
     const LIMITS: (f64, f64) = (LARGEST_SLIP.0 / UNSURE, LARGEST_SLIP.1 / UNSURE);
-    let covariance = &state.covariance;
+    let covariance = state.covariance();
     covariance.m11 + covariance.m22 <= LIMITS.0 * LIMITS.0 && covariance.m33 <= LIMITS.1 * LIMITS.1
 }
 

@@ -9,12 +9,19 @@ use crate::maps::{LandmarkKind, Verdict};
 
 /// What became of something that was seen.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fate {
+pub(super) struct Outcome {
     pub verdict: Verdict,
-    /// The landmark that it was compared with, and the outcome of the comparison.
+    /// The landmark that it was compared with, and the innovation.
     pub landmark: Option<(LandmarkSource, u16, Innovation)>,
     /// Where it is in W, m, from the pose before it was used.
     pub located: Point,
+    /// Whether it has corrected the filter.
+    pub is_used: bool,
+}
+
+impl Outcome {
+    pub const OUT_OF_TIME: Self =
+        Self { verdict: Verdict::OutOfTime, landmark: None, located: Point::new(0.0, 0.0), is_used: false };
 }
 
 /// Way since something last happened, m.
@@ -62,19 +69,20 @@ impl<'a> Evidence<'a> {
         Self { outputs, distance, gate, are_reflectors_expected, expected: 0, accepted: 0, used: 0, square_sum: 0.0 }
     }
 
-    /// Takes one sighting and what became of it; it was accepted if it has corrected the filter.
-    pub fn add(&mut self, sighting: &Sighting, fate: &Fate, is_accepted: bool) {
-        let is_fixed = fate.landmark.is_none_or(|(source, ..)| source == LandmarkSource::Fixed);
+    /// Takes one sighting and what became of it.
+    pub fn add(&mut self, sighting: &Sighting, outcome: &Outcome) {
+        let is_accepted = outcome.is_used;
+        let is_fixed = outcome.landmark.is_none_or(|(source, ..)| source == LandmarkSource::Fixed);
         let is_reflector = sighting.kind == LandmarkKind::Reflector;
         // Two landmarks that fit equally say nothing against the pose, nor does a feature that no map has.
         let is_evidence = is_fixed
-            && !matches!(fate.verdict, Verdict::Ambiguous | Verdict::OutOfTime)
-            && ((is_reflector && self.are_reflectors_expected) || fate.landmark.is_some());
+            && !matches!(outcome.verdict, Verdict::Ambiguous | Verdict::OutOfTime)
+            && ((is_reflector && self.are_reflectors_expected) || outcome.landmark.is_some());
         if is_evidence {
             self.expected += 1;
             self.accepted += usize::from(is_accepted);
         }
-        if let Some((_, _, innovation)) = fate.landmark.filter(|_| is_accepted) {
+        if let Some((_, _, innovation)) = outcome.landmark.filter(|_| is_accepted) {
             self.used += 1;
             self.square_sum += innovation.normalised_square;
             if is_reflector {
@@ -84,14 +92,14 @@ impl<'a> Evidence<'a> {
             }
         }
         let position = sighting.observation.position();
-        let innovation = fate.landmark.map(|(_, _, innovation)| innovation);
+        let innovation = outcome.landmark.map(|(_, _, innovation)| innovation);
         let is_told = self.outputs.uses.push(LandmarkUse {
             time: sighting.time,
             kind: sighting.kind,
-            landmark: fate.landmark.map(|(source, id, _)| (source, id)),
-            verdict: fate.verdict,
+            landmark: outcome.landmark.map(|(source, id, _)| (source, id)),
+            verdict: outcome.verdict,
             position: [position.x as f32, position.y as f32],
-            located: fate.located.into(),
+            located: outcome.located.into(),
             residual: innovation.map_or([0.0; 2], |innovation| innovation.residual.into()),
             residual_deviation: innovation.map_or([0.0; 2], |innovation| {
                 [libm::sqrt(innovation.covariance.m11), libm::sqrt(innovation.covariance.m22)]

@@ -1,10 +1,63 @@
-//! Fusing what is seen, each sighting at its own time.
+//! Fusing what is seen: the same for every state of the filter.
 
-use super::evidence::{Evidence, Fate};
-use super::maps::Association;
-use super::{LandmarkSource, Localizer};
-use crate::geometry::Point;
-use crate::maps::Verdict;
+use super::Localizer;
+use super::association::{Association, Candidate, Comparison};
+use super::evidence::{Evidence, Outcome};
+use super::maps::Maps;
+use super::sighting::Sighting;
+use super::slam::LandmarkSlots;
+use super::{LandmarkSource, Parameters};
+use crate::filter::{Correction, Ekf, Landmark, Slots};
+use crate::maps::{LandmarkKind, Verdict};
+use crate::measurement::Time;
+
+/// Corrects a filter by something seen from its state. A landmark of a map that is recognised enters the state, if there are
+/// `slots` and one can be freed. Tells what became of it, and the correction if one was made.
+fn correct<S: Slots, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, const LANDMARKS: usize>(
+    filter: &mut Ekf<S>,
+    mut slots: Option<&mut LandmarkSlots<LANDMARKS>>,
+    maps: &Maps<REFLECTORS, FEATURES, DYNAMIC>,
+    seen: &Sighting,
+    parameters: &Parameters,
+) -> (Outcome, Option<Correction>) {
+    let comparison = Comparison::new(filter, seen, parameters);
+    let Association { verdict, nearest } = comparison.associate(maps, slots.as_deref());
+    let (located, from, orientation) = (comparison.located, comparison.from, comparison.orientation());
+    let Some(Candidate { source, id, landmark, mut linearisation, innovation }) = nearest else {
+        return (Outcome { verdict, landmark: None, located, is_used: false }, None);
+    };
+    let outcome = Outcome { verdict, landmark: Some((source, id, innovation)), located, is_used: false };
+    if verdict != Verdict::Accepted {
+        return (outcome, None);
+    }
+    let free = slots.as_deref().and_then(LandmarkSlots::free);
+    let slot = match (landmark, free) {
+        (Landmark::Slot(slot), _) => Some(slot),
+        (Landmark::Known { position, variance }, Some(free)) => {
+            filter.add_known_landmark(free, position, variance);
+            if let Some(slots) = slots.as_deref_mut() {
+                slots.enter(free, Some(id), seen.kind, orientation);
+            }
+            let Some(by_slot) = filter.observe(&from, &seen.observation, &Landmark::Slot(free)) else {
+                return (outcome, None);
+            };
+            linearisation = by_slot;
+            Some(free)
+        }
+        (Landmark::Known { .. }, None) => None,
+    };
+    let is_used = filter.correct(&linearisation);
+    if let Some((slots, slot)) = slots.zip(slot).filter(|_| is_used) {
+        slots.see(slot);
+    }
+    let correction = match landmark {
+        Landmark::Known { position, variance } if is_used => {
+            Some(Correction { observation: seen.observation, landmark: position, landmark_variance: variance })
+        }
+        _ => None,
+    };
+    (Outcome { is_used, ..outcome }, correction)
+}
 
 impl<
     const BEAMS: usize,
@@ -17,35 +70,65 @@ impl<
     const ENTRIES: usize,
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
-    /// Fuses the sightings of the workspace, each at its own time, and brings the dynamic map up to date.
-    pub(super) fn fuse(&mut self) {
+    /// Fuses the sightings of the workspace: each at its own time, or, with landmarks in the state, all at the time of the
+    /// filter, moved there by the path of the workspace, which begins at `start`.
+    pub(super) fn fuse(&mut self, start: Time) {
         let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none()) else {
             return;
         };
+        let (parameters, maps) = (&self.parameters, &self.maps);
+        let has_slots = parameters.maps.slam;
+        // With slots a vehicle without a map of reflectors finds them on its way.
+        let are_reflectors_expected = !has_slots || !maps.reflectors.landmarks().is_empty();
+        let gate = parameters.association.gate;
+        let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, are_reflectors_expected);
+        for sighting in &mut self.workspace.sightings {
+            let outcome = if has_slots {
+                let moved = sighting.moved(&self.workspace.path, start, self.slam.time());
+                let (filter, slots) = self.slam.parts();
+                correct(filter, Some(slots), maps, &moved, parameters).0
+            } else {
+                let mut outcome = Outcome::OUT_OF_TIME;
+                // What finds no place in the past is out of time.
+                let _ = timeline.fuse(sighting.time, |state| {
+                    let correction;
+                    (outcome, correction) = correct(state, None::<&mut LandmarkSlots<0>>, maps, sighting, parameters);
+                    correction
+                });
+                outcome
+            };
+            sighting.verdict = outcome.verdict;
+            sighting.matched = match outcome.landmark {
+                Some((LandmarkSource::Dynamic, id, _)) if outcome.is_used => Some(id),
+                _ => None,
+            };
+            evidence.add(sighting, &outcome);
+        }
+        self.lost = evidence.judge(&mut self.integrity.innovations);
+        if has_slots {
+            self.discover(start, are_reflectors_expected);
+        }
+    }
+
+    /// Tells that the sightings of the workspace are neither for nor against the pose.
+    pub(super) fn refuse_sightings(&mut self) {
         let gate = self.parameters.association.gate;
         let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, true);
         for sighting in &mut self.workspace.sightings {
-            let mut association = Association::NONE;
-            let mut located = Point::default();
-            let outcome = timeline.correct(sighting.time, |state| {
-                located = sighting.observation.locate(&state.pose, &self.parameters.laser);
-                association = self.maps.associate(&self.parameters, state, sighting.kind, &sighting.observation);
-                association.correction(&sighting.observation)
-            });
-            if outcome.is_err() {
-                association.verdict = Verdict::OutOfTime;
-            }
-            let is_accepted = outcome == Ok(true);
-            sighting.verdict = association.verdict;
-            sighting.matched = association
-                .nearest
-                .filter(|landmark| is_accepted && landmark.source == LandmarkSource::Dynamic)
-                .map(|landmark| landmark.id);
-            let landmark = association.nearest.map(|landmark| (landmark.source, landmark.id, landmark.innovation));
-            let fate = Fate { verdict: association.verdict, landmark, located };
-            evidence.add(sighting, &fate, is_accepted);
+            sighting.verdict = Outcome::OUT_OF_TIME.verdict;
+            evidence.add(sighting, &Outcome::OUT_OF_TIME);
         }
-        self.lost = evidence.judge(&mut self.integrity.innovations);
+    }
+
+    /// Takes what fits no landmark as new ones of the state, once all that was seen has corrected the pose.
+    fn discover(&mut self, start: Time, are_reflectors_given: bool) {
+        for sighting in &self.workspace.sightings {
+            let may_be_new = sighting.kind != LandmarkKind::Reflector || !are_reflectors_given;
+            if may_be_new && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
+                let moved = sighting.moved(&self.workspace.path, start, self.slam.time());
+                self.slam.discover(&moved, &self.parameters);
+            }
+        }
     }
 
     /// Algorithm 1 (K 5.4.1) for the natural features of one scan, at the poses that the whole scan has led to. A vehicle

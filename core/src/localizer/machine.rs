@@ -23,7 +23,7 @@ const PAST: usize = 128;
 ///
 /// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, and `DYNAMIC` landmarks
 /// that are found while driving; in the filter's state for `KEYS` past poses and `LANDMARKS` landmarks, which make `STATES`
-/// states and `ENTRIES` entries of their covariance ([`crate::filter::augmented_states`],
+/// states and `ENTRIES` entries of their covariance ([`crate::filter::slot_states`],
 /// [`crate::filter::packed_entries`]).
 #[derive(Clone, Debug)]
 pub struct Localizer<
@@ -247,7 +247,7 @@ impl<
                 if self.parameters.maps.slam {
                     self.fuse_lone_reflectors_by_slam();
                 } else {
-                    self.fuse();
+                    self.fuse(self.timeline.now());
                 }
             }
             Event::Reflectors(_) => {}
@@ -485,14 +485,14 @@ impl<
             if maps.slam {
                 self.fuse_reflectors_by_slam(scan.start);
             } else {
-                self.fuse();
+                self.fuse(scan.start);
             }
         }
         if maps.slam {
             self.fuse_scan_by_slam(scan);
         } else if maps.features || maps.dynamic {
             self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
-            self.fuse();
+            self.fuse(scan.start);
             self.update_dynamic_map();
         }
     }

@@ -1,10 +1,12 @@
 //! The machine that owns all below: one event in, outputs out.
 
+mod association;
 mod bounds;
 mod capacities;
 mod event;
 mod evidence;
 mod fusion;
+mod horizon;
 mod localize;
 mod machine;
 mod maps;
@@ -13,7 +15,6 @@ mod output_predictor;
 mod parameters;
 mod sighting;
 mod slam;
-mod slam_fusion;
 mod start_finder;
 mod start_search;
 mod supervisor;

@@ -58,7 +58,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         self.base = Some(*output);
         let [xx, xy, yy, x_heading, y_heading, heading] = output.covariance;
         let covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, heading);
-        self.state = Ekf { pose: output.pose, covariance };
+        self.state = Ekf::with_covariance(output.pose, &covariance);
         let lever = self.odometer.vehicle().steering_lever();
         for motion in &self.motions {
             go_on(&mut self.state, &motion.corrected(bias, lever), output.time);

@@ -36,6 +36,16 @@ pub(super) struct Sighting {
     pub verdict: Verdict,
 }
 
+impl Sighting {
+    /// The same as it would be seen at `time`, by a path that begins at `start`.
+    pub fn moved(&self, path: &SensorPath, start: Time, time: Time) -> Self {
+        let seen = self.observation.cartesian();
+        let at_start = path.to_start(self.time.since(start), &seen.position);
+        let position = path.from_start(time.since(start), &at_start);
+        Self { observation: Observation::Cartesian(Cartesian { position, ..seen }), ..*self }
+    }
+}
+
 impl<const BEAMS: usize> Workspace<BEAMS> {
     /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
     /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two. True if there

@@ -2,3 +2,4 @@
 
 pub mod hall;
 pub mod stage;
+pub mod view;

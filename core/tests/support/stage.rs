@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::filter::{augmented_states, packed_entries};
+use agv_core::filter::{packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose, Twist, difference};
 use agv_core::localizer::{Event, Localizer, Outputs, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::{Landmark, LandmarkKind};
@@ -14,7 +14,7 @@ use super::hall::{cast, corners};
 pub const BEAMS: usize = 1440;
 const KEYS: usize = 2;
 const PLACES: usize = 24;
-const STATES: usize = augmented_states(KEYS, PLACES);
+const STATES: usize = slot_states(KEYS, PLACES);
 pub type Small = Localizer<BEAMS, 64, 64, 32, KEYS, PLACES, STATES, { packed_entries(STATES) }>;
 
 /// Samples of the odometry in a revolution, and the time between them, us.

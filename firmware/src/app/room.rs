@@ -1,13 +1,13 @@
 //! How much this image localises with.
 
-use agv_core::filter::{augmented_states, packed_entries};
+use agv_core::filter::{packed_entries, slot_states};
 use agv_core::localizer;
 
 /// Past poses in the state of the filter.
 const KEYS: usize = if cfg!(feature = "slam") { 4 } else { 0 };
 /// Landmarks in the state of the filter.
 const LANDMARKS: usize = if cfg!(feature = "slam") { 64 } else { 0 };
-const STATES: usize = augmented_states(KEYS, LANDMARKS);
+const STATES: usize = slot_states(KEYS, LANDMARKS);
 const ENTRIES: usize = packed_entries(STATES);
 
 /// Whether the localiser has room for landmarks in its state, without which `maps.slam` cannot be switched on.

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::filter::{Augmented, RelativePose};
+use crate::filter::{Ekf, RelativePose, Slots};
 use crate::geometry::{Pose, difference};
 use crate::sensing::PointScan;
 use crate::sensing::{SurfaceScan, align_to_surfaces};
@@ -31,9 +31,9 @@ impl<const KEYS: usize> KeyScans<KEYS> {
     }
 
     /// Corrects the filter by what the scan says of the way since each key scan.
-    pub(super) fn align<const BEAMS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize>(
+    pub(super) fn align<const BEAMS: usize, S: Slots>(
         &self,
-        filter: &mut Augmented<KEYS, LANDMARKS, STATES, ENTRIES>,
+        filter: &mut Ekf<S>,
         points: &PointScan<BEAMS>,
         place: &Pose,
         laser: &Pose,
@@ -71,14 +71,14 @@ impl<const KEYS: usize> KeyScans<KEYS> {
     }
 
     /// Makes the scan a key scan if the vehicle has come far enough from the newest one; it takes the place of the oldest.
-    pub(super) fn keep<const BEAMS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize>(
+    pub(super) fn keep<const BEAMS: usize, S: Slots>(
         &mut self,
-        filter: &mut Augmented<KEYS, LANDMARKS, STATES, ENTRIES>,
+        filter: &mut Ekf<S>,
         points: &PointScan<BEAMS>,
         place: &Pose,
         parameters: &KeyScanParameters,
     ) {
-        let pose = filter.state().pose;
+        let pose = filter.pose;
         let is_needed = filter.past_pose(self.newest).is_none_or(|newest| {
             libm::hypot(pose.x - newest.x, pose.y - newest.y) > parameters.spacing
                 || libm::fabs(difference(pose.theta, newest.theta)) > parameters.turn

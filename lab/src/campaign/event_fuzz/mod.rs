@@ -13,7 +13,7 @@ use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
-use agv_core::filter::{augmented_states, packed_entries};
+use agv_core::filter::{packed_entries, slot_states};
 use agv_core::localizer;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -25,7 +25,7 @@ use drive::{Drive, Lists};
 
 const KEYS: usize = 2;
 const LANDMARKS: usize = 8;
-const STATES: usize = augmented_states(KEYS, LANDMARKS);
+const STATES: usize = slot_states(KEYS, LANDMARKS);
 const ENTRIES: usize = packed_entries(STATES);
 
 /// A localiser with so little room that all of it is filled.

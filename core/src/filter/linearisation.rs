@@ -1,4 +1,4 @@
-//! An observation model of many states that depends on few of them.
+//! An observation model, linearised at a state.
 
 use heapless::Vec;
 use nalgebra::{SMatrix, SVector};
@@ -6,18 +6,18 @@ use nalgebra::{SMatrix, SVector};
 /// Most states on which one observation depends: two poses and a yaw.
 pub const TERMS: usize = 8;
 
-/// An observation of `SIZE` numbers, linearised at a state.
+/// An observation of `SIZE` numbers, linearised at a state of which it needs few entries.
 #[derive(Clone, Debug)]
-pub struct SparseLinearisation<const SIZE: usize> {
+pub struct Linearisation<const SIZE: usize> {
     /// Observation minus expectation.
     pub residual: SVector<f64, SIZE>,
-    /// The states on which the expectation depends, each once and with its derivative.
+    /// The states on which the expectation depends, each once and with its derivative (K: the columns of H).
     pub terms: Vec<(usize, SVector<f64, SIZE>), TERMS>,
-    /// Covariance of the observation.
+    /// Covariance of the observation (K: Q), and of a landmark's position that is not in the state.
     pub covariance: SMatrix<f64, SIZE, SIZE>,
 }
 
-impl<const SIZE: usize> SparseLinearisation<SIZE> {
+impl<const SIZE: usize> Linearisation<SIZE> {
     /// A residual with its covariance that depends on nothing yet.
     #[must_use]
     pub fn new(residual: SVector<f64, SIZE>, covariance: SMatrix<f64, SIZE, SIZE>) -> Self {

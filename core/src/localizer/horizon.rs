@@ -1,10 +1,6 @@
-//! Fusing what is seen into the filter with landmarks and past poses, a scan at a time.
+//! With landmarks or past poses in the state the filter stands a little in the past: at the middle of what it has used last.
 
 use super::Localizer;
-use super::evidence::{Evidence, Fate};
-use super::slam::{Seen, cartesian};
-use crate::geometry::Point;
-use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::{Scan, Time};
 
 impl<
@@ -35,7 +31,7 @@ impl<
         let end = last.time;
         let time = first.time.offset(0.5 * end.since(first.time));
         if self.begin_slam(time, end) {
-            self.fuse_by_slam(start);
+            self.fuse(start);
             self.slam.finish(true, &self.parameters.slam);
             self.end_slam();
         }
@@ -52,7 +48,7 @@ impl<
         }
         let place = self.workspace.path.place(self.slam.time().since(scan.start));
         self.slam.align(&self.workspace.points, &place, &self.parameters);
-        self.fuse_by_slam(scan.start);
+        self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
         self.slam.keep(&self.workspace.points, &place, &self.parameters);
         self.end_slam();
@@ -70,49 +66,8 @@ impl<
         true
     }
 
-    /// Tells that the sightings of the workspace are neither for nor against the pose.
-    fn refuse_sightings(&mut self) {
-        let gate = self.parameters.association.gate;
-        let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, true);
-        let fate = Fate { verdict: Verdict::OutOfTime, landmark: None, located: Point::default() };
-        for sighting in &mut self.workspace.sightings {
-            sighting.verdict = fate.verdict;
-            evidence.add(sighting, &fate, false);
-        }
-    }
-
     fn end_slam(&mut self) {
         // The filter's time is one that the timeline reaches: see `begin_slam`.
         let _ = self.timeline.set_state(self.slam.time(), self.slam.state());
-    }
-
-    /// Fuses the sightings of the workspace at the filter's time; its path begins at `start`.
-    fn fuse_by_slam(&mut self, start: Time) {
-        // A vehicle without a map of reflectors finds them on its way.
-        let reflectors_are_given = !self.maps.reflectors.landmarks().is_empty();
-        let gate = self.parameters.association.gate;
-        let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, reflectors_are_given);
-        let now = self.slam.time().since(start);
-        let path = &self.workspace.path;
-        for sighting in &mut self.workspace.sightings {
-            let mut seen = cartesian(&sighting.observation);
-            seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
-            let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
-            let fate = self.slam.see(&seen, &self.maps, &self.parameters);
-            sighting.verdict = fate.verdict;
-            evidence.add(sighting, &fate, fate.verdict == Verdict::Accepted);
-        }
-        let lost = evidence.judge(&mut self.integrity.innovations);
-        // What fits no landmark is new, once the whole scan has corrected the pose.
-        for sighting in &self.workspace.sightings {
-            let may_be_new = sighting.kind != LandmarkKind::Reflector || !reflectors_are_given;
-            if may_be_new && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
-                let mut seen = cartesian(&sighting.observation);
-                seen.position = path.from_start(now, &path.to_start(sighting.time.since(start), &seen.position));
-                let seen = Seen { kind: sighting.kind, cartesian: seen, orientation: sighting.orientation };
-                self.slam.discover(&seen, &self.parameters);
-            }
-        }
-        self.lost = lost;
     }
 }

@@ -1,0 +1,141 @@
+//! Biases, past poses and landmarks as parts of the state.
+
+use nalgebra::Matrix2;
+
+use super::biases::{BiasDeviations, SCALE, STEERING, YAW};
+use super::observation::{Viewpoint, left};
+use super::slots::{PastPose, Slots, StateLandmark, pose_state};
+use super::{Cartesian, Ekf};
+use crate::geometry::{Point, Pose};
+
+impl<S: Slots> Ekf<S> {
+    /// Begins at a pose; what was known of the biases is kept, past poses and landmarks are forgotten.
+    pub fn begin(&mut self, state: &Ekf) {
+        for slot in 0..self.poses.as_ref().len() {
+            self.forget_pose(slot);
+        }
+        for slot in 0..self.landmarks.as_ref().len() {
+            self.remove_landmark(slot);
+        }
+        for axis in 0..SCALE {
+            self.covariance.clear(axis);
+        }
+        self.pose = state.pose;
+        self.anchor.as_mut().fill(state.pose.position());
+        self.set_pose_covariance(&state.covariance());
+    }
+
+    /// Forgets what was learnt of the biases.
+    pub fn begin_biases(&mut self, deviations: &BiasDeviations) {
+        self.biases.as_mut().fill(0.0);
+        let biases = [(SCALE, deviations.scale), (STEERING, deviations.steering), (YAW, deviations.laser_yaw)];
+        for (state, deviation) in biases.into_iter().take(self.biases.as_ref().len()) {
+            self.covariance.clear(state);
+            self.covariance.set(state, state, deviation * deviation);
+        }
+    }
+
+    /// Copies the present pose to a slot for past poses; what was there is forgotten.
+    pub fn remember_pose(&mut self, slot: usize) {
+        let past = PastPose { pose: self.pose, anchor: self.anchor() };
+        let Some(place) = self.poses.as_mut().get_mut(slot) else { return };
+        *place = Some(past);
+        let state = pose_state(slot);
+        for axis in 0..3 {
+            self.covariance.clear(state + axis);
+        }
+        for axis in 0..3 {
+            for other in 0..S::STATES {
+                if !(state..state + 3).contains(&other) {
+                    let value = self.covariance.get(axis, other);
+                    self.covariance.set(state + axis, other, value);
+                }
+            }
+            for other in 0..3 {
+                let value = self.covariance.get(axis, other);
+                self.covariance.set(state + axis, state + other, value);
+            }
+        }
+    }
+
+    /// Frees a slot for past poses.
+    pub fn forget_pose(&mut self, slot: usize) {
+        if let Some(place) = self.poses.as_mut().get_mut(slot)
+            && place.take().is_some()
+        {
+            for axis in 0..3 {
+                self.covariance.clear(pose_state(slot) + axis);
+            }
+        }
+    }
+
+    /// A past pose.
+    #[must_use]
+    pub fn past_pose(&self, slot: usize) -> Option<Pose> {
+        self.poses.as_ref().get(slot).copied().flatten().map(|past| past.pose)
+    }
+
+    /// Adds a landmark at a slot whose position (m, in W) is known beforehand with that variance (m^2) an axis.
+    pub fn add_known_landmark(&mut self, slot: usize, position: Point, variance: f64) {
+        self.remove_landmark(slot);
+        let first = self.landmark_state(slot);
+        if let Some(place) = self.landmarks.as_mut().get_mut(slot) {
+            *place = Some(StateLandmark { position, anchor: position });
+            for state in [first, first + 1] {
+                self.covariance.set(state, state, variance);
+            }
+        }
+    }
+
+    /// Marginalises a landmark: it is forgotten, what it has told is kept.
+    pub fn remove_landmark(&mut self, slot: usize) {
+        let first = self.landmark_state(slot);
+        if let Some(place) = self.landmarks.as_mut().get_mut(slot)
+            && place.take().is_some()
+        {
+            for state in [first, first + 1] {
+                self.covariance.clear(state);
+            }
+        }
+    }
+
+    /// Position of a landmark in W, m.
+    #[must_use]
+    pub fn landmark(&self, slot: usize) -> Option<Point> {
+        self.landmarks.as_ref().get(slot).copied().flatten().map(|landmark| landmark.position)
+    }
+
+    /// Adds a landmark at a slot, where it was seen from a viewpoint of this state.
+    pub fn add_landmark(&mut self, slot: usize, from: &Viewpoint, seen: &Cartesian) {
+        let position = from.locate(&seen.position);
+        // Known to nothing at first; the observation's inverse then gives its correlations.
+        self.add_known_landmark(slot, position, 0.0);
+        let state = self.landmark_state(slot);
+        let Some(place) = self.landmarks.as_mut().get_mut(slot) else { return };
+        let anchor = from.anchor + from.arm + from.outwards(&seen.position);
+        *place = Some(StateLandmark { position, anchor });
+        let reach = anchor - from.anchor;
+        let (by_heading, by_yaw) = (left(&reach), left(&(reach - from.arm)));
+        let shares = [(by_heading.x, by_yaw.x), (by_heading.y, by_yaw.y)];
+        for other in 0..S::STATES {
+            if (state..state + 2).contains(&other) {
+                continue;
+            }
+            let (heading, yaw) = (self.covariance.get(2, other), self.covariance.get(YAW, other));
+            for (axis, (by_heading, by_yaw)) in shares.iter().enumerate() {
+                let value = self.covariance.get(axis, other) + by_heading * heading + by_yaw * yaw;
+                self.covariance.set(state + axis, other, value);
+            }
+        }
+        let turn = Matrix2::new(from.cosine, -from.sine, from.sine, from.cosine);
+        let own = turn * seen.covariance * turn.transpose();
+        for row in 0..2 {
+            for (column, (by_heading, by_yaw)) in shares.iter().enumerate().take(row + 1) {
+                let of = |other: usize| self.covariance.get(state + row, other);
+                let value = of(column) + by_heading * of(2) + by_yaw * of(YAW);
+                let noise = own.get((row, column)).copied().unwrap_or(0.0);
+                self.covariance.set(state + row, state + column, value + noise);
+            }
+        }
+    }
+}

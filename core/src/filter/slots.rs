@@ -1,0 +1,105 @@
+//! What the state of a filter has room for.
+
+use core::fmt::Debug;
+
+use nalgebra::SVector;
+
+use super::packed_covariance::packed_entries;
+use crate::geometry::{Point, Pose};
+
+/// Memory for a number of values that is known when it is compiled.
+pub trait Storage<T>: Clone + Debug + AsRef<[T]> + AsMut<[T]> {
+    /// Memory with the same value everywhere.
+    fn filled(value: T) -> Self;
+}
+
+impl<T: Copy + Debug, const SIZE: usize> Storage<T> for [T; SIZE] {
+    #[inline(always)]
+    fn filled(value: T) -> Self {
+        [value; SIZE]
+    }
+}
+
+/// A pose that was copied when it was the present one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PastPose {
+    /// Pose of R in W.
+    pub pose: Pose,
+    /// Position for the Jacobians, m.
+    pub anchor: Point,
+}
+
+/// A landmark in the state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateLandmark {
+    /// Position in W, m.
+    pub position: Point,
+    /// Position for the Jacobians, m.
+    pub anchor: Point,
+}
+
+/// Room of a filter's state: the pose, and what depends on it. A slot that is free has neither variance nor correlation.
+pub trait Slots: Clone + Debug {
+    /// Scale and steering of the odometry, yaw of the laser: three numbers, or none.
+    type Biases: Storage<f64>;
+    /// Past poses.
+    type Poses: Storage<Option<PastPose>>;
+    /// Landmarks that are found, or seen again, while driving.
+    type Landmarks: Storage<Option<StateLandmark>>;
+    /// Position of the pose for the Jacobians: one, or none if it is that of the pose.
+    type Anchor: Storage<Point>;
+    /// Lower triangle of the covariance.
+    type Covariance: Storage<f64>;
+    /// A row of `SIZE` numbers for each state.
+    type Rows<const SIZE: usize>: Storage<SVector<f64, SIZE>>;
+    /// Number of states.
+    const STATES: usize;
+}
+
+/// The pose alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseOnly;
+
+impl Slots for PoseOnly {
+    type Biases = [f64; 0];
+    type Poses = [Option<PastPose>; 0];
+    type Landmarks = [Option<StateLandmark>; 0];
+    type Anchor = [Point; 0];
+    type Covariance = [f64; 6];
+    type Rows<const SIZE: usize> = [SVector<f64, SIZE>; 3];
+    const STATES: usize = 3;
+}
+
+/// The pose, three biases, `POSES` past poses and `LANDMARKS` landmarks: `STATES` is [`slot_states`] of them, and `ENTRIES`
+/// is [`packed_entries`] of that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseAndSlots<const POSES: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize>;
+
+impl<const POSES: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize> Slots
+    for PoseAndSlots<POSES, LANDMARKS, STATES, ENTRIES>
+{
+    type Biases = [f64; 3];
+    type Poses = [Option<PastPose>; POSES];
+    type Landmarks = [Option<StateLandmark>; LANDMARKS];
+    type Anchor = [Point; 1];
+    type Covariance = [f64; ENTRIES];
+    type Rows<const SIZE: usize> = [SVector<f64, SIZE>; STATES];
+    const STATES: usize = {
+        assert!(STATES == slot_states(POSES, LANDMARKS) && ENTRIES == packed_entries(STATES));
+        STATES
+    };
+}
+
+/// First of the past poses' states.
+const POSES_FROM: usize = 6;
+
+/// States of a filter with room for that many past poses and landmarks.
+#[must_use]
+pub const fn slot_states(poses: usize, landmarks: usize) -> usize {
+    POSES_FROM + 3 * poses + 2 * landmarks
+}
+
+/// First state of a past pose.
+pub(super) const fn pose_state(slot: usize) -> usize {
+    POSES_FROM + 3 * slot
+}

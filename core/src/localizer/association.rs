@@ -1,0 +1,132 @@
+//! Which landmark an observation belongs to.
+
+use super::maps::Maps;
+use super::sighting::Sighting;
+use super::slam::LandmarkSlots;
+use super::{LandmarkSource, MapUse, Parameters};
+use crate::filter::{Ekf, Innovation, Landmark, Linearisation, Slots, Viewpoint};
+use crate::geometry::{Point, difference};
+use crate::maps::{self, LandmarkKind, NearestNeighbour, Verdict};
+
+/// A landmark that an observation was compared with.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub source: LandmarkSource,
+    pub id: u16,
+    pub landmark: Landmark,
+    pub linearisation: Linearisation<2>,
+    pub innovation: Innovation,
+}
+
+/// The nearest landmark and what it is good for.
+#[derive(Clone, Debug)]
+pub(super) struct Association {
+    pub verdict: Verdict,
+    pub nearest: Option<Candidate>,
+}
+
+/// What is compared with the landmarks: something seen from a state of the filter.
+pub(super) struct Comparison<'a, S: Slots> {
+    pub filter: &'a Ekf<S>,
+    pub from: Viewpoint,
+    pub seen: &'a Sighting,
+    /// Where it is in W, m.
+    pub located: Point,
+    pub parameters: &'a Parameters,
+}
+
+impl<'a, S: Slots> Comparison<'a, S> {
+    pub fn new(filter: &'a Ekf<S>, seen: &'a Sighting, parameters: &'a Parameters) -> Self {
+        let from = filter.viewpoint(&parameters.laser);
+        let located = from.locate(&seen.observation.position());
+        Self { filter, from, seen, located, parameters }
+    }
+
+    /// Direction of what is seen in W, rad.
+    pub fn orientation(&self) -> f32 {
+        let sensor = self.filter.pose.theta + self.parameters.laser.theta + self.filter.laser_yaw();
+        difference(f64::from(self.seen.orientation) + sensor, 0.0) as f32
+    }
+
+    fn radius(&self) -> f64 {
+        let association = &self.parameters.association;
+        match self.seen.kind {
+            LandmarkKind::Reflector => association.reflector_radius,
+            _ => association.feature_radius,
+        }
+    }
+
+    fn candidate(&self, source: LandmarkSource, id: u16, landmark: Landmark) -> Option<Candidate> {
+        let linearisation = self.filter.observe(&self.from, &self.seen.observation, &landmark)?;
+        let innovation = self.filter.innovation(&linearisation)?;
+        Some(Candidate { source, id, landmark, linearisation, innovation })
+    }
+
+    /// The best of the candidates, if no other is nearly as good.
+    fn decide(&self, candidates: impl Iterator<Item = Candidate>) -> Association {
+        let association = &self.parameters.association;
+        let mut nearest = NearestNeighbour::default();
+        for candidate in candidates {
+            let normalised_square = candidate.innovation.normalised_square;
+            nearest.consider(candidate, normalised_square);
+        }
+        let (best, verdict) = nearest.decide(association.gate, association.margin);
+        Association { verdict, nearest: best.map(|best| best.landmark) }
+    }
+
+    /// Compares it with the landmarks of the state, if there are `slots`, and with those that were given; and with those of the
+    /// dynamic map only where none of them fits.
+    pub fn associate<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, const LANDMARKS: usize>(
+        &self,
+        maps: &Maps<REFLECTORS, FEATURES, DYNAMIC>,
+        slots: Option<&LandmarkSlots<LANDMARKS>>,
+    ) -> Association {
+        let MapUse { reflectors, features, dynamic, .. } = self.parameters.maps;
+        let kind = self.seen.kind;
+        let in_state = slots.map(|slots| self.in_state(slots));
+        let given = |landmark: &maps::Landmark| {
+            if slots.is_some_and(|slots| slots.has_fixed(landmark.id, landmark.kind)) {
+                return None;
+            }
+            let deviation = f64::from(landmark.deviation);
+            // A landmark that becomes part of the state is correlated with what it has told.
+            let share = if slots.is_some() { 1.0 } else { self.parameters.association.shared_map_error };
+            let variance = share * deviation * deviation;
+            let known = Landmark::Known { position: Point::new(landmark.x, landmark.y), variance };
+            self.candidate(LandmarkSource::Fixed, landmark.id, known)
+        };
+        let in_state = in_state.into_iter().flatten();
+        let radius = self.radius();
+        if kind == LandmarkKind::Reflector {
+            let near = reflectors.then(|| maps.reflectors.near(self.located, radius));
+            return self.decide(in_state.chain(near.into_iter().flatten().filter_map(given)));
+        }
+        let near = features.then(|| maps.features.near(self.located, radius));
+        let near = near.into_iter().flatten().filter(|landmark| landmark.kind == kind);
+        let lasting = self.decide(in_state.chain(near.filter_map(given)));
+        if !dynamic || slots.is_some() || lasting.verdict == Verdict::Accepted {
+            return lasting;
+        }
+        let variance = self.parameters.dynamic_map.deviation * self.parameters.dynamic_map.deviation;
+        let near = maps.dynamic.near(self.located, radius).filter(|landmark| landmark.kind == kind);
+        let found = self.decide(near.filter_map(|landmark| {
+            let known = Landmark::Known { position: landmark.position, variance };
+            self.candidate(LandmarkSource::Dynamic, landmark.id, known)
+        }));
+        if found.nearest.is_some() { found } else { lasting }
+    }
+
+    /// Landmarks of the state that it may be.
+    fn in_state<const LANDMARKS: usize>(&self, slots: &LandmarkSlots<LANDMARKS>) -> impl Iterator<Item = Candidate> {
+        let (radius, orientation) = (self.radius(), self.orientation());
+        let is_near = move |slot: usize| {
+            self.filter.landmark(slot).is_some_and(|position| {
+                libm::fabs(position.x - self.located.x) <= radius && libm::fabs(position.y - self.located.y) <= radius
+            })
+        };
+        slots.occupied().filter_map(move |(slot, landmark)| {
+            let may_be = is_near(slot) && landmark.resembles(self.seen.kind, orientation, &self.parameters.slam);
+            may_be.then(|| self.candidate(landmark.source, landmark.id, Landmark::Slot(slot))).flatten()
+        })
+    }
+}

@@ -1,0 +1,33 @@
+//! Observations as a filter compares them.
+#![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use agv_core::filter::{Cartesian, Ekf, Landmark, Linearisation, Observation, Slots};
+use agv_core::geometry::{Point, Pose};
+use nalgebra::Matrix2x3;
+
+/// What a vehicle at `pose` with its sensor at `mount` makes of an observation of a landmark that is not in the state.
+pub fn linearise(
+    observation: &Observation,
+    pose: &Pose,
+    mount: &Pose,
+    position: &Point,
+    variance: f64,
+) -> Option<Linearisation<2>> {
+    let state = Ekf::new(*pose, 0.0, 0.0);
+    state.observe(&state.viewpoint(mount), observation, &Landmark::Known { position: *position, variance })
+}
+
+/// What a filter makes of a position that is seen from `mount`.
+pub fn observe<S: Slots>(
+    filter: &Ekf<S>,
+    mount: &Pose,
+    seen: &Cartesian,
+    landmark: Landmark,
+) -> Option<Linearisation<2>> {
+    filter.observe(&filter.viewpoint(mount), &Observation::Cartesian(*seen), &landmark)
+}
+
+/// The derivatives by the pose.
+pub fn by_pose(linearisation: &Linearisation<2>) -> Matrix2x3<f64> {
+    Matrix2x3::from_columns(&[0, 1, 2].map(|state| linearisation.terms[state].1))
+}
