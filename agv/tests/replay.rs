@@ -360,10 +360,10 @@ fn reflectors_are_mapped_from_reference_poses_of_the_laser() {
         })
         .collect();
     recording.truth.clear();
-    recording.parameters.laser.theta = FRAC_PI_2;
+    recording.parameters.lasers.first_mut().theta = FRAC_PI_2;
     for event in &mut recording.events {
-        if let agv_host_sim::recording::RecordedEvent::Reflectors(observations) = event {
-            observations.iter_mut().for_each(|observation| observation.bearing -= FRAC_PI_2 as f32);
+        if let agv_host_sim::recording::RecordedEvent::Reflectors(seen) = event {
+            seen.observations.iter_mut().for_each(|observation| observation.bearing -= FRAC_PI_2 as f32);
         }
     }
     log::write(Path::new(&log), &recording).unwrap();

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::Point;
-use agv_core::measurement::{Scan, Time};
+use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::{Keypoint, PointScan, falko};
 
 const BEAMS: usize = 1440;
@@ -32,6 +32,7 @@ pub fn main() {
     let step = TAU / BEAMS as f64;
     let ranges: Vec<f32> = (0..BEAMS).map(|beam| range(beam as f64 * step - PI) as f32).collect();
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: -PI,

@@ -48,7 +48,7 @@ pub fn main() {
         localizer.handle(&Event::Encoders(counters));
         if sample % 12 == 0 {
             let observations = look(&pose, &map, time);
-            let output = localizer.handle(&Event::Reflectors(Reflectors { observations: &observations })).pose;
+            let output = localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations))).pose;
             let error = (output.pose.x - pose.x).hypot(output.pose.y - pose.y);
             println!(
                 "{:.2} s {:?} x {:.3} m, y {:.3} m, off {error:.4} m",

@@ -46,7 +46,7 @@
 //! localizer.handle(&Event::Increment(PoseIncrement { time, displacement: Pose::default() }));
 //! // The reflector is 3.52 m before the laser: the vehicle stands 2 cm further back.
 //! let observations = [ReflectorObservation { time, range: 3.52, bearing: 0.0 }];
-//! let output = localizer.handle(&Event::Reflectors(Reflectors { observations: &observations })).pose;
+//! let output = localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations))).pose;
 //! assert_eq!(output.mode, Mode::Reflectors);
 //! assert!((output.pose.x + 0.02).abs() < 0.002);
 //! ```

@@ -1,7 +1,5 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
-mod augmented_filter;
-mod augmented_places;
 mod calibration;
 mod covariance_repair;
 mod examples;
@@ -31,10 +29,13 @@ mod prediction;
 mod record;
 mod reflector_detection;
 mod reflector_search;
+mod second_laser;
 mod slam;
 mod slip_check;
+mod slot_life;
 mod start_finder;
 mod start_search;
+mod state_slots;
 mod support;
 mod timeline;
 mod uncertain_motion;

@@ -122,7 +122,7 @@ fn motion(step: u64) -> Motion {
 }
 
 fn past() -> Timeline<160> {
-    let mut timeline = Timeline::new(laser(), 0.1);
+    let mut timeline = Timeline::new(0.1);
     assert!(timeline.begun().is_none());
     timeline.begin(Time::default(), Ekf::new(Pose::default(), 0.05, 0.02));
     timeline
@@ -142,7 +142,7 @@ fn observations() -> Vec<(Time, Correction)> {
             let way = time.seconds() / 0.01;
             let pose = Pose::new(0.01 * way + 0.01, 0.003, 0.004 * way);
             let observation = perfect((index % 2) as usize, &pose, &laser(), &landmark);
-            (time, Correction { observation, landmark, landmark_variance: 1e-6 })
+            (time, Correction { observation, mount: laser(), landmark, landmark_variance: 1e-6 })
         })
         .collect()
 }
@@ -186,7 +186,7 @@ fn late_measurements_give_what_timely_ones_would_have_given() {
         }
         for index in order {
             let (time, correction) = seen[index];
-            assert_eq!(timeline.fuse(time, |state| correction.apply(state, &laser()).then_some(correction)), Ok(true));
+            assert_eq!(timeline.fuse(time, |state| correction.apply(state).then_some(correction)), Ok(true));
         }
         assert_close(&timeline.state(), &expected, 1e-9);
     }
@@ -213,12 +213,12 @@ fn at_a_thousand_motions_a_second_the_past_is_as_long_and_the_order_of_measureme
         late.advance(&motion(step));
         timely.advance(&motion(step));
         while let Some((time, correction)) = pending.next_if(|(time, _)| *time <= motion(step).end) {
-            assert_eq!(timely.fuse(*time, |state| correction.apply(state, &laser()).then_some(*correction)), Ok(true));
+            assert_eq!(timely.fuse(*time, |state| correction.apply(state).then_some(*correction)), Ok(true));
         }
     }
     for (time, correction) in seen.iter().rev() {
         assert_eq!(
-            late.fuse(*time, |state| correction.apply(state, &laser()).then_some(*correction)),
+            late.fuse(*time, |state| correction.apply(state).then_some(*correction)),
             Ok(true),
             "{time:?} is remembered"
         );
@@ -238,10 +238,7 @@ fn measurements_ahead_of_the_odometry_are_extrapolated_and_set_right() {
     timeline.advance(&motion(0));
     for step in 1..30 {
         while let Some((time, correction)) = pending.next_if(|(time, _)| *time <= motion(step).end) {
-            assert_eq!(
-                timeline.fuse(*time, |state| correction.apply(state, &laser()).then_some(*correction)),
-                Ok(true)
-            );
+            assert_eq!(timeline.fuse(*time, |state| correction.apply(state).then_some(*correction)), Ok(true));
         }
         timeline.advance(&motion(step));
     }
@@ -260,7 +257,7 @@ fn the_total_displacement_survives_a_wrong_extrapolation() {
         seen.covariance = Matrix2::identity() * 1e12;
     }
     assert_eq!(
-        timeline.fuse(Time::from_micros(17_000), |state| correction.apply(state, &laser()).then_some(correction)),
+        timeline.fuse(Time::from_micros(17_000), |state| correction.apply(state).then_some(correction)),
         Ok(true)
     );
     let stop = Motion { displacement: Pose::new(0.001, 0.0, 0.0), ..motion(1) };
@@ -278,12 +275,12 @@ fn what_is_too_old_or_too_new_is_refused() {
     }
     let (_, correction) = observations()[0];
     assert_eq!(
-        timeline.fuse(Time::from_micros(1_000), |state| correction.apply(state, &laser()).then_some(correction)),
+        timeline.fuse(Time::from_micros(1_000), |state| correction.apply(state).then_some(correction)),
         Err(TimelineError::TooLate)
     );
     let ahead = motion(399).end.offset(0.2);
     assert_eq!(
-        timeline.fuse(ahead, |state| correction.apply(state, &laser()).then_some(correction)),
+        timeline.fuse(ahead, |state| correction.apply(state).then_some(correction)),
         Err(TimelineError::TooEarly)
     );
     let before = timeline.state();
@@ -339,9 +336,9 @@ fn the_filter_is_consistent() {
                 let seen = truth.compose(&laser()).inverse_transform(&landmark);
                 let observation =
                     range_bearing(seen.norm() + 1e-2 * random.next(), seen.y.atan2(seen.x) + 1e-3 * random.next());
-                let correction = Correction { observation, landmark, landmark_variance: 0.0 };
+                let correction = Correction { observation, mount: laser(), landmark, landmark_variance: 0.0 };
                 assert_eq!(
-                    timeline.fuse(believed.end, |state| correction.apply(state, &laser()).then_some(correction)),
+                    timeline.fuse(believed.end, |state| correction.apply(state).then_some(correction)),
                     Ok(true)
                 );
             }

@@ -5,7 +5,7 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason};
 use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
-    EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time,
+    EncoderFault, EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time,
 };
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_core::sensing::{ReflectorDetection, falko};
@@ -57,7 +57,7 @@ impl Drive {
     fn start() -> Self {
         let mut localizer = Box::new(Small::new(parameters()));
         localizer.add_landmarks(&reflectors()).unwrap();
-        Self { localizer, step: 0, offset: 0.0, stood: 0, laser: parameters().laser }
+        Self { localizer, step: 0, offset: 0.0, stood: 0, laser: parameters().lasers.first() }
     }
 
     fn time(&self) -> Time {
@@ -106,7 +106,7 @@ impl Drive {
             .filter(|reflector| sees(reflector.id))
             .filter_map(|reflector| self.observe(start, reflector))
             .collect();
-        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
+        self.localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations)));
     }
 
     /// A revolution of a vehicle that stands at the origin.
@@ -117,7 +117,7 @@ impl Drive {
             self.stood += 1;
             self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive: 0, steering: 0 }));
         }
-        let laser = parameters().laser;
+        let laser = parameters().lasers.first();
         let observations: Vec<_> = reflectors()
             .iter()
             .filter(|reflector| sees(reflector.id))
@@ -128,7 +128,7 @@ impl Drive {
                 bearing: seen.y.atan2(seen.x) as f32,
             })
             .collect();
-        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
+        self.localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations)));
     }
 
     fn observe(&self, start: Time, reflector: &Landmark) -> Option<ReflectorObservation> {
@@ -325,7 +325,15 @@ const BEAM: f64 = 0.12 / 360.0;
 
 fn scan<'a>(start: Time, ranges: &'a [f32], intensities: &'a [u16]) -> Event<'a> {
     let bearing_step = std::f64::consts::TAU / 360.0;
-    Event::Scan(Scan { start, beam_interval: BEAM, first_bearing: 0.0, bearing_step, ranges, intensities })
+    Event::Scan(Scan {
+        laser: LaserId::FIRST,
+        start,
+        beam_interval: BEAM,
+        first_bearing: 0.0,
+        bearing_step,
+        ranges,
+        intensities,
+    })
 }
 
 #[test]
@@ -460,7 +468,7 @@ fn some_false_reflectors_change_nothing() {
             range: 2.0 + 0.3 * (index % 7) as f32,
             bearing: 0.9 * (index % 5) as f32 - 1.3,
         };
-        let outputs = drive.localizer.handle(&Event::Reflectors(Reflectors { observations: &[ghost] }));
+        let outputs = drive.localizer.handle(&Event::Reflectors(Reflectors::of_first(&[ghost])));
         assert_ne!(outputs.uses[0].verdict, Verdict::Accepted);
         assert_eq!(drive.revolutions(1, |_| true).mode, Mode::Reflectors);
     }
@@ -633,9 +641,10 @@ proptest! {
                     observations = seen.iter().map(|&(time, range, bearing)| ReflectorObservation {
                         time: Time::from_micros(time), range, bearing,
                     }).collect();
-                    Event::Reflectors(Reflectors { observations: &observations })
+                    Event::Reflectors(Reflectors::of_first(&observations))
                 }
                 Anything::Scan(start, beam_interval, first_bearing, bearing_step, ranges) => Event::Scan(Scan {
+laser: LaserId::FIRST,
                     start: Time::from_micros(*start),
                     beam_interval: *beam_interval,
                     first_bearing: *first_bearing,

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use crate::support::hall::{cast, corners};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Localizer, OBSERVATIONS, Parameters, PoseFix};
-use agv_core::measurement::{ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::sensing::falko::{Detector, Parameters as Falko};
 use agv_core::sensing::{Keypoint, PointScan, ReflectorDetection, detect_reflectors};
@@ -46,7 +46,7 @@ fn of_too_many_reflectors_those_of_all_directions_are_kept() {
     for count in [1, OBSERVATIONS, OBSERVATIONS + 1, 200, 1000] {
         let mut localizer = localizer();
         let seen = observations(count);
-        let outputs = localizer.handle(&Event::Reflectors(Reflectors { observations: &seen }));
+        let outputs = localizer.handle(&Event::Reflectors(Reflectors::of_first(&seen)));
         assert_eq!(outputs.pose.overflows, u8::from(count > OBSERVATIONS), "{count}");
         assert_eq!(outputs.uses.len(), count.min(OBSERVATIONS));
         if count > OBSERVATIONS {
@@ -66,6 +66,7 @@ fn of_too_many_bright_spots_those_of_all_directions_are_kept() {
         let ranges = vec![5.0; beams];
         let intensities: Vec<u16> = (0..beams).map(|beam| u16::from(beam % 4 == 1)).collect();
         let scan = Scan {
+            laser: LaserId::FIRST,
             start: Time::default(),
             beam_interval: 1e-5,
             first_bearing: -PI,
@@ -88,6 +89,7 @@ fn of_too_many_features_the_best_known_are_kept() {
     let place = Pose::new(0.4, 0.3, 0.2);
     let ranges: Vec<f32> = (0..BEAMS).map(|beam| cast(&place, beam as f64 * bearing_step - PI) as f32).collect();
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: -PI,

@@ -35,8 +35,8 @@ type Set = fn(&mut Parameters, f64);
 #[test]
 fn what_is_no_number_or_beyond_its_bounds_is_named() {
     let cases: [(&'static str, Set); 7] = [
-        ("laser.x", |parameters, value| parameters.laser.x = value),
-        ("laser.theta", |parameters, value| parameters.laser.theta = value),
+        ("laser.x", |parameters, value| parameters.lasers.first_mut().x = value),
+        ("laser.theta", |parameters, value| parameters.lasers.first_mut().theta = value),
         ("odometry.unknown_turn", |parameters, value| parameters.odometry_noise.unknown_turn = value),
         ("reflectors.range_deviation", |parameters, value| parameters.reflectors.range_deviation = value),
         ("association.gate", |parameters, value| parameters.association.gate = value),

@@ -7,8 +7,8 @@ use agv_core::localizer::{
 };
 use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
-    EncoderFault, EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample,
-    Time,
+    EncoderFault, EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan,
+    SpeedSample, Time,
 };
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
@@ -48,9 +48,10 @@ impl Owned {
             Self::EncoderFaults(faults) => Record::Event(Event::EncoderFaults(*faults)),
             Self::Speed(sample) => Record::Event(Event::Speed(*sample)),
             Self::Increment(increment) => Record::Event(Event::Increment(*increment)),
-            Self::Reflectors(observations) => Record::Event(Event::Reflectors(Reflectors { observations })),
+            Self::Reflectors(observations) => Record::Event(Event::Reflectors(Reflectors::of_first(observations))),
             Self::Scan(start, [beam_interval, first_bearing, bearing_step], ranges, intensities) => {
                 Record::Event(Event::Scan(Scan {
+                    laser: LaserId::FIRST,
                     start: *start,
                     beam_interval: *beam_interval,
                     first_bearing: *first_bearing,
@@ -165,6 +166,7 @@ fn landmark_use() -> impl Strategy<Value = LandmarkUse> {
     let numbers = (prop::array::uniform2(single()), prop::array::uniform2(number()), number());
     (time(), landmark_kind(), landmark, verdict, numbers).prop_map(
         |(time, kind, landmark, verdict, (position, residual, test_ratio))| LandmarkUse {
+            laser: LaserId::FIRST,
             located: [residual[1], residual[0]],
             residual_deviation: [test_ratio, residual[0]],
             time,
@@ -487,7 +489,7 @@ fn the_header_of_a_localiser_s_log_states_its_room() {
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 7, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 8, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }
@@ -510,6 +512,7 @@ fn what_does_not_fit_is_refused() {
 
     let ranges = [1.0; 5];
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: 0.0,

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::{Point, Pose, difference};
-use agv_core::measurement::{ReflectorObservation, Scan, Time};
+use agv_core::measurement::{LaserId, ReflectorObservation, Scan, Time};
 use agv_core::sensing::{ReflectorDetection, detect_reflectors};
 use proptest::prelude::*;
 
@@ -54,6 +54,7 @@ impl Sweep {
             }
         }
         let scan = Scan {
+            laser: LaserId::FIRST,
             start: Time::default(),
             beam_interval: interval,
             first_bearing: self.first_bearing,

@@ -8,7 +8,7 @@ use agv_core::filter::{packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::LandmarkKind;
-use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::sensing::ReflectorDetection;
 
@@ -76,7 +76,7 @@ impl Drive {
     /// True pose of S.
     fn sensor(&self, time: Time) -> Pose {
         let way = self.way - self.speed * self.time().since(time);
-        Pose::new(way, 0.0, 0.0).compose(&parameters().laser)
+        Pose::new(way, 0.0, 0.0).compose(&parameters().lasers.first())
     }
 
     /// Takes what is seen of these points in the revolution that began at `start`.
@@ -95,7 +95,7 @@ impl Drive {
             })
             .collect();
         observations.sort_by_key(|seen| seen.time);
-        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations })).pose
+        self.localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations))).pose
     }
 
     /// How far the believed position is from the true one, m.
@@ -130,6 +130,7 @@ fn features_are_at_corners(beams: usize, detection: Option<ReflectorDetection>) 
             .unzip();
         let first_bearing = -FRAC_PI_2;
         let scan = Scan {
+            laser: LaserId::FIRST,
             start,
             beam_interval,
             first_bearing,

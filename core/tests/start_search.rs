@@ -49,7 +49,7 @@ impl Search {
     }
 
     fn see(&mut self, observations: &[ReflectorObservation]) {
-        self.search.handle(&Event::Reflectors(Reflectors { observations }), self.mode, self.map.view());
+        self.search.handle(&Event::Reflectors(Reflectors::of_first(observations)), self.mode, self.map.view());
     }
 
     /// Slices until there is nothing more to do.
@@ -179,7 +179,7 @@ impl Finder {
                 at(&pose, &landmarks[index], Time::from_seconds(self.time - ago(index)))
             })
             .collect();
-        self.tell(&Event::Reflectors(Reflectors { observations: &observations }));
+        self.tell(&Event::Reflectors(Reflectors::of_first(&observations)));
     }
 
     fn search(&mut self) -> StartState {

@@ -43,14 +43,15 @@ fn correction(random: &mut Random) -> Correction {
     let covariance = Matrix2::new(4e-4, 1e-4, 1e-4, 2e-4);
     Correction {
         observation: Observation::Cartesian(Cartesian { position: seen, covariance }),
+        mount: LASER,
         landmark,
         landmark_variance: 1e-6,
     }
 }
 
 fn apply(state: &mut Ekf, correction: &Correction) {
-    let Correction { observation, landmark, landmark_variance } = correction;
-    let linearisation = linearise(observation, &state.pose, &LASER, landmark, *landmark_variance);
+    let Correction { observation, mount, landmark, landmark_variance } = correction;
+    let linearisation = linearise(observation, &state.pose, mount, landmark, *landmark_variance);
     assert!(linearisation.is_some_and(|linearisation| state.correct(&linearisation)));
 }
 
@@ -95,7 +96,7 @@ fn assert_same(a: &Ekf, b: &Ekf) {
 fn the_state_at_any_time_is_that_of_what_was_told_until_then() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
-        let mut timeline: Timeline<160> = Timeline::new(LASER, 0.1);
+        let mut timeline: Timeline<160> = Timeline::new(0.1);
         let (begin, state) = start();
         timeline.begin(begin, state);
         assert_eq!((timeline.start(), timeline.now()), (begin, begin));
@@ -115,7 +116,7 @@ fn the_state_at_any_time_is_that_of_what_was_told_until_then() {
                 let before = in_order(&told, 30, at);
                 let answer = timeline.fuse(at, |state| {
                     assert_same(state, &before);
-                    correction.apply(state, &LASER).then_some(correction)
+                    correction.apply(state).then_some(correction)
                 });
                 assert_eq!(answer, Ok(true));
                 told.push((at, Told::Correction(correction)));
@@ -142,7 +143,7 @@ fn the_state_at_any_time_is_that_of_what_was_told_until_then() {
 fn a_past_that_is_too_short_forgets_the_oldest_and_nothing_else() {
     // Room for 8 entries; corrections take places of motions, and the ring is written round several times.
     let mut random = Random::new(11);
-    let mut timeline: Timeline<8> = Timeline::new(LASER, 0.1);
+    let mut timeline: Timeline<8> = Timeline::new(0.1);
     let (begin, state) = start();
     timeline.begin(begin, state);
     let mut told: Vec<(Time, Told)> = Vec::new();
@@ -153,7 +154,7 @@ fn a_past_that_is_too_short_forgets_the_oldest_and_nothing_else() {
                 let at = time(step - late, 1 + (random.unit() * 9_998.0) as u64);
                 let correction = correction(&mut random);
                 // What is inserted into a full ring may itself be too old.
-                if timeline.fuse(at, |state| correction.apply(state, &LASER).then_some(correction)) == Ok(true) {
+                if timeline.fuse(at, |state| correction.apply(state).then_some(correction)) == Ok(true) {
                     told.push((at, Told::Correction(correction)));
                     told.sort_by_key(|(at, _)| *at);
                 }
@@ -168,7 +169,7 @@ fn a_past_that_is_too_short_forgets_the_oldest_and_nothing_else() {
 
 #[test]
 fn beyond_the_newest_sample_the_last_motion_goes_on_for_a_while() {
-    let mut timeline: Timeline<40> = Timeline::new(LASER, 0.5);
+    let mut timeline: Timeline<40> = Timeline::new(0.5);
     let (begin, state) = start();
     timeline.begin(begin, state);
     timeline.advance(&motion(0));
@@ -210,7 +211,7 @@ fn beyond_the_newest_sample_the_last_motion_goes_on_for_a_while() {
 
 #[test]
 fn the_motions_between_two_times_are_cut_at_both() {
-    let mut timeline: Timeline<40> = Timeline::new(LASER, 0.1);
+    let mut timeline: Timeline<40> = Timeline::new(0.1);
     let (begin, state) = start();
     timeline.begin(begin, state);
     for step in 0..20 {
@@ -251,7 +252,7 @@ fn the_motions_between_two_times_are_cut_at_both() {
 
 #[test]
 fn a_timeline_that_begins_anew_knows_nothing_of_what_was() {
-    let mut timeline: Timeline<40> = Timeline::new(LASER, 0.1);
+    let mut timeline: Timeline<40> = Timeline::new(0.1);
     assert!(timeline.begun().is_none() && timeline.begun_mut().is_none());
     let (begin, state) = start();
     timeline.begin(begin, state);

@@ -13,7 +13,7 @@ use agv_core::record::{
 };
 
 use crate::file_kind;
-use crate::recording::{RecordedEvent, RecordedOutput, Recording};
+use crate::recording::{RecordedOutput, Recording, keep};
 
 /// Name and version that this program leaves in its logs.
 pub const SOFTWARE: &str = concat!("agv ", env!("CARGO_PKG_VERSION"));
@@ -423,7 +423,7 @@ pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Conte
                 Record::Landmarks(piece) => landmarks.extend_from_slice(piece),
                 Record::Event(event) => {
                     is_answer_expected = true;
-                    events.push(RecordedEvent::from(event));
+                    events.push(keep(&event));
                     if events.len() % 1024 == 0 {
                         progress(offset);
                     }

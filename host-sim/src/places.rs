@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use agv_core::geometry::{Pose, ScanPoint};
-use agv_core::measurement::Time;
+use agv_core::measurement::{LaserId, Time};
 use agv_core::sensing::falko::{Detector, Parameters};
 use agv_core::sensing::{Keypoint, PointScan};
 use agv_places::{
@@ -228,6 +228,7 @@ impl PlaceMap {
             .take(PLACES)
             .map(|place| {
                 let observation = observer.observe(&RecordedScan {
+                    laser: LaserId::FIRST,
                     start: Time::default(),
                     beam_interval: 0.0,
                     first_bearing: place.first_bearing,

@@ -1,17 +1,17 @@
 //! A drive in memory: what the sensors said, in the order of arrival, and apart from that where the vehicle really was.
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Event, LandmarkUse, Parameters, PoseFix, PoseOutput};
+use agv_core::localizer::{AnyEvent, AsReflectors, AsScan, Event, LandmarkUse, Parameters, PoseOutput};
 use agv_core::maps::Landmark;
-use agv_core::measurement::{
-    EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
-};
+use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::record::Output;
 pub use agv_core::record::{Reference, Truth};
 
 /// A scan that owns its ranges; the fields are those of [`Scan`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedScan {
+    /// Which laser has measured it.
+    pub laser: LaserId,
     /// When the first beam was measured.
     pub start: Time,
     /// Time between neighbouring beams, s.
@@ -31,6 +31,7 @@ impl RecordedScan {
     #[must_use]
     pub fn view(&self) -> Scan<'_> {
         Scan {
+            laser: self.laser,
             start: self.start,
             beam_interval: self.beam_interval,
             first_bearing: self.first_bearing,
@@ -41,82 +42,58 @@ impl RecordedScan {
     }
 }
 
+impl AsScan for RecordedScan {
+    fn as_scan(&self) -> Scan<'_> {
+        self.view()
+    }
+}
+
+impl From<&Scan<'_>> for RecordedScan {
+    fn from(scan: &Scan) -> Self {
+        Self {
+            laser: scan.laser,
+            start: scan.start,
+            beam_interval: scan.beam_interval,
+            first_bearing: scan.first_bearing,
+            bearing_step: scan.bearing_step,
+            ranges: scan.ranges.to_vec(),
+            intensities: scan.intensities.to_vec(),
+        }
+    }
+}
+
+/// Reflectors of one revolution that are kept; the fields are those of [`Reflectors`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordedReflectors {
+    /// Which laser has found them.
+    pub laser: LaserId,
+    /// Observations in order of time.
+    pub observations: Vec<ReflectorObservation>,
+}
+
+impl AsReflectors for RecordedReflectors {
+    fn as_reflectors(&self) -> Reflectors<'_> {
+        Reflectors { laser: self.laser, observations: &self.observations }
+    }
+}
+
+impl From<Vec<ReflectorObservation>> for RecordedReflectors {
+    /// Those of the laser of a vehicle that has one.
+    fn from(observations: Vec<ReflectorObservation>) -> Self {
+        Self { laser: LaserId::FIRST, observations }
+    }
+}
+
 /// An event that owns what it carries.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RecordedEvent {
-    /// Counters of a tricycle's encoders.
-    Encoders(EncoderSample),
-    /// What is wrong with a tricycle's encoders.
-    EncoderFaults(EncoderFaults),
-    /// Speed and steering angle.
-    Speed(SpeedSample),
-    /// Motion that the vehicle has integrated itself.
-    Increment(PoseIncrement),
-    /// Reflectors of one revolution.
-    Reflectors(Vec<ReflectorObservation>),
-    /// Ranges of one sweep.
-    Scan(RecordedScan),
-    /// A pose from outside.
-    SetPose(PoseFix),
-}
+pub type RecordedEvent = AnyEvent<RecordedReflectors, RecordedScan>;
 
-impl RecordedEvent {
-    /// The event as the core takes it.
-    #[must_use]
-    pub fn view(&self) -> Event<'_> {
-        match self {
-            Self::Encoders(sample) => Event::Encoders(*sample),
-            Self::EncoderFaults(faults) => Event::EncoderFaults(*faults),
-            Self::Speed(sample) => Event::Speed(*sample),
-            Self::Increment(increment) => Event::Increment(*increment),
-            Self::Reflectors(observations) => Event::Reflectors(Reflectors { observations }),
-            Self::Scan(scan) => Event::Scan(scan.view()),
-            Self::SetPose(fix) => Event::SetPose(*fix),
-        }
-    }
-}
-
-impl RecordedEvent {
-    /// Whether somebody has told where the vehicle is.
-    #[must_use]
-    pub fn is_told(&self) -> bool {
-        matches!(self, Self::SetPose(_))
-    }
-
-    /// When it happened; for a revolution, when it began. None for a revolution without reflectors.
-    #[must_use]
-    pub fn time(&self) -> Option<Time> {
-        match self {
-            Self::Encoders(sample) => Some(sample.time),
-            Self::EncoderFaults(faults) => Some(faults.time),
-            Self::Speed(sample) => Some(sample.time),
-            Self::Increment(increment) => Some(increment.time),
-            Self::Reflectors(observations) => observations.first().map(|observation| observation.time),
-            Self::Scan(scan) => Some(scan.start),
-            Self::SetPose(fix) => Some(fix.time),
-        }
-    }
-}
-
-impl From<Event<'_>> for RecordedEvent {
-    fn from(event: Event<'_>) -> Self {
-        match event {
-            Event::Encoders(sample) => Self::Encoders(sample),
-            Event::EncoderFaults(faults) => Self::EncoderFaults(faults),
-            Event::Speed(sample) => Self::Speed(sample),
-            Event::Increment(increment) => Self::Increment(increment),
-            Event::Reflectors(reflectors) => Self::Reflectors(reflectors.observations.to_vec()),
-            Event::Scan(scan) => Self::Scan(RecordedScan {
-                start: scan.start,
-                beam_interval: scan.beam_interval,
-                first_bearing: scan.first_bearing,
-                bearing_step: scan.bearing_step,
-                ranges: scan.ranges.to_vec(),
-                intensities: scan.intensities.to_vec(),
-            }),
-            Event::SetPose(fix) => Self::SetPose(fix),
-        }
-    }
+/// Keeps what an event carries.
+#[must_use]
+pub fn keep(event: &Event) -> RecordedEvent {
+    event.map(
+        |seen| RecordedReflectors { laser: seen.laser, observations: seen.observations.to_vec() },
+        RecordedScan::from,
+    )
 }
 
 /// A drive in memory.
@@ -157,7 +134,7 @@ impl Recording {
     /// The poses of R that the references state: those with a heading, in order of time.
     #[must_use]
     pub fn referenced_poses(&self) -> Vec<Truth> {
-        let laser_in_reverse = self.parameters.laser.inverse();
+        let laser_in_reverse = self.parameters.lasers.first().inverse();
         let poses = self.references.iter().filter_map(|reference| {
             let laser = Pose::new(reference.x, reference.y, reference.heading?);
             Some(Truth { time: reference.time, pose: laser.compose(&laser_in_reverse) })

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Capacities, Parameters, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
-use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, SpeedSample, Time};
+use agv_core::measurement::{EncoderSample, LaserId, PoseIncrement, ReflectorObservation, SpeedSample, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::record::{Damage, DamageReason, Header, Item, Record};
 use agv_host_sim::log::{self, LogError, Reader, Writer};
@@ -34,8 +34,11 @@ fn small_recording() -> Recording {
             RecordedEvent::Encoders(EncoderSample { time: at(1000), drive: 4_294_967_290, steering: 17 }),
             RecordedEvent::Speed(SpeedSample { time: at(2000), speed: 1.5, steering: -0.2 }),
             RecordedEvent::Increment(PoseIncrement { time: at(3000), displacement: Pose::new(0.1, 0.0, 0.02) }),
-            RecordedEvent::Reflectors(vec![ReflectorObservation { time: at(2500), range: 4.0, bearing: 1.0 }; 2]),
+            RecordedEvent::Reflectors(
+                vec![ReflectorObservation { time: at(2500), range: 4.0, bearing: 1.0 }; 2].into(),
+            ),
             RecordedEvent::Scan(RecordedScan {
+                laser: LaserId::FIRST,
                 start: at(4000),
                 beam_interval: 1e-5,
                 first_bearing: -1.0,
@@ -90,6 +93,7 @@ proptest! {
     fn long_drives_survive_too(lengths in prop::collection::vec(0_usize..4000, 0..200), first in -1e3_f32..1e3) {
         let mut recording = small_recording();
         recording.events.extend(lengths.iter().enumerate().map(|(index, length)| RecordedEvent::Scan(RecordedScan {
+            laser: LaserId::FIRST,
             start: Time::from_micros(index as u64),
             beam_interval: 0.0,
             first_bearing: 0.0,
@@ -273,7 +277,7 @@ fn two_drives_in_one_file_are_refused() {
     let (_folder, path) = written(&small_recording());
     let first = std::fs::read(&path).unwrap();
     let mut other = small_recording();
-    other.parameters.laser = Pose::new(0.0, 0.0, 0.0);
+    *other.parameters.lasers.first_mut() = Pose::new(0.0, 0.0, 0.0);
     log::write(&path, &other).unwrap();
     let second = std::fs::read(&path).unwrap();
     std::fs::write(&path, [first.clone(), second].concat()).unwrap();

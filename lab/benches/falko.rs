@@ -7,7 +7,7 @@ mod scene;
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
 
-use agv_core::measurement::{Scan, Time};
+use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::falko::Detector;
 use agv_core::sensing::{Keypoint, PointScan};
 use agv_host_sim::data;
@@ -44,6 +44,7 @@ fn storage(criterion: &mut Criterion) {
     let storage = scene::Scene::block_storage(&mut random);
     let ranges = storage.scan([4.0, 0.1, 0.05], BEAMS, -PI, 0.01, &mut random);
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: -PI,

@@ -62,7 +62,7 @@ fn steps(criterion: &mut Criterion) {
     });
     let ready = localizer();
     // Seen 2 cm from where the reflector at (2.3 m, 0.4 m) is expected.
-    let pose = ready.outputs().pose.pose.compose(&parameters().laser);
+    let pose = ready.outputs().pose.pose.compose(&parameters().lasers.first());
     let seen = pose.inverse_transform(&nalgebra::Vector2::new(2.32, 0.4));
     let observation = ReflectorObservation {
         time: Time::from_micros(490_000),
@@ -73,7 +73,8 @@ fn steps(criterion: &mut Criterion) {
         bencher.iter_batched_ref(
             || ready.clone(),
             |localizer| {
-                let event = Event::Reflectors(Reflectors { observations: &[black_box(observation)] });
+                let one = [black_box(observation)];
+                let event = Event::Reflectors(Reflectors::of_first(&one));
                 localizer.handle(&event).uses.len()
             },
             BatchSize::LargeInput,

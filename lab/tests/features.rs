@@ -1,7 +1,7 @@
 //! How keypoints and their descriptors are measured.
 
 use agv_core::geometry::Point;
-use agv_core::measurement::Time;
+use agv_core::measurement::{LaserId, Time};
 use agv_host_sim::recording::RecordedScan;
 use agv_lab::evaluate::features::{Comparison, Disturbance, curve, stability};
 
@@ -21,6 +21,7 @@ fn wall() -> RecordedScan {
     // Beams at 0, 10, 20 degrees onto the wall x = 2.
     let step = 10_f64.to_radians();
     RecordedScan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: 0.0,

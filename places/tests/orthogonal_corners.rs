@@ -2,7 +2,7 @@
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::{Point, Pose, difference};
-use agv_core::measurement::{Scan, Time};
+use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::{Keypoint, PointScan};
 use agv_places::{HoughSpectrum, OrthogonalCorners};
 use proptest::prelude::*;
@@ -22,6 +22,7 @@ fn room(sensor: &Pose) -> PointScan<BEAMS> {
         })
         .collect();
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: 0.0,
@@ -73,6 +74,7 @@ proptest! {
 fn a_scan_of_nothing_has_no_direction() {
     let mut points = PointScan::<BEAMS>::new();
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing: 0.0,

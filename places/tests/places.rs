@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use agv_core::geometry::fit_rigid;
 use agv_core::geometry::{Point, Pose, ScanPoint, difference};
-use agv_core::measurement::{Scan, Time};
+use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::{Keypoint, KeypointKind, PointScan};
 use agv_places::{
     AffineHough, Candidate, Compatibility, Correspondence, CorrespondenceGraph, Glare, GlareParameters, GlareTables,
@@ -280,6 +280,7 @@ fn room_swept(pose: &Pose, first_bearing: f64, bearing_step: f64, beams: usize) 
         })
         .collect();
     let scan = Scan {
+        laser: LaserId::FIRST,
         start: Time::default(),
         beam_interval: 0.0,
         first_bearing,

@@ -51,6 +51,24 @@ macro_rules! tricycle_number {
     };
 }
 
+/// A part of the first laser's mount.
+macro_rules! mount {
+    ($key:literal, $name:literal, $unit:literal, $field:ident) => {
+        Leaf {
+            key: $key,
+            name: $name,
+            unit: $unit,
+            bounds: bounds($name),
+            get: |settings| Some(Value::Number(settings.parameters.lasers.first().$field)),
+            set: |settings, value| {
+                let Value::Number(number) = value else { return false };
+                settings.parameters.lasers.first_mut().$field = number;
+                true
+            },
+        }
+    };
+}
+
 /// How many values a counter of a tricycle takes.
 macro_rules! counter {
     ($key:literal, $name:literal, $field:ident) => {
@@ -136,9 +154,9 @@ pub static LEAVES: [Leaf; 60] = [
     tricycle_number!(104, "vehicle.steering_offset_backward", "rad", steering_offset_backward),
     counter!(105, "vehicle.drive_counter_values", drive_range),
     counter!(106, "vehicle.steering_counter_values", steering_range),
-    number!(120, "laser.x", "m", parameters.laser.x),
-    number!(121, "laser.y", "m", parameters.laser.y),
-    number!(122, "laser.theta", "rad", parameters.laser.theta),
+    mount!(120, "laser.x", "m", x),
+    mount!(121, "laser.y", "m", y),
+    mount!(122, "laser.theta", "rad", theta),
     number!(140, "odometry.speed_deviation", "m/s", parameters.odometry_noise.speed),
     number!(141, "odometry.steering_deviation", "rad", parameters.odometry_noise.steering),
     number!(142, "odometry.slip", "m/sqrt(m)", parameters.odometry_noise.slip),

@@ -27,7 +27,7 @@ const WORK: [&str; 14] = [
     "8timeline",
     "7machine",
     "5falko",
-    "9augmented",
+    "11slot_states",
     "17motion_correction",
     "12start_finder",
     "11relocalizer",

@@ -42,7 +42,8 @@ fn standing() -> Recording {
         })
     };
     let stand = first(&recording.events).unwrap();
-    let is_seen = |event: &&RecordedEvent| matches!(event, RecordedEvent::Reflectors(seen) if !seen.is_empty());
+    let is_seen =
+        |event: &&RecordedEvent| matches!(event, RecordedEvent::Reflectors(seen) if !seen.observations.is_empty());
     let mut events = vec![recording.events.iter().find(is_seen).unwrap().clone()];
     let counts = (0..(100.0 * SECONDS) as u32).map(|step| {
         RecordedEvent::Encoders(EncoderSample { time: stand.time.offset(0.01 * f64::from(step)), ..stand })

@@ -131,7 +131,7 @@ fn reflectors_that_are_no_numbers_are_noticed() {
                 ..*seen
             };
             let observations: Vec<_> = revolution.iter().enumerate().map(spoil).collect();
-            log.add(&Event::Reflectors(Reflectors { observations: &observations }));
+            log.add(&Event::Reflectors(Reflectors::of_first(&observations)));
         }
         log
     };

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use super::capture;
 
 use agv_controller::EncoderNodes;
-use agv_core::localizer::{Event, Localizer};
+use agv_core::localizer::Localizer;
 use agv_core::record::{Item, RawSource, Record};
 use agv_host_sim::import::raw::{self, Bus, EventMaker};
 use agv_host_sim::link::clock::Clock;
@@ -97,6 +97,7 @@ pub fn check_events(turns: &[Turn], recorded: &[RecordedEvent]) -> (Vec<usize>, 
         let [RecordedEvent::Reflectors(reflectors), RecordedEvent::Scan(scan)] = pair else {
             panic!("reflectors and scan come together")
         };
+        let reflectors = &reflectors.observations;
         let (number, turn) = turn(turns, &scan.ranges).expect("the scan was served");
         numbers.push(number);
         assert_eq!(scan.intensities, turn.remission);
@@ -190,20 +191,19 @@ pub fn localises(simulated: &Recording, recorded: &Recording, numbers: &[usize],
         let mut poses = Vec::new();
         for event in &simulated.events {
             match event {
-                RecordedEvent::Reflectors(observations) => {
-                    let Some(first) = observations.first() else { continue };
+                RecordedEvent::Reflectors(seen) => {
+                    let Some(first) = seen.observations.first() else { continue };
                     let number = turns.partition_point(|turn| turn.start <= first.time) - 1;
                     let Some(place) = numbers.iter().position(|known| *known == number) else { continue };
                     if is_live {
                         let RecordedEvent::Reflectors(found) = &recorded.events[2 * place] else { panic!() };
                         let RecordedEvent::Scan(scan) = &recorded.events[2 * place + 1] else { panic!() };
                         let mut shifted = found.clone();
-                        for observation in &mut shifted {
+                        for observation in &mut shifted.observations {
                             let since = observation.time.since(scan.start);
                             observation.time = turns[number].start.offset(since);
                         }
-                        let observations = agv_core::measurement::Reflectors { observations: &shifted };
-                        localizer.handle(&Event::Reflectors(observations));
+                        localizer.handle(&RecordedEvent::Reflectors(shifted).view());
                     } else {
                         localizer.handle(&event.view());
                     }

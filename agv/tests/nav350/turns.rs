@@ -46,7 +46,7 @@ fn the_sensor_turns_where_there_is_nothing_to_see() {
         bearing: frame.bearing(core::f64::consts::PI) as f32,
     };
     recording.events.retain(|event| !matches!(event, RecordedEvent::Reflectors(_)));
-    recording.events.extend([2.0, 5.0].map(|turn| RecordedEvent::Reflectors(vec![half(turn)])));
+    recording.events.extend([2.0, 5.0].map(|turn| RecordedEvent::Reflectors(vec![half(turn)].into())));
     let drive = Drive::new(&recording, frame).unwrap();
     let starts: Vec<Time> = drive.turns().iter().map(|turn| turn.start).collect();
     let expected: Vec<Time> = (0..6).map(|turn| START.offset(f64::from(turn) * frame.period)).collect();

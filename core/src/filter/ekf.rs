@@ -14,6 +14,7 @@ use super::positive_semidefinite::make_positive_semidefinite;
 use super::slots::{PoseOnly, Slots, Storage, pose_state, slot_states};
 use super::{Linearisation, Observation, PackedCovariance};
 use crate::geometry::{Point, Pose, wrap};
+use crate::measurement::LaserId;
 use crate::odometry::{BiasJacobian, Motion, OdometryBias};
 
 /// The extended Kalman filter (K 5.3) with room for `S` beside the pose.
@@ -258,10 +259,11 @@ impl<S: Slots> Ekf<S> {
         self.anchor.as_mut().fill(pose.position());
     }
 
-    /// Where a sensor at `mount` in R is.
+    /// Where a laser is that is mounted at `mount` in R. The yaw of the first one is part of the state.
     #[must_use]
-    pub fn viewpoint(&self, mount: &Pose) -> Viewpoint {
-        Viewpoint::new(&self.pose, self.anchor(), mount, self.laser_yaw())
+    pub fn viewpoint(&self, laser: LaserId, mount: &Pose) -> Viewpoint {
+        let yaw = (laser == LaserId::FIRST && self.has_biases()).then(|| self.laser_yaw());
+        Viewpoint::new(&self.pose, self.anchor(), mount, yaw)
     }
 
     /// Compares an observation from a viewpoint of this state with a landmark. None if the landmark is at the sensor, or in
@@ -286,7 +288,7 @@ impl<S: Slots> Ekf<S> {
         let [by_x, by_y] = model.by_position;
         let mut linearisation =
             Linearisation::new(model.residual, model.covariance).with(0, by_x).with(1, by_y).with(2, model.by_heading);
-        if self.has_biases() {
+        if from.has_yaw {
             linearisation = linearisation.with(YAW, model.by_yaw);
         }
         if let Some(slot) = slot {

@@ -29,6 +29,8 @@ pub struct Viewpoint {
     pub(super) sine: f64,
     /// Its cosine.
     pub(super) cosine: f64,
+    /// Whether the yaw is part of the state.
+    pub(super) has_yaw: bool,
 }
 
 /// A landmark, as it is believed to be.
@@ -58,16 +60,16 @@ pub(super) struct Model {
 }
 
 impl Viewpoint {
-    /// S is mounted at `mount` in R, turned by `yaw` (rad) from there.
-    pub(super) fn new(pose: &Pose, anchor: Point, mount: &Pose, yaw: f64) -> Self {
+    /// S is mounted at `mount` in R, turned from there by the `yaw` (rad) of the state, if that is there.
+    pub(super) fn new(pose: &Pose, anchor: Point, mount: &Pose, yaw: Option<f64>) -> Self {
         let (heading_sine, heading_cosine) = libm::sincos(pose.theta);
-        let theta = pose.theta + mount.theta + yaw;
+        let theta = pose.theta + mount.theta + yaw.unwrap_or(0.0);
         let (sine, cosine) = libm::sincos(theta);
         let arm = Point::new(
             heading_cosine * mount.x - heading_sine * mount.y,
             heading_sine * mount.x + heading_cosine * mount.y,
         );
-        Self { position: pose.position(), anchor, arm, theta, sine, cosine }
+        Self { position: pose.position(), anchor, arm, theta, sine, cosine, has_yaw: yaw.is_some() }
     }
 
     /// From W to S.
@@ -78,6 +80,12 @@ impl Viewpoint {
     /// From S to W.
     pub(super) fn outwards(&self, vector: &Point) -> Point {
         Point::new(self.cosine * vector.x - self.sine * vector.y, self.sine * vector.x + self.cosine * vector.y)
+    }
+
+    /// Direction of S in W, rad, not wrapped.
+    #[must_use]
+    pub const fn theta(&self) -> f64 {
+        self.theta
     }
 
     /// Where a point that is seen at `position` in S is in W, m.

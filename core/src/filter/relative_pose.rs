@@ -1,4 +1,4 @@
-//! A past place of S, seen from the present one.
+//! A past place of the first laser, seen from the present one.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,6 +7,7 @@ use super::observation::{Viewpoint, left};
 use super::slots::{Slots, pose_state};
 use super::{Ekf, Linearisation};
 use crate::geometry::{Point, Pose, difference};
+use crate::measurement::LaserId;
 
 /// Pose of S relative to a past one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +32,10 @@ impl<S: Slots> Ekf<S> {
     pub fn observe_relative_pose(&self, slot: usize, seen: &RelativePose, mount: &Pose) -> Option<Linearisation<3>> {
         let expected = self.expected_relative_pose(slot, mount)?;
         let past = self.poses.as_ref().get(slot).copied().flatten()?;
-        let (now, then) = (self.viewpoint(mount), Viewpoint::new(&past.pose, past.anchor, mount, self.laser_yaw()));
+        let (now, then) = (
+            self.viewpoint(LaserId::FIRST, mount),
+            Viewpoint::new(&past.pose, past.anchor, mount, Some(self.laser_yaw())),
+        );
         let residual = Vector3::new(
             seen.pose.x - expected.x,
             seen.pose.y - expected.y,

@@ -121,7 +121,8 @@ impl<S: Slots> Ekf<S> {
             if (state..state + 2).contains(&other) {
                 continue;
             }
-            let (heading, yaw) = (self.covariance.get(2, other), self.covariance.get(YAW, other));
+            let yaw = if from.has_yaw { self.covariance.get(YAW, other) } else { 0.0 };
+            let heading = self.covariance.get(2, other);
             for (axis, (by_heading, by_yaw)) in shares.iter().enumerate() {
                 let value = self.covariance.get(axis, other) + by_heading * heading + by_yaw * yaw;
                 self.covariance.set(state + axis, other, value);
@@ -132,7 +133,8 @@ impl<S: Slots> Ekf<S> {
         for row in 0..2 {
             for (column, (by_heading, by_yaw)) in shares.iter().enumerate().take(row + 1) {
                 let of = |other: usize| self.covariance.get(state + row, other);
-                let value = of(column) + by_heading * of(2) + by_yaw * of(YAW);
+                let yaw = if from.has_yaw { of(YAW) } else { 0.0 };
+                let value = of(column) + by_heading * of(2) + by_yaw * yaw;
                 let noise = own.get((row, column)).copied().unwrap_or(0.0);
                 self.covariance.set(state + row, state + column, value + noise);
             }

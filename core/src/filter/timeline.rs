@@ -14,7 +14,7 @@ use heapless::Deque;
 
 use super::{Ekf, Landmark, Observation};
 use crate::geometry::{Point, Pose};
-use crate::measurement::Time;
+use crate::measurement::{LaserId, Time};
 use crate::odometry::Motion;
 
 /// Motions become one up to this time, us; one that takes more than half of it stays as it is.
@@ -25,6 +25,8 @@ const LONGEST_JOINED: u64 = 14_000;
 pub struct Correction {
     /// What was seen.
     pub observation: Observation,
+    /// Pose of the sensor in R.
+    pub mount: Pose,
     /// Where the landmark is, m, in W.
     pub landmark: Point,
     /// Variance of the landmark's position an axis, m^2.
@@ -61,23 +63,23 @@ impl Entry {
         self.motion.end
     }
 
-    fn recompute(&mut self, before: &Ekf, laser: &Pose) {
+    fn recompute(&mut self, before: &Ekf) {
         if matches!(self.fusion, Fusion::Given) {
             return;
         }
         self.state = *before;
         self.state.predict(&self.motion);
         if let Fusion::Correction(correction) = &self.fusion {
-            correction.apply(&mut self.state, laser);
+            correction.apply(&mut self.state);
         }
     }
 }
 
 impl Correction {
-    /// Corrects a state, with the laser at `laser` in R. False, and nothing changed, if the filter refuses it as singular.
-    pub fn apply(&self, state: &mut Ekf, laser: &Pose) -> bool {
+    /// Corrects a state. False, and nothing changed, if the filter refuses it as singular.
+    pub fn apply(&self, state: &mut Ekf) -> bool {
         let landmark = Landmark::Known { position: self.landmark, variance: self.landmark_variance };
-        match state.observe(&state.viewpoint(laser), &self.observation, &landmark) {
+        match state.observe(&state.viewpoint(LaserId::FIRST, &self.mount), &self.observation, &landmark) {
             Some(linearisation) => state.correct(&linearisation),
             None => false,
         }
@@ -96,14 +98,13 @@ pub struct Timeline<const ENTRIES: usize> {
     last_motion: Motion,
     odometry_pose: Pose,
     start: Time,
-    laser: Pose,
     longest_extrapolation: f64,
 }
 
 impl<const ENTRIES: usize> Timeline<ENTRIES> {
     /// A timeline that has not begun.
     #[must_use]
-    pub fn new(laser: Pose, longest_extrapolation: f64) -> Self {
+    pub fn new(longest_extrapolation: f64) -> Self {
         let time = Time::default();
         Self {
             entries: Deque::new(),
@@ -112,7 +113,6 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
             last_motion: Motion::none(time),
             odometry_pose: Pose::default(),
             start: time,
-            laser,
             longest_extrapolation,
         }
     }
@@ -394,7 +394,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         }
         self.make_room();
         let mut entry = Entry { motion, fusion: Fusion::Nothing, state };
-        entry.recompute(&state, &self.laser);
+        entry.recompute(&state);
         let _ = self.entries.push_back(entry);
         self.settled = self.entries.len();
     }
@@ -449,7 +449,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
             return;
         };
         for entry in self.entries.iter_mut().skip(first).take(count - first) {
-            entry.recompute(&before, &self.laser);
+            entry.recompute(&before);
             before = entry.state;
         }
         self.settled = count;

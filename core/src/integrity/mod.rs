@@ -22,7 +22,7 @@ pub use slip_check::SlipCheck;
 
 use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
-use crate::measurement::Time;
+use crate::measurement::{LASERS, LaserId, Time};
 use crate::state::LandmarkUse;
 
 /// All checks of one vehicle.
@@ -30,7 +30,8 @@ use crate::state::LandmarkUse;
 pub struct Integrity {
     /// What observations say of the pose.
     pub innovations: InnovationMonitor,
-    slip: SlipCheck,
+    /// One for each laser: they see the same landmarks at other times.
+    slip: [SlipCheck; LASERS],
     jumps: JumpCheck,
     mounting: MountingCheck,
 }
@@ -52,7 +53,7 @@ impl Integrity {
     pub fn new(parameters: InnovationMonitorParameters) -> Self {
         Self {
             innovations: InnovationMonitor::new(parameters),
-            slip: SlipCheck::new(),
+            slip: [const { SlipCheck::new() }; LASERS],
             jumps: JumpCheck::new(),
             mounting: MountingCheck::new(),
         }
@@ -64,7 +65,9 @@ impl Integrity {
             self.mounting.suspect_laser();
         }
         self.innovations = InnovationMonitor::new(parameters);
-        self.slip.clear();
+        for slip in &mut self.slip {
+            slip.clear();
+        }
         self.mounting.restart();
         self.jumps.forget();
     }
@@ -74,16 +77,17 @@ impl Integrity {
         self.jumps.forget();
     }
 
-    /// Takes the reflectors of a revolution that ended at `now`, be it none; `to_odometry` is the pose of W in the frame of the
+    /// Takes the reflectors of a revolution of a laser that ended at `now`, be it none; `to_odometry` is the pose of W in the frame of the
     /// odometry. True if the laser has moved otherwise than the odometry says.
-    pub fn see_reflectors(&mut self, now: Time, to_odometry: &Pose, uses: &[LandmarkUse]) -> bool {
-        self.slip.begin(now);
+    pub fn see_reflectors(&mut self, laser: LaserId, now: Time, to_odometry: &Pose, uses: &[LandmarkUse]) -> bool {
+        let Some(slip) = self.slip.get_mut(laser.index()) else { return false };
+        slip.begin(now);
         for seen in uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector) {
             let [x, y] = seen.position.map(f64::from);
             let place = to_odometry.transform(&Point::from(seen.located));
-            self.slip.see(&place, libm::hypot(x, y));
+            slip.see(&place, libm::hypot(x, y));
         }
-        self.slip.disagrees()
+        slip.disagrees()
     }
 
     /// Takes what an event has made of the estimate; see [`JumpCheck::correct`]. What corrects nothing tells nothing.

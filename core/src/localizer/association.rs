@@ -37,15 +37,14 @@ pub(super) struct Comparison<'a, S: Slots> {
 
 impl<'a, S: Slots> Comparison<'a, S> {
     pub fn new(filter: &'a Ekf<S>, seen: &'a Sighting, parameters: &'a Parameters) -> Self {
-        let from = filter.viewpoint(&parameters.laser);
+        let from = filter.viewpoint(seen.laser, &seen.mount);
         let located = from.locate(&seen.observation.position());
         Self { filter, from, seen, located, parameters }
     }
 
     /// Direction of what is seen in W, rad.
     pub fn orientation(&self) -> f32 {
-        let sensor = self.filter.pose.theta + self.parameters.laser.theta + self.filter.laser_yaw();
-        difference(f64::from(self.seen.orientation) + sensor, 0.0) as f32
+        difference(f64::from(self.seen.orientation) + self.from.theta(), 0.0) as f32
     }
 
     fn radius(&self) -> f64 {

@@ -68,9 +68,9 @@ const BOUNDS: [Bound; 41] = [
         most: TURN,
         get: |parameters| Some(tricycle(parameters)?.steering_offset_backward),
     },
-    Bound { leaf: "laser.x", least: -20.0, most: 20.0, get: |parameters| Some(parameters.laser.x) },
-    Bound { leaf: "laser.y", least: -20.0, most: 20.0, get: |parameters| Some(parameters.laser.y) },
-    Bound { leaf: "laser.theta", least: -TURN, most: TURN, get: |parameters| Some(parameters.laser.theta) },
+    Bound { leaf: "laser.x", least: -20.0, most: 20.0, get: |parameters| Some(parameters.lasers.first().x) },
+    Bound { leaf: "laser.y", least: -20.0, most: 20.0, get: |parameters| Some(parameters.lasers.first().y) },
+    Bound { leaf: "laser.theta", least: -TURN, most: TURN, get: |parameters| Some(parameters.lasers.first().theta) },
     Bound {
         leaf: "odometry.speed_deviation",
         least: 0.0,

@@ -95,6 +95,7 @@ impl<'a> Evidence<'a> {
         let innovation = outcome.landmark.map(|(_, _, innovation)| innovation);
         let is_told = self.outputs.uses.push(LandmarkUse {
             time: sighting.time,
+            laser: sighting.laser,
             kind: sighting.kind,
             landmark: outcome.landmark.map(|(source, id, _)| (source, id)),
             verdict: outcome.verdict,

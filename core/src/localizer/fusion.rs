@@ -51,9 +51,12 @@ fn correct<S: Slots, const REFLECTORS: usize, const FEATURES: usize, const DYNAM
         slots.see(slot);
     }
     let correction = match landmark {
-        Landmark::Known { position, variance } if is_used => {
-            Some(Correction { observation: seen.observation, landmark: position, landmark_variance: variance })
-        }
+        Landmark::Known { position, variance } if is_used => Some(Correction {
+            observation: seen.observation,
+            mount: seen.mount,
+            landmark: position,
+            landmark_variance: variance,
+        }),
         _ => None,
     };
     (Outcome { is_used, ..outcome }, correction)
@@ -142,7 +145,7 @@ impl<
             let Ok(state) = timeline.state_at(sighting.time) else {
                 continue;
             };
-            let position = sighting.observation.locate(&state.pose, &self.parameters.laser);
+            let position = sighting.observation.locate(&state.pose, &sighting.mount);
             match (sighting.matched, sighting.verdict) {
                 (Some(id), _) => self.maps.dynamic.update(id, position),
                 (None, Verdict::Unknown | Verdict::Gated) => self.maps.dynamic.insert(sighting.kind, position),

@@ -1,7 +1,8 @@
 //! With landmarks or past poses in the state the filter stands a little in the past: at the middle of what it has used last.
 
 use super::Localizer;
-use crate::measurement::{Scan, Time};
+use crate::geometry::Pose;
+use crate::measurement::{LaserId, Scan, Time};
 
 impl<
     const BEAMS: usize,
@@ -15,12 +16,12 @@ impl<
 > Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
 {
     /// Fuses the reflectors of the workspace that came without a scan.
-    pub(super) fn fuse_lone_reflectors_by_slam(&mut self) {
+    pub(super) fn fuse_lone_reflectors_by_slam(&mut self, mount: &Pose) {
         let sightings = &self.workspace.sightings;
         let (Some(first), Some(last)) = (sightings.first(), sightings.last()) else { return };
         let (start, end) = (first.time, last.time);
         let Some(timeline) = self.timeline.begun() else { return };
-        self.workspace.path.set(start, &self.parameters.laser, timeline.relative_path(start, end));
+        self.workspace.path.set(start, mount, timeline.relative_path(start, end));
         self.fuse_reflectors_by_slam(start);
     }
 
@@ -38,8 +39,8 @@ impl<
     }
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
-    pub(super) fn fuse_scan_by_slam(&mut self, scan: &Scan) {
-        self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
+    pub(super) fn fuse_scan_by_slam(&mut self, mount: &Pose, scan: &Scan) {
+        self.outputs.has_cut |= self.workspace.see_features(&self.parameters, mount, scan);
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }
@@ -47,10 +48,16 @@ impl<
             return;
         }
         let place = self.workspace.path.place(self.slam.time().since(scan.start));
-        self.slam.align(&self.workspace.points, &place, &self.parameters);
+        // Key scans are those of the first laser.
+        let is_first = scan.laser == LaserId::FIRST;
+        if is_first {
+            self.slam.align(&self.workspace.points, &place, &self.parameters);
+        }
         self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
-        self.slam.keep(&self.workspace.points, &place, &self.parameters);
+        if is_first {
+            self.slam.keep(&self.workspace.points, &place, &self.parameters);
+        }
         self.end_slam();
     }
 

@@ -12,7 +12,7 @@ use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::{Estimate, Integrity, Replacement, is_sure};
 use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView};
-use crate::measurement::{EncoderFaults, Scan, Time};
+use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
 use crate::sensing::{PointScan, SensorPath, detect_reflectors, falko};
 
@@ -117,7 +117,7 @@ impl<
                 features: FixedMap::new(),
                 dynamic: DynamicMap::new(parameters.dynamic_map),
             },
-            timeline: Timeline::new(parameters.laser, parameters.limits.longest_extrapolation),
+            timeline: Timeline::new(parameters.limits.longest_extrapolation),
             slam: Slam::new(),
             integrity: Integrity::new(parameters.consistency),
             lost: None,
@@ -225,7 +225,7 @@ impl<
         }
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
-        let is_revolution = self.tells_reflectors(event);
+        let revolution_of = event.laser().filter(|_| self.tells_reflectors(event));
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);
@@ -240,22 +240,12 @@ impl<
                 let motion = self.odometer.increment(increment);
                 self.move_by(increment.time, motion);
             }
-            Event::Reflectors(reflectors) if self.parameters.maps.reflectors => {
-                self.workspace.sightings.clear();
-                self.outputs.has_cut |=
-                    see_reflectors(&self.parameters, reflectors.observations, &mut self.workspace.sightings);
-                if self.parameters.maps.slam {
-                    self.fuse_lone_reflectors_by_slam();
-                } else {
-                    self.fuse(self.timeline.now());
-                }
-            }
-            Event::Reflectors(_) => {}
+            Event::Reflectors(seen) => self.reflectors_of(seen),
             Event::Scan(scan) => self.scan(scan),
             Event::SetPose(fix) => self.set_pose(fix),
         }
         if let Some(before) = before {
-            self.check(&before, is_revolution);
+            self.check(&before, revolution_of);
         }
         self.publish(sees);
         &self.outputs
@@ -270,14 +260,14 @@ impl<
     }
 
     /// Lets the checks compare what an event has shown with what the odometry says; `before` is the estimate before it was
-    /// used, and `is_revolution` says whether the event tells the reflectors of a revolution: one that tells none
-    /// contradicts none.
-    fn check(&mut self, before: &Estimate, is_revolution: bool) {
+    /// used, and `revolution_of` is the laser whose reflectors of a revolution the event tells, if it does: one that tells
+    /// none contradicts none.
+    fn check(&mut self, before: &Estimate, revolution_of: Option<LaserId>) {
         let Some(after) = self.estimate() else { return };
         let uses = &self.outputs.uses;
-        if is_revolution {
+        if let Some(laser) = revolution_of {
             let to_odometry = before.odometry_pose.compose(&before.pose.inverse());
-            let slips = self.integrity.see_reflectors(self.timeline.now(), &to_odometry, uses);
+            let slips = self.integrity.see_reflectors(laser, self.timeline.now(), &to_odometry, uses);
             if slips && self.lost.is_none() {
                 self.lost = Some(Reason::MotionDisagrees);
             }
@@ -469,19 +459,42 @@ impl<
         self.outage = Some(Outage { reason, coasting, since: Time::default() });
     }
 
+    /// Takes reflectors that a laser has found.
+    fn reflectors_of(&mut self, seen: &Reflectors) {
+        if !self.parameters.maps.reflectors {
+            return;
+        }
+        let Some(mount) = self.parameters.lasers.mount(seen.laser).copied() else {
+            self.outputs.misuse = Some(Misuse::UnknownLaser);
+            return;
+        };
+        self.workspace.sightings.clear();
+        self.outputs.has_cut |= see_reflectors(&self.parameters, &mount, seen, &mut self.workspace.sightings);
+        if self.parameters.maps.slam {
+            self.fuse_lone_reflectors_by_slam(&mount);
+        } else {
+            self.fuse(self.timeline.now());
+        }
+    }
+
     fn scan(&mut self, scan: &Scan) {
+        let Some(mount) = self.parameters.lasers.mount(scan.laser).copied() else {
+            self.outputs.misuse = Some(Misuse::UnknownLaser);
+            return;
+        };
         let Some(timeline) = self.timeline.begun() else {
             return;
         };
         let workspace = &mut self.workspace;
         let maps = self.parameters.maps;
         if maps.features || maps.dynamic || maps.slam {
-            workspace.path.set(scan.start, &self.parameters.laser, timeline.relative_path(scan.start, scan.end()));
+            workspace.path.set(scan.start, &mount, timeline.relative_path(scan.start, scan.end()));
         }
         if let Some(detection) = self.parameters.detection_in(scan) {
             self.outputs.has_cut |= detect_reflectors(scan, detection, &mut workspace.reflectors) > 0;
             workspace.sightings.clear();
-            see_reflectors(&self.parameters, &workspace.reflectors, &mut workspace.sightings);
+            let seen = Reflectors { laser: scan.laser, observations: &workspace.reflectors };
+            see_reflectors(&self.parameters, &mount, &seen, &mut workspace.sightings);
             if maps.slam {
                 self.fuse_reflectors_by_slam(scan.start);
             } else {
@@ -489,9 +502,9 @@ impl<
             }
         }
         if maps.slam {
-            self.fuse_scan_by_slam(scan);
+            self.fuse_scan_by_slam(&mount, scan);
         } else if maps.features || maps.dynamic {
-            self.outputs.has_cut |= self.workspace.see_features(&self.parameters, scan);
+            self.outputs.has_cut |= self.workspace.see_features(&self.parameters, &mount, scan);
             self.fuse(scan.start);
             self.update_dynamic_map();
         }

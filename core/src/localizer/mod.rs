@@ -7,6 +7,7 @@ mod event;
 mod evidence;
 mod fusion;
 mod horizon;
+mod lasers;
 mod localize;
 mod machine;
 mod maps;
@@ -21,7 +22,8 @@ mod supervisor;
 
 pub use bounds::{ParameterError, bounds};
 pub use capacities::Capacities;
-pub use event::Event;
+pub use event::{AnyEvent, AsReflectors, AsScan, Event, kind};
+pub use lasers::Lasers;
 pub use localize::Localize;
 pub use machine::Localizer;
 pub use output::{Misuse, OBSERVATIONS, Outputs};

@@ -14,6 +14,8 @@ pub enum Misuse {
     WrongVehicle,
     /// A sample of the odometry is not later than the one before.
     OutOfOrder,
+    /// The parameters mount no such laser.
+    UnknownLaser,
     /// A given pose is not finite, or its standard deviations are not positive.
     NoPose,
     /// A given pose is of a time that the filter has forgotten.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Lasers;
 use super::slam::SlamParameters;
 use crate::geometry::Pose;
 use crate::integrity::InnovationMonitorParameters;
@@ -15,8 +16,8 @@ use crate::sensing::{ReflectorDetection, falko};
 pub struct Parameters {
     /// How the vehicle moves.
     pub vehicle: Vehicle,
-    /// Pose of S in R (K: l).
-    pub laser: Pose,
+    /// The lasers, and where they are mounted.
+    pub lasers: Lasers,
     /// How odometry is integrated.
     pub integration: Integration,
     /// How wrong odometry may be.
@@ -40,12 +41,12 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// Default parameters for a vehicle with its sensor at `laser` in R.
+    /// Default parameters for a vehicle with one laser, at `laser` in R.
     #[must_use]
     pub fn new(vehicle: Vehicle, laser: Pose) -> Self {
         Self {
             vehicle,
-            laser,
+            lasers: Lasers::one(laser),
             integration: Integration::default(),
             odometry_noise: OdometryNoise::default(),
             maps: MapUse::default(),

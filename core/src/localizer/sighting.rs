@@ -6,9 +6,9 @@ use nalgebra::Matrix2;
 use super::Parameters;
 use super::output::OBSERVATIONS;
 use crate::filter::{Cartesian, Observation, RangeBearing};
-use crate::geometry::{Point, difference};
+use crate::geometry::{Point, Pose, difference};
 use crate::maps::{LandmarkKind, Verdict};
-use crate::measurement::{ReflectorObservation, Scan, Time};
+use crate::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 use crate::order::{Evenly, insertion_sort_by};
 use crate::sensing::{Keypoint, KeypointKind, PointScan, SensorPath, falko};
 
@@ -27,6 +27,9 @@ pub(super) struct Workspace<const BEAMS: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sighting {
     pub time: Time,
+    pub laser: LaserId,
+    /// Where that laser is mounted in R.
+    pub mount: Pose,
     pub kind: LandmarkKind,
     pub observation: Observation,
     /// Direction of a feature in S, rad.
@@ -50,7 +53,7 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
     /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
     /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two. True if there
     /// was not room for all beams and features.
-    pub fn see_features(&mut self, parameters: &Parameters, scan: &Scan) -> bool {
+    pub fn see_features(&mut self, parameters: &Parameters, mount: &Pose, scan: &Scan) -> bool {
         let features = &parameters.features;
         self.points.set(scan, features.nearest, features.farthest);
         if features.motion_correction {
@@ -72,6 +75,8 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
             let [xx, xy, yy] = keypoint.covariance.map(f64::from);
             let _ = self.sightings.push(Sighting {
                 time: scan.beam_time(beam),
+                laser: scan.laser,
+                mount: *mount,
                 kind: match keypoint.kind {
                     KeypointKind::Corner => LandmarkKind::Corner,
                     KeypointKind::EndPoint => LandmarkKind::EndPoint,
@@ -93,12 +98,13 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
 /// if some are left out.
 pub(super) fn see_reflectors(
     parameters: &Parameters,
-    observations: &[ReflectorObservation],
+    mount: &Pose,
+    seen: &Reflectors,
     sightings: &mut Vec<Sighting, OBSERVATIONS>,
 ) -> bool {
-    let mut choice = Evenly::new(OBSERVATIONS, observations.len());
+    let mut choice = Evenly::new(OBSERVATIONS, seen.observations.len());
     let reflectors = &parameters.reflectors;
-    for observation in observations.iter().filter(|_| choice.takes()) {
+    for observation in seen.observations.iter().filter(|_| choice.takes()) {
         if !(observation.range.is_finite() && observation.bearing.is_finite()) {
             continue;
         }
@@ -110,6 +116,8 @@ pub(super) fn see_reflectors(
         });
         let _ = sightings.push(Sighting {
             time: observation.time,
+            laser: seen.laser,
+            mount: *mount,
             kind: LandmarkKind::Reflector,
             observation: observation_model,
             orientation: 0.0,

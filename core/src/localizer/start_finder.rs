@@ -7,7 +7,7 @@ use heapless::Vec;
 
 use super::{Event, Parameters, PoseFix};
 use crate::geometry::{Point, Pose};
-use crate::measurement::{ReflectorObservation, Time};
+use crate::measurement::{LaserId, ReflectorObservation, Time};
 use crate::odometry::{Motion, Odometer, OdometryError, RecentMotion};
 use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
@@ -106,14 +106,14 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 let motion = self.odometer.increment(increment);
                 self.travel(increment.time, motion);
             }
-            Event::Reflectors(seen) => self.revolution(seen.observations, reflectors),
+            Event::Reflectors(seen) => self.revolution(seen.laser, seen.observations, reflectors),
             Event::Scan(scan) => {
                 if let Some(detection) = self.parameters.reflectors.detection
                     && !scan.intensities.is_empty()
                 {
                     let mut found = core::mem::take(&mut self.found);
                     detect_reflectors(scan, &detection, &mut found);
-                    self.revolution(&found, reflectors);
+                    self.revolution(scan.laser, &found, reflectors);
                     self.found = found;
                 }
             }
@@ -164,7 +164,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         }
     }
 
-    fn revolution(&mut self, observations: &[ReflectorObservation], reflectors: &IndexedReflectors) {
+    fn revolution(&mut self, laser: LaserId, observations: &[ReflectorObservation], reflectors: &IndexedReflectors) {
         if self.is_blind {
             return;
         }
@@ -179,7 +179,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             self.stand(first.time);
         }
         self.has_spoken = false;
-        self.see(observations);
+        self.see(laser, observations);
         if self.since.is_none() {
             self.relocalizer.begin(&self.snapshot, reflectors);
             self.since = Some(Pose::default());
@@ -206,18 +206,18 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     }
 
     /// Notes reflectors where they are in R at the end of the last motion.
-    fn see(&mut self, observations: &[ReflectorObservation]) {
+    fn see(&mut self, laser: LaserId, observations: &[ReflectorObservation]) {
         let believed = &self.parameters.reflectors;
         let noise = ReflectorNoise {
             range: believed.range_deviation as f32,
             bearing: believed.bearing_deviation as f32,
             ..ReflectorNoise::default()
         };
-        let Some(known_from) = self.known_from else { return };
+        let (Some(known_from), Some(mount)) = (self.known_from, self.parameters.lasers.mount(laser)) else { return };
         for observation in observations.iter().filter(|observation| observation.time >= known_from) {
             let range = f64::from(observation.range);
             let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
-            let in_robot = self.parameters.laser.transform(&Point::new(range * cosine, range * sine));
+            let in_robot = mount.transform(&Point::new(range * cosine, range * sine));
             // The vehicle goes on, or has come here, as it has moved of late.
             let position = self.recent.pose_at(observation.time).transform(&in_robot);
             self.snapshot.see(&position, range, &noise);

@@ -2,6 +2,7 @@
 
 mod encoder;
 mod encoder_fault;
+mod laser_id;
 mod pose_fix;
 mod reflectors;
 mod scan;
@@ -9,6 +10,7 @@ mod time;
 
 pub use encoder::{EncoderSample, PoseIncrement, SpeedSample};
 pub use encoder_fault::{EncoderFault, EncoderFaults};
+pub use laser_id::{LASERS, LaserId, LaserIdError};
 pub use pose_fix::PoseFix;
 pub use reflectors::{ReflectorObservation, Reflectors};
 pub use scan::Scan;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Time;
+use super::{LaserId, Time};
 
 /// One reflector, seen from S at its own time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,6 +18,16 @@ pub struct ReflectorObservation {
 /// The reflectors of one revolution, in order of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reflectors<'a> {
+    /// Which laser has found them.
+    pub laser: LaserId,
     /// Observations in order of time.
     pub observations: &'a [ReflectorObservation],
+}
+
+impl<'a> Reflectors<'a> {
+    /// Reflectors of the laser of a vehicle that has one.
+    #[must_use]
+    pub const fn of_first(observations: &'a [ReflectorObservation]) -> Self {
+        Self { laser: LaserId::FIRST, observations }
+    }
 }

@@ -4,12 +4,14 @@ use core::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::Time;
+use super::{LaserId, Time};
 
 /// Ranges of one sweep. Beam `i` was measured at `start + i * beam_interval` in the direction
 /// `first_bearing + i * bearing_step` of S, from wherever S was then: motion is not corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Scan<'a> {
+    /// Which laser has measured it.
+    pub laser: LaserId,
     /// When the first beam was measured.
     pub start: Time,
     /// Time between neighbouring beams, s; zero if all beams are simultaneous.

@@ -7,7 +7,7 @@ use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
 use super::truth::{Reference, Truth};
 use crate::localizer::{Capacities, Event, LandmarkUse, Outputs, Parameters, PoseOutput};
 use crate::maps::Landmark;
-use crate::measurement::{ReflectorObservation, Reflectors, Scan, Time};
+use crate::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 
 /// Greatest number of landmarks in one record; a map is written in pieces.
 pub const LANDMARKS_A_RECORD: usize = 50;
@@ -124,27 +124,24 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Scratch<BEAMS, REFLECTORS> {
     }
 }
 
+/// Numbers of the kinds of records. Those of events are [theirs](crate::localizer::kind).
 mod kind {
+    pub use crate::localizer::kind::*;
+
     pub const HEADER: u8 = 0;
     pub const LANDMARKS: u8 = 1;
-    pub const ENCODERS: u8 = 2;
-    pub const SPEED: u8 = 3;
-    pub const INCREMENT: u8 = 4;
-    pub const REFLECTORS: u8 = 5;
-    pub const SCAN: u8 = 6;
-    pub const SET_POSE: u8 = 7;
     pub const OUTPUT: u8 = 8;
     pub const TRUTH: u8 = 9;
     pub const REFERENCE: u8 = 10;
     pub const NOTE: u8 = 11;
     pub const END: u8 = 12;
     pub const RAW: u8 = 13;
-    pub const ENCODER_FAULTS: u8 = 14;
 }
 
 /// What stands before the beams of a scan.
 #[derive(Serialize, Deserialize)]
 struct ScanHead {
+    laser: LaserId,
     start: Time,
     beam_interval: f64,
     first_bearing: f64,
@@ -170,13 +167,7 @@ impl Record<'_> {
         match self {
             Self::Header(_) => kind::HEADER,
             Self::Landmarks(_) => kind::LANDMARKS,
-            Self::Event(Event::Encoders(_)) => kind::ENCODERS,
-            Self::Event(Event::EncoderFaults(_)) => kind::ENCODER_FAULTS,
-            Self::Event(Event::Speed(_)) => kind::SPEED,
-            Self::Event(Event::Increment(_)) => kind::INCREMENT,
-            Self::Event(Event::Reflectors(_)) => kind::REFLECTORS,
-            Self::Event(Event::Scan(_)) => kind::SCAN,
-            Self::Event(Event::SetPose(_)) => kind::SET_POSE,
+            Self::Event(event) => event.code(),
             Self::Output(_) => kind::OUTPUT,
             Self::Truth(_) => kind::TRUTH,
             Self::Reference(_) => kind::REFERENCE,
@@ -200,7 +191,7 @@ impl Record<'_> {
             Self::Event(Event::EncoderFaults(faults)) => put(faults, room),
             Self::Event(Event::Speed(sample)) => put(sample, room),
             Self::Event(Event::Increment(increment)) => put(increment, room),
-            Self::Event(Event::Reflectors(reflectors)) => put_all(reflectors.observations, room),
+            Self::Event(Event::Reflectors(reflectors)) => put(reflectors, room),
             Self::Event(Event::Scan(scan)) => put_scan(scan, room),
             Self::Event(Event::SetPose(fix)) => put(fix, room),
             Self::Output(output) => put(&(&output.pose, output.uses), room),
@@ -236,8 +227,9 @@ impl Record<'_> {
             kind::SPEED => Record::Event(Event::Speed(take(payload)?)),
             kind::INCREMENT => Record::Event(Event::Increment(take(payload)?)),
             kind::REFLECTORS => {
-                take_each(payload, &mut scratch.observations)?;
-                Record::Event(Event::Reflectors(Reflectors { observations: &scratch.observations }))
+                let (laser, rest) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+                take_each(rest, &mut scratch.observations)?;
+                Record::Event(Event::Reflectors(Reflectors { laser, observations: &scratch.observations }))
             }
             kind::SCAN => Record::Event(Event::Scan(take_scan(payload, scratch)?)),
             kind::SET_POSE => Record::Event(Event::SetPose(take(payload)?)),
@@ -280,6 +272,7 @@ fn put_all<T: Serialize>(values: &[T], room: &mut [u8]) -> Option<usize> {
 
 fn put_scan(scan: &Scan, room: &mut [u8]) -> Option<usize> {
     let head = ScanHead {
+        laser: scan.laser,
         start: scan.start,
         beam_interval: scan.beam_interval,
         first_bearing: scan.first_bearing,
@@ -343,6 +336,7 @@ fn take_scan<'a, const BEAMS: usize, const REFLECTORS: usize>(
         *intensity = u16::from_le_bytes(*bytes);
     }
     Ok(Scan {
+        laser: head.laser,
         start: head.start,
         beam_interval: head.beam_interval,
         first_bearing: head.first_bearing,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::maps::{LandmarkKind, Verdict};
-use crate::measurement::Time;
+use crate::measurement::{LaserId, Time};
 
 /// From which map a landmark is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,6 +20,8 @@ pub enum LandmarkSource {
 pub struct LandmarkUse {
     /// When it was true.
     pub time: Time,
+    /// Which laser has seen it.
+    pub laser: LaserId,
     /// What was seen.
     pub kind: LandmarkKind,
     /// The nearest landmark, if there is one near.

@@ -6,7 +6,7 @@ pub mod scene;
 use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::ScanPoint;
-use agv_core::measurement::{Scan, Time};
+use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::falko::{Detector, Parameters, Sectors, pair_sum};
 use agv_core::sensing::{Keypoint, KeypointKind, PointScan};
 use proptest::prelude::*;
@@ -19,8 +19,15 @@ fn profiles() -> [(&'static str, Parameters); 3] {
 }
 
 fn points(ranges: &[f32], first_bearing: f64, bearing_step: f64) -> Box<PointScan<BEAMS>> {
-    let scan =
-        Scan { start: Time::default(), beam_interval: 0.0, first_bearing, bearing_step, ranges, intensities: &[] };
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: Time::default(),
+        beam_interval: 0.0,
+        first_bearing,
+        bearing_step,
+        ranges,
+        intensities: &[],
+    };
     let mut points = Box::new(PointScan::new());
     points.set(&scan, 0.05, 80.0);
     points

@@ -201,7 +201,7 @@ impl<'a> Drive<'a> {
     /// The reflectors that are seen in a revolution, each at its own time.
     pub fn revolution(&self, index: u64) -> Vec<ReflectorObservation> {
         let start = Time::from_micros(START + index * REVOLUTION);
-        let laser = self.localizer.parameters().laser;
+        let laser = self.localizer.parameters().lasers.first();
         let mut seen: Vec<_> = reflectors()
             .iter()
             .filter_map(|reflector| {
@@ -231,7 +231,7 @@ impl<'a> Drive<'a> {
         for seen in &mut observations {
             seen.time = seen.time.offset(self.laser_ahead);
         }
-        self.localizer.handle(&Event::Reflectors(Reflectors { observations: &observations }));
+        self.localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations)));
     }
 
     /// Goes on for some seconds; `hear` is given what is said after each sample of the odometry.

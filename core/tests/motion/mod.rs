@@ -295,7 +295,7 @@ fn what_the_localiser_has_assumed_already_is_not_published_twice() {
     let mut seen = drive.revolution(23);
     seen.last_mut().unwrap().time = drive.time().offset(0.009);
     let observations = &seen[seen.len() - 1..];
-    drive.localizer.handle(&Event::Reflectors(Reflectors { observations }));
+    drive.localizer.handle(&Event::Reflectors(Reflectors::of_first(observations)));
     assert!(drive.said().time > drive.time());
     predictor.update(&drive.said(), &drive.localizer.odometry_bias());
     let sample = encoders(drive.sample(3_000_000));

@@ -6,7 +6,7 @@ use agv_core::filter::{packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose, Twist, difference};
 use agv_core::localizer::{Event, Localizer, Outputs, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::{Landmark, LandmarkKind};
-use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
 
 use super::hall::{cast, corners};
@@ -96,6 +96,7 @@ impl Revolution {
 
     pub fn scan<'a>(&self, ranges: &'a [f32], intensities: &'a [u16]) -> Scan<'a> {
         Scan {
+            laser: LaserId::FIRST,
             start: self.start,
             beam_interval: REVOLUTION / BEAMS as f64,
             first_bearing: -PI,
@@ -188,7 +189,7 @@ impl Stage {
     }
 
     pub fn see(&mut self, observations: &[ReflectorObservation]) -> &Outputs {
-        self.localizer.handle(&Event::Reflectors(Reflectors { observations }))
+        self.localizer.handle(&Event::Reflectors(Reflectors::of_first(observations)))
     }
 
     /// All reflectors, in the order of their bearings.
@@ -228,6 +229,7 @@ impl Stage {
         let range = |beam: usize| cast(&sensor, beam as f64 * step - PI) as f32;
         let ranges: Vec<f32> = (0..BEAMS).map(|beam| change(beam, range(beam))).collect();
         let scan = Scan {
+            laser: LaserId::FIRST,
             start: self.time(),
             beam_interval: 0.0,
             first_bearing: -PI,

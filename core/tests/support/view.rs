@@ -3,6 +3,7 @@
 
 use agv_core::filter::{Cartesian, Ekf, Landmark, Linearisation, Observation, Slots};
 use agv_core::geometry::{Point, Pose};
+use agv_core::measurement::LaserId;
 use nalgebra::Matrix2x3;
 
 /// What a vehicle at `pose` with its sensor at `mount` makes of an observation of a landmark that is not in the state.
@@ -14,7 +15,11 @@ pub fn linearise(
     variance: f64,
 ) -> Option<Linearisation<2>> {
     let state = Ekf::new(*pose, 0.0, 0.0);
-    state.observe(&state.viewpoint(mount), observation, &Landmark::Known { position: *position, variance })
+    state.observe(
+        &state.viewpoint(LaserId::FIRST, mount),
+        observation,
+        &Landmark::Known { position: *position, variance },
+    )
 }
 
 /// What a filter makes of a position that is seen from `mount`.
@@ -24,7 +29,7 @@ pub fn observe<S: Slots>(
     seen: &Cartesian,
     landmark: Landmark,
 ) -> Option<Linearisation<2>> {
-    filter.observe(&filter.viewpoint(mount), &Observation::Cartesian(*seen), &landmark)
+    filter.observe(&filter.viewpoint(LaserId::FIRST, mount), &Observation::Cartesian(*seen), &landmark)
 }
 
 /// The derivatives by the pose.

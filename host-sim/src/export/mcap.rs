@@ -240,7 +240,7 @@ impl Writer {
 
     /// What is true all the time: where the laser is, and the map.
     fn write_statics(&mut self, now: Time, recording: &Recording) -> Result<(), McapExportError> {
-        let laser = transform(now, BASE, LASER, recording.parameters.laser);
+        let laser = transform(now, BASE, LASER, recording.parameters.lasers.first());
         self.write(Topic::StaticTransforms, now, &Transforms { transforms: vec![laser] })?;
         let mut markers = Vec::new();
         for (number, kind) in (0..).zip(KINDS) {
@@ -300,11 +300,7 @@ impl Exporter {
     }
 
     fn advance(&mut self, event: &RecordedEvent) {
-        let end = match event {
-            RecordedEvent::Scan(scan) => Some(scan.view().end()),
-            RecordedEvent::Reflectors(observations) => observations.last().map(|observation| observation.time),
-            other => other.time(),
-        };
+        let end = event.span().map(|(_, end)| end);
         self.now = end.map_or(self.now, |end| end.max(self.now));
     }
 

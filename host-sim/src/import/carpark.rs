@@ -8,7 +8,7 @@ use std::path::Path;
 use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
 use agv_core::maps::{Landmark, LandmarkKind};
-use agv_core::measurement::{SpeedSample, Time};
+use agv_core::measurement::{LaserId, SpeedSample, Time};
 use agv_core::odometry::{Ackermann, Vehicle};
 
 use super::table::{Row, read_rows};
@@ -112,6 +112,7 @@ pub fn read_batch_solution(folder: &Path) -> Result<Vec<Truth>, TextFileError> {
 /// The first column of both rows is the time; column k after it is the beam at 0.5 k - 90 degrees.
 fn scan(time: Time, ranges: &[f64], intensities: &[f64]) -> RecordedScan {
     RecordedScan {
+        laser: LaserId::FIRST,
         start: time,
         beam_interval: 0.0,
         first_bearing: -std::f64::consts::FRAC_PI_2,

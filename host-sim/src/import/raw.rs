@@ -15,7 +15,7 @@ use agv_wire::nav350::SensorFrame;
 use crate::link::encoder_listener::EncoderListener;
 use crate::link::nav350_listener::{Heard, Listener};
 use crate::log::{self, LogError, Reader, Writer};
-use crate::recording::{RecordedEvent, Recording};
+use crate::recording::{RecordedEvent, Recording, keep};
 
 /// Bytes as they passed a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -142,8 +142,8 @@ impl<'a> EventMaker<'a> {
             RawSource::FromNav350 => {
                 let Ok(()) = self.nav350.received::<Infallible>(*time, bytes, |heard, revolution| {
                     if heard == Heard::Revolution {
-                        events.extend(revolution.reflectors().map(|found| Event::Reflectors(found).into()));
-                        events.extend(revolution.scan().map(|scan| Event::Scan(scan).into()));
+                        events.extend(revolution.reflectors().map(|found| keep(&Event::Reflectors(found))));
+                        events.extend(revolution.scan().map(|scan| keep(&Event::Scan(scan))));
                     }
                     Ok(())
                 });
@@ -178,7 +178,7 @@ impl<'a> EventMaker<'a> {
             Encoders::Served(_) if is_first => {}
             Encoders::Served(encoders) => encoders.look(time, frame, |output| {
                 if let EncoderOutput::Event(event) = output {
-                    events.push(event.event().into());
+                    events.push(keep(&event.event()));
                 }
             }),
             Encoders::Overheard(listener) => {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
-use agv_core::measurement::{PoseFix, PoseIncrement, Time};
+use agv_core::measurement::{LaserId, PoseFix, PoseIncrement, Time};
 use agv_core::odometry::Vehicle;
 
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
@@ -225,6 +225,7 @@ fn scan(start: Time, message: &LaserScan) -> RecordedScan {
     // A list of another length belongs to other beams.
     let has_strengths = message.intensities.len() == message.ranges.len();
     RecordedScan {
+        laser: LaserId::FIRST,
         start,
         beam_interval: f64::from(message.time_increment.max(0.0)),
         first_bearing: message.angle_min.into(),

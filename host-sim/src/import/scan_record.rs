@@ -1,7 +1,7 @@
 //! Fields that CARMEN and pose-graph logs share: numbers, poses and the record of a laser. Lengths are in m, angles in rad.
 
 use agv_core::geometry::Pose;
-use agv_core::measurement::Time;
+use agv_core::measurement::{LaserId, Time};
 
 use super::PosedScan;
 use crate::recording::RecordedScan;
@@ -36,7 +36,15 @@ pub(super) fn ranges<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Ve
 }
 
 pub(super) fn scan(start: Time, first_bearing: f64, bearing_step: f64, ranges: Vec<f32>) -> RecordedScan {
-    RecordedScan { start, beam_interval: 0.0, first_bearing, bearing_step, ranges, intensities: Vec::new() }
+    RecordedScan {
+        laser: LaserId::FIRST,
+        start,
+        beam_interval: 0.0,
+        first_bearing,
+        bearing_step,
+        ranges,
+        intensities: Vec::new(),
+    }
 }
 
 /// A `ROBOTLASER1` or `ROBOTLASER2` record behind its name. Fields: type, start angle, field of view, step, largest range, accuracy, remission mode, n, n ranges, m, m

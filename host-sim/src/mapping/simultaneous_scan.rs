@@ -66,7 +66,7 @@ pub fn simultaneous(scan: &RecordedScan, poses: &[Truth], laser: &Pose) -> Optio
 
 #[cfg(test)]
 mod tests {
-    use agv_core::measurement::Time;
+    use agv_core::measurement::{LaserId, Time};
 
     use super::*;
 
@@ -90,6 +90,7 @@ mod tests {
         let interval = 0.125 / f64::from(beams);
         let bearing = |beam: i32| -PI + step * f64::from(beam);
         let scan = RecordedScan {
+            laser: LaserId::FIRST,
             start: Time::default(),
             beam_interval: interval,
             first_bearing: -PI,

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::measurement::Time;
+use agv_core::measurement::{LaserId, Time};
 
 use super::people::Person;
 use super::random::Random;
@@ -185,6 +185,7 @@ pub fn scan(revolution: &Revolution, noise: &mut Random, faults: &mut Random) ->
         }
     }
     RecordedScan {
+        laser: LaserId::FIRST,
         start: drive_start.offset(scan_start),
         beam_interval,
         first_bearing: FIRST_BEARING,

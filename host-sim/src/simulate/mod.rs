@@ -224,7 +224,7 @@ fn report_laser(arrivals: &mut Arrivals, scenario: &Scenario, world: &World, tra
         if !world.reflectors.is_empty() {
             let observations =
                 reflector_detector::detect(&revolution, &world.reflectors, &scenario.reflectors, &mut reflector_random);
-            arrivals.add(end.offset(scenario.reflectors.latency), RecordedEvent::Reflectors(observations));
+            arrivals.add(end.offset(scenario.reflectors.latency), RecordedEvent::Reflectors(observations.into()));
         }
         if scenario.laser.scans {
             let scan = laser::scan(&revolution, &mut noise, &mut faults);

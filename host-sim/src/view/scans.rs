@@ -10,7 +10,7 @@ use agv_core::localizer::Event;
 use agv_core::measurement::{Scan, Time};
 use agv_core::record::{FrameReader, FrameStep, MAX_FRAME, Record, Scratch};
 
-use crate::recording::{RecordedEvent, RecordedScan};
+use crate::recording::RecordedScan;
 
 /// Scans of a drive without a file that are kept: a quarter of an hour at 8 Hz.
 const KEPT: usize = 7200;
@@ -51,9 +51,7 @@ impl Scans {
         if self.kept.len() == KEPT {
             self.kept.pop_front();
         }
-        if let RecordedEvent::Scan(scan) = Event::Scan(*scan).into() {
-            self.kept.push_back(Arc::new(scan));
-        }
+        self.kept.push_back(Arc::new(scan.into()));
     }
 
     /// The last scan that began by then.
@@ -86,10 +84,7 @@ impl Found {
         let (_, FrameStep::Frame { frame, .. }) = FrameReader::new().step(&bytes, true) else { return None };
         let mut scratch: Box<Scratch<8192, 4096>> = Box::default();
         match frame.record(&mut scratch) {
-            Ok(Record::Event(event)) => match event.into() {
-                RecordedEvent::Scan(scan) => Some(Arc::new(scan)),
-                _ => None,
-            },
+            Ok(Record::Event(Event::Scan(scan))) => Some(Arc::new((&scan).into())),
             _ => None,
         }
     }

@@ -15,7 +15,8 @@ fn events_come_in_the_order_of_arrival() {
         let arrival = match event {
             RecordedEvent::Encoders(sample) => sample.time,
             RecordedEvent::Scan(scan) => scan.start.offset(0.125 + 0.010),
-            RecordedEvent::Reflectors(observations) => {
+            RecordedEvent::Reflectors(seen) => {
+                let observations = &seen.observations;
                 assert!(observations.iter().all(|observation| observation.time <= now));
                 assert!(observations.windows(2).all(|pair| pair[0].time <= pair[1].time));
                 continue;

@@ -45,7 +45,7 @@ pub fn scans(recording: &Recording) -> impl Iterator<Item = &RecordedScan> {
 
 pub fn revolutions(recording: &Recording) -> impl Iterator<Item = &Vec<ReflectorObservation>> {
     recording.events.iter().filter_map(|event| match event {
-        RecordedEvent::Reflectors(observations) => Some(observations),
+        RecordedEvent::Reflectors(seen) => Some(&seen.observations),
         _ => None,
     })
 }

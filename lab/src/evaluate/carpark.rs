@@ -132,12 +132,12 @@ pub fn run(folder: &Path, noise: Noise, knowledge: Knowledge) -> Result<(Outcome
     let given = match knowledge {
         Knowledge::Map => None,
         // Nothing on the way tells the angle of a map that begins here, so the start must.
-        Knowledge::Slam => headings.first().map(|first| first.pose.theta + recording.parameters.laser.theta),
+        Knowledge::Slam => headings.first().map(|first| first.pose.theta + recording.parameters.lasers.first().theta),
     };
     let laser = Pose::new(first.x, first.y, given.unwrap_or(FIRST_HEADING));
     let fix = PoseFix {
         time: first.time,
-        pose: laser.compose(&recording.parameters.laser.inverse()),
+        pose: laser.compose(&recording.parameters.lasers.first().inverse()),
         position_deviation: 0.3,
         heading_deviation: given.map_or(5.0_f64, |_| 1.0).to_radians(),
     };
@@ -185,7 +185,7 @@ fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome 
         .references
         .iter()
         .filter_map(|reference| {
-            let laser = pose_at(&localised, reference.time)?.compose(&recording.parameters.laser);
+            let laser = pose_at(&localised, reference.time)?.compose(&recording.parameters.lasers.first());
             Some((reference.time, (laser.position() - reference.position()).norm()))
         })
         .collect();

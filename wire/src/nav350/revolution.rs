@@ -8,7 +8,7 @@ use super::{
 };
 use agv_core::geometry::{Pose, wrap};
 use agv_core::localizer::OBSERVATIONS;
-use agv_core::measurement::{ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::order::{Evenly, insertion_sort_by};
 
 /// Why an answer did not become a revolution.
@@ -47,6 +47,7 @@ struct ScanHead {
 /// one more than a localiser, which so knows of it and says so.
 #[derive(Clone, Debug)]
 pub struct Revolution<const BEAMS: usize = 1440, const REFLECTORS: usize = { OBSERVATIONS + 1 }> {
+    laser: LaserId,
     ranges: [f32; BEAMS],
     intensities: [u16; BEAMS],
     scan: Option<ScanHead>,
@@ -62,10 +63,17 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Default for Revolution<BEAMS, 
 }
 
 impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> {
-    /// Nothing yet.
+    /// Nothing yet, of the laser of a vehicle that has one.
     #[must_use]
     pub const fn new() -> Self {
+        Self::of(LaserId::FIRST)
+    }
+
+    /// Nothing yet of one of the vehicle's lasers.
+    #[must_use]
+    pub const fn of(laser: LaserId) -> Self {
         Self {
+            laser,
             ranges: [0.0; BEAMS],
             intensities: [0; BEAMS],
             scan: None,
@@ -80,6 +88,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> 
     pub fn scan(&self) -> Option<Scan<'_>> {
         let head = self.scan?;
         Some(Scan {
+            laser: self.laser,
             start: head.start,
             beam_interval: head.beam_interval,
             first_bearing: head.first_bearing,
@@ -92,7 +101,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> 
     /// The reflectors, if the answer had a list of them. It may be empty.
     #[must_use]
     pub fn reflectors(&self) -> Option<Reflectors<'_>> {
-        self.reflectors.as_ref().map(|observations| Reflectors { observations })
+        self.reflectors.as_ref().map(|observations| Reflectors { laser: self.laser, observations })
     }
 
     /// The pose that the sensor itself has found, if any.

@@ -171,7 +171,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         parameters: &Parameters,
     ) {
         if let Some(wanted) = &parameters.slam.key_scans {
-            self.key_scans.align(&mut self.filter, points, place, &parameters.laser, wanted);
+            self.key_scans.align(&mut self.filter, points, place, &parameters.lasers.first(), wanted);
         }
     }
 

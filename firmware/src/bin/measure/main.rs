@@ -157,7 +157,7 @@ fn handle(stopwatch: &Stopwatch, counts: &mut Counts, localizer: &mut Localizer,
         })),
         Event::Reflectors(reflectors) => {
             for observation in reflectors.observations {
-                let one = Event::Reflectors(Reflectors { observations: core::slice::from_ref(observation) });
+                let one = Event::Reflectors(Reflectors::of_first(core::slice::from_ref(observation)));
                 counts.reflector.add(stopwatch.count(|| {
                     localizer.handle(&one);
                 }));

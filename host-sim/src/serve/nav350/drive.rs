@@ -8,7 +8,7 @@ use agv_core::measurement::{ReflectorObservation, Time};
 use agv_wire::nav350::{Distance, IdentifiedLandmark, Milliangle, SensorFrame};
 
 use crate::layout_file;
-use crate::recording::{RecordedEvent, RecordedScan, Recording};
+use crate::recording::{RecordedEvent, RecordedReflectors, RecordedScan, Recording};
 
 /// What the sensor measured in one turn.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +81,7 @@ impl Drive {
         let has_scans = !turns.is_empty();
         turns.sort_by_key(|turn| turn.start);
         for event in &recording.events {
-            let RecordedEvent::Reflectors(observations) = event else { continue };
+            let RecordedEvent::Reflectors(RecordedReflectors { observations, .. }) = event else { continue };
             let Some(first) = observations.first() else { continue };
             if has_scans {
                 let index = turns.partition_point(|turn| turn.start <= first.time).saturating_sub(1);
@@ -100,7 +100,7 @@ impl Drive {
             let end = turn.start.offset(frame.period);
             let index = recording.truth.partition_point(|truth| truth.time <= end);
             let truth = recording.truth.get(index.saturating_sub(1));
-            turn.pose = truth.map(|truth| truth.pose.compose(&recording.parameters.laser));
+            turn.pose = truth.map(|truth| truth.pose.compose(&recording.parameters.lasers.first()));
         }
         let layout = layout_file::layout(&recording.landmarks);
         if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, begin, layout, frame }) }

@@ -5,8 +5,8 @@ use core::f64::consts::TAU;
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{Event, Parameters};
 use agv_core::measurement::{
-    EncoderFault, EncoderFaults, EncoderSample, PoseFix, PoseIncrement, ReflectorObservation, Reflectors, Scan,
-    SpeedSample, Time,
+    EncoderFault, EncoderFaults, EncoderSample, LaserId, PoseFix, PoseIncrement, ReflectorObservation, Reflectors,
+    Scan, SpeedSample, Time,
 };
 use agv_core::odometry::{Control, Vehicle};
 
@@ -198,7 +198,7 @@ impl Drive {
 
     fn reflectors<'a>(&mut self, dice: &mut Dice<impl Source>, lists: &'a mut Lists) -> Event<'a> {
         let start = self.time(dice);
-        let sensor = self.truth.compose(&self.parameters.laser);
+        let sensor = self.truth.compose(&self.parameters.lasers.first());
         let observations = &mut lists.observations;
         observations.clear();
         for (landmark, number) in reflectors().zip(0_u32..) {
@@ -228,7 +228,7 @@ impl Drive {
             let few = usize::from(dice.below(8));
             observations.truncate(few);
         }
-        Event::Reflectors(Reflectors { observations })
+        Event::Reflectors(Reflectors::of_first(observations))
     }
 
     fn scan<'a>(&mut self, dice: &mut Dice<impl Source>, lists: &'a mut Lists) -> Event<'a> {
@@ -238,7 +238,7 @@ impl Drive {
         let mut bearing_step = if is_backward { -TAU } else { TAU } / beams as f64;
         let mut first_bearing = dice.between(-3.2, 3.2);
         let mut beam_interval = if dice.once_in(4) { 0.0 } else { 0.125 / beams as f64 };
-        let sensor = self.truth.compose(&self.parameters.laser);
+        let sensor = self.truth.compose(&self.parameters.lasers.first());
         let Lists { ranges, intensities, .. } = lists;
         // Noise that costs no choices: one seed for all beams.
         let mut noise = u32::from(dice.byte());
@@ -276,7 +276,15 @@ impl Drive {
                 }
             }
         }
-        Event::Scan(Scan { start, beam_interval, first_bearing, bearing_step, ranges, intensities })
+        Event::Scan(Scan {
+            laser: LaserId::FIRST,
+            start,
+            beam_interval,
+            first_bearing,
+            bearing_step,
+            ranges,
+            intensities,
+        })
     }
 }
 

@@ -48,7 +48,8 @@ pub fn parameters(dice: &mut Dice<impl Source>) -> Parameters {
         parameters.integration = Integration::Arc;
     }
     if dice.once_in(3) {
-        parameters.laser = Pose::new(dice.between(-2.0, 2.0), dice.between(-2.0, 2.0), dice.between(-3.2, 3.2));
+        *parameters.lasers.first_mut() =
+            Pose::new(dice.between(-2.0, 2.0), dice.between(-2.0, 2.0), dice.between(-3.2, 3.2));
     }
     parameters.maps = MapUse {
         reflectors: !dice.once_in(4),

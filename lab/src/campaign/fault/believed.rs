@@ -46,7 +46,7 @@ impl Fault {
                 }
             }
             FaultKind::MountingWrong { deg, x } => {
-                let laser = &mut recording.parameters.laser;
+                let laser = &mut recording.parameters.lasers.first();
                 *laser = Pose::new(laser.x + x, laser.y, laser.theta + deg.to_radians());
             }
             FaultKind::WheelbaseWrong { metres } => {

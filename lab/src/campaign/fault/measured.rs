@@ -24,10 +24,10 @@ impl Fault {
                     self.spoil_encoders(sample, time, tricycle, &mut encoders);
                 }
                 RecordedEvent::Reflectors(seen) => {
-                    let Some(first) = seen.first() else { continue };
+                    let Some(first) = seen.observations.first() else { continue };
                     let time = first.time.since(START);
                     if self.is_active(time) {
-                        self.spoil_reflectors(seen, time, &walkers, random);
+                        self.spoil_reflectors(&mut seen.observations, time, &walkers, random);
                     }
                 }
                 _ => {}
@@ -226,7 +226,7 @@ fn kidnap(recording: &mut Recording, from: f64, seconds: f64, range: CounterRang
                 sample.drive = shifted(sample.drive, -ticks, range);
             }
             RecordedEvent::Reflectors(seen) if time >= end => {
-                for observation in seen {
+                for observation in &mut seen.observations {
                     observation.time = earlier(observation.time);
                 }
             }

@@ -1,6 +1,7 @@
 //! Scans made worse on purpose (K 3.3, tests 2 to 4).
 
 use agv_core::geometry::Point;
+use agv_core::measurement::LaserId;
 use serde::Serialize;
 
 use agv_host_sim::recording::RecordedScan;
@@ -59,6 +60,7 @@ impl Disturbance {
             Self::Subsampling(removed) => {
                 let every = removed + 1;
                 RecordedScan {
+                    laser: LaserId::FIRST,
                     ranges: scan.ranges.iter().copied().step_by(every).collect(),
                     intensities: Vec::new(),
                     bearing_step: scan.bearing_step * every as f64,
@@ -94,6 +96,7 @@ fn oversampled(scan: &RecordedScan, times: usize) -> RecordedScan {
     }
     ranges.extend(scan.ranges.last());
     RecordedScan {
+        laser: LaserId::FIRST,
         ranges,
         intensities: Vec::new(),
         bearing_step: step,

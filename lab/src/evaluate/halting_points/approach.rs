@@ -180,7 +180,7 @@ pub fn drive(
         if steps % STEPS_A_REVOLUTION == 0 && !plant.seen.is_empty() {
             let mut observations = std::mem::take(&mut plant.seen);
             observations.sort_by_key(|seen| seen.time);
-            pose = localizer.handle(&Event::Reflectors(Reflectors { observations: &observations })).pose.pose;
+            pose = localizer.handle(&Event::Reflectors(Reflectors::of_first(&observations))).pose.pose;
         }
         steps += 1;
         if plant.time > LONGEST {

@@ -144,7 +144,7 @@ impl<'a> Sensor<'a> {
         let added = (features.added_deviation * features.added_deviation) as f32;
         for keypoint in &self.found {
             let [xx, _, yy] = keypoint.covariance;
-            let position = self.believed.laser.transform(&keypoint.position.cast());
+            let position = self.believed.lasers.first().transform(&keypoint.position.cast());
             snapshot.see_landmark(&position, 0.5 * (xx + yy) + added);
         }
         self.found.len()

@@ -7,7 +7,7 @@ use agv_core::integrity::ProtectionLevel;
 use agv_core::localizer::{self, Event, Outputs, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
-    EncoderFaults, EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
+    EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
 use agv_firmware::app::room;
@@ -45,8 +45,9 @@ fn event() -> Event<'static> {
         1 => Event::EncoderFaults(any(EncoderFaults::default())),
         2 => Event::Speed(SpeedSample { time, speed: any(0.0), steering: any(0.0) }),
         3 => Event::Increment(PoseIncrement { time, displacement: pose }),
-        4 => Event::Reflectors(Reflectors { observations: part(&OBSERVATIONS) }),
+        4 => Event::Reflectors(Reflectors::of_first(part(&OBSERVATIONS))),
         5 => Event::Scan(Scan {
+            laser: LaserId::FIRST,
             start: time,
             beam_interval: any(0.0),
             first_bearing: any(0.0),

@@ -1,9 +1,10 @@
-//! Places of the augmented filter: how they are taken and freed, and what an observation without a place says.
+//! Slots of the filter: how they are taken and freed, and what an observation without a slot says.
 
 use agv_core::filter::{
     BiasDeviations, Cartesian, Ekf, Landmark, Linearisation, PoseAndSlots, RelativePose, packed_entries, slot_states,
 };
 use agv_core::geometry::{Point, Pose};
+use agv_core::measurement::LaserId;
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2};
 
 use super::support::view::observe;
@@ -44,9 +45,14 @@ fn full() -> Filter {
         filter.remember_pose(key);
     }
     for landmark in 0..LANDMARKS {
-        filter.add_landmark(landmark, &filter.viewpoint(&LASER), &seen(4.0 - 3.0 * landmark as f64, 2.0));
+        filter.add_landmark(
+            landmark,
+            &filter.viewpoint(LaserId::FIRST, &LASER),
+            &seen(4.0 - 3.0 * landmark as f64, 2.0),
+        );
     }
-    let known = known(&filter, filter.viewpoint(&LASER).locate(&Point::new(3.0, 1.0)), 1e-4, &seen(3.01, 1.02));
+    let known =
+        known(&filter, filter.viewpoint(LaserId::FIRST, &LASER).locate(&Point::new(3.0, 1.0)), 1e-4, &seen(3.01, 1.02));
     assert!(filter.correct(&known));
     filter
 }
@@ -117,7 +123,7 @@ fn what_is_freed_has_neither_variance_nor_correlation() {
     filter.remember_pose(KEYS);
     filter.remove_landmark(LANDMARKS);
     filter.add_known_landmark(LANDMARKS, Point::new(1.0, 1.0), 1.0);
-    filter.add_landmark(LANDMARKS, &filter.viewpoint(&LASER), &seen(1.0, 1.0));
+    filter.add_landmark(LANDMARKS, &filter.viewpoint(LaserId::FIRST, &LASER), &seen(1.0, 1.0));
     assert_eq!(covariance(&filter), before);
     assert_eq!((filter.past_pose(KEYS), filter.landmark(LANDMARKS)), (None, None));
     assert!(observe(&filter, &LASER, &seen(1.0, 1.0), Landmark::Slot(LANDMARKS)).is_none());
@@ -129,8 +135,8 @@ fn what_is_freed_has_neither_variance_nor_correlation() {
 fn landmarks_and_past_poses_are_where_they_were_put() {
     let mut filter = begun();
     let there = filter.state().pose.compose(&LASER).transform(&Point::new(4.0, 1.0));
-    assert!((filter.viewpoint(&LASER).locate(&Point::new(4.0, 1.0)) - there).norm() < 1e-12);
-    filter.add_landmark(1, &filter.viewpoint(&LASER), &seen(4.0, 1.0));
+    assert!((filter.viewpoint(LaserId::FIRST, &LASER).locate(&Point::new(4.0, 1.0)) - there).norm() < 1e-12);
+    filter.add_landmark(1, &filter.viewpoint(LaserId::FIRST, &LASER), &seen(4.0, 1.0));
     assert!(filter.landmark(1).is_some_and(|place| (place - there).norm() < 1e-12));
     filter.add_known_landmark(0, Point::new(7.0, -3.0), 2e-4);
     assert_eq!(filter.landmark(0), Some(Point::new(7.0, -3.0)));

@@ -1,4 +1,4 @@
-//! The augmented filter against a dense one, and its consistency.
+//! The filter with slots against a dense one, and its consistency.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use agv_core::filter::{
@@ -6,7 +6,7 @@ use agv_core::filter::{
     slot_states,
 };
 use agv_core::geometry::{Point, Pose, wrap};
-use agv_core::measurement::Time;
+use agv_core::measurement::{LaserId, Time};
 use agv_core::odometry::{Motion, OdometryBias};
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use proptest::prelude::*;
@@ -252,7 +252,7 @@ proptest! {
                     dense.predict(&motion(x, y, theta));
                 }
                 Step::Add(slot, x, y) => {
-                    filter.add_landmark(slot, &filter.viewpoint(&LASER), &seen(x, y));
+                    filter.add_landmark(slot, &filter.viewpoint(LaserId::FIRST, &LASER), &seen(x, y));
                     dense.add_landmark(slot, &seen(x, y));
                 }
                 Step::Remove(slot) => {
@@ -302,7 +302,7 @@ proptest! {
 fn a_known_landmark_is_not_learnt_better_than_the_map_states() {
     // Twice the same landmark, a thousand times: its own error stays in the pose.
     let (mut filter, _) = start();
-    let there = filter.viewpoint(&LASER).locate(&Point::new(4.0, 1.0));
+    let there = filter.viewpoint(LaserId::FIRST, &LASER).locate(&Point::new(4.0, 1.0));
     filter.add_known_landmark(0, there, 1e-4);
     for _ in 0..1000 {
         let linearised = observe(&filter, &LASER, &seen(4.0, 1.0), Landmark::Slot(0)).unwrap();
@@ -360,7 +360,7 @@ fn wander(run: u64, turns: usize, speed: f64, turn: f64, start_deviation: f64, m
                 covariance: Matrix2::identity() * 2.5e-5,
             };
             if scan == 0 {
-                filter.add_landmark(slot, &filter.viewpoint(&LASER), &observation);
+                filter.add_landmark(slot, &filter.viewpoint(LaserId::FIRST, &LASER), &observation);
             } else {
                 let linearised = observe(&filter, &LASER, &observation, Landmark::Slot(slot)).unwrap();
                 assert!(filter.correct(&linearised));
