@@ -1,10 +1,10 @@
 //! Builds the programs of the tests and runs them: those that wait beside those that compute, then those that emulate a board
-//! in real time.
+//! in real time, and alone.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, bail};
 use serde_json::Value;
@@ -14,7 +14,9 @@ use crate::repository;
 
 /// Everything is built once, as it is shipped, so that the tests judge the program that people run. Overflow is checked
 /// there, too.
-const CARGO_TEST: [&str; 6] = ["test", "--workspace", "--release", "--features", "agv/full", "--no-fail-fast"];
+/// Benchmarks are only checked, by clippy: what they are measured with takes long to build.
+const CARGO_TEST: [&str; 8] =
+    ["test", "--workspace", "--exclude", "agv-benches", "--release", "--features", "agv/full", "--no-fail-fast"];
 
 /// Programs whose tests wait for networks, or run on one core: they run beside those that compute.
 const WAITING: [&str; 2] = ["bad_network", "chip"];
@@ -22,18 +24,20 @@ const WAITING: [&str; 2] = ["bad_network", "chip"];
 /// Programs whose tests emulate a board in real time: they have the machine to themselves.
 const EMULATED: [&str; 6] = ["vehicle", "firmware", "vehicle_on_can", "view", "service_attacks", "busy_bus"];
 
+/// Programs that take longest: they begin first.
+const LONGEST: [&str; 5] = ["place_images", "agv", "places", "evaluate", "falko"];
+
 /// A program of tests.
 #[derive(Debug, PartialEq)]
-struct Program {
+pub struct Program {
     name: String,
     executable: PathBuf,
     /// Of its crate: where its tests expect to run.
     folder: PathBuf,
 }
 
-/// Builds and runs all tests.
-pub fn run(is_long: bool) -> anyhow::Result<Outcome> {
-    let programs = build()?;
+/// Runs all tests.
+pub fn run(programs: &[Program], is_long: bool) -> anyhow::Result<Outcome> {
     if programs.is_empty() {
         bail!("cargo has built no tests");
     }
@@ -47,28 +51,35 @@ pub fn run(is_long: bool) -> anyhow::Result<Outcome> {
     };
     let (emulated, others): (Vec<_>, Vec<_>) =
         programs.iter().partition(|program| EMULATED.contains(&program.name.as_str()));
-    let (waiting, computing): (Vec<_>, Vec<_>) =
+    let (waiting, mut computing): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|program| WAITING.contains(&program.name.as_str()));
+    computing.sort_by_key(|program| LONGEST.iter().position(|name| *name == program.name).unwrap_or(LONGEST.len()));
     let outcome = Mutex::new(Outcome::new());
-    let run_row = |row: &[&Program]| -> anyhow::Result<()> {
-        for program in row {
+    // Takes one program after the other until none is left.
+    let run_row = |row: &Mutex<VecDeque<&Program>>, threads: Option<usize>| -> anyhow::Result<()> {
+        loop {
+            let next = row.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+            let Some(program) = next else { return Ok(()) };
             let mut command = Command::new(&program.executable);
             command.current_dir(&program.folder).env("CARGO_MANIFEST_DIR", &program.folder);
             set_up(&mut command);
+            command.args(threads.map(|threads| format!("--test-threads={threads}")));
             let output = command.stdin(Stdio::null()).output();
             let output = output.with_context(|| format!("{} cannot be started", program.executable.display()))?;
-            let mut outcome = outcome.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner);
             take(&mut outcome, &program.name, &output);
         }
-        Ok(())
     };
+    let [waiting, computing, emulated] = [waiting, computing, emulated].map(|row| Mutex::new(VecDeque::from(row)));
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     std::thread::scope(|scope| {
-        let beside = scope.spawn(|| run_row(&waiting));
-        run_row(&computing)?;
-        beside.join().unwrap_or_else(|_| bail!("a row of tests broke down"))
+        let mut rows = vec![scope.spawn(|| run_row(&waiting, None))];
+        // A program of one long test would leave the other cores without work.
+        rows.extend((0..cores).map(|_| scope.spawn(|| run_row(&computing, Some(1)))));
+        rows.into_iter().try_for_each(|row| row.join().unwrap_or_else(|_| bail!("a row of tests broke down")))
     })?;
-    run_row(&emulated)?;
-    let mut outcome = outcome.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    run_row(&emulated, None)?;
+    let mut outcome = outcome.into_inner().unwrap_or_else(PoisonError::into_inner);
     let mut examples = cargo_test();
     examples.arg("--doc").arg("--");
     set_up(&mut examples);
@@ -87,7 +98,8 @@ fn cargo_test() -> Command {
     command
 }
 
-fn build() -> anyhow::Result<Vec<Program>> {
+/// Builds all tests.
+pub fn build() -> anyhow::Result<Vec<Program>> {
     let mut command = cargo_test();
     command.args(["--no-run", "--message-format", "json-render-diagnostics"]).stderr(Stdio::inherit());
     let output = command.output().context("cargo cannot be started")?;
