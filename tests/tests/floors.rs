@@ -16,7 +16,7 @@ const CRATES: [&[&str]; 8] = [
     &["controller"],
     &["firmware", "host-sim"],
     &["lab"],
-    &["tests"],
+    &["tests", "benches"],
     &["agv"],
 ];
 

@@ -27,7 +27,7 @@ const WORK: [&str; 14] = [
     "8timeline",
     "7machine",
     "5falko",
-    "11slot_states",
+    "12PoseAndSlots",
     "17motion_correction",
     "12start_finder",
     "11relocalizer",

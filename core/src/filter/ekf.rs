@@ -219,35 +219,24 @@ impl<S: Slots> Ekf<S> {
                 (state, Vector3::new(x, y, theta))
             })
         });
-        // F P: the heading and the biases move the pose.
-        let mut rows = S::Rows::<3>::filled(Vector3::zeros());
-        for (other, row) in rows.as_mut().iter_mut().enumerate().take(count) {
+        let mut own = self.moved_covariance(&moved) + turned(&motion.covariance, sine, cosine);
+        // The heading and the biases move the pose, and with it what it has in common with the other states.
+        for other in SCALE..count {
             let of = |state| self.covariance.get(state, other);
             let heading = of(2);
-            *row = Vector3::new(of(0) - moved.y * heading, of(1) + moved.x * heading, heading);
+            let by_pose = Vector3::new(of(0) - moved.y * heading, of(1) + moved.x * heading, heading);
+            let mut row = by_pose;
             for (state, derivative) in by_bias.iter().flatten() {
-                *row += derivative * of(*state);
+                row += derivative * of(*state);
             }
-        }
-        // (F P) F' for the pose itself.
-        let rows = rows.as_ref();
-        let column = |state: usize| rows.get(state).copied().unwrap_or_default();
-        let heading = column(2);
-        let mut own = [column(0) - heading * moved.y, column(1) + heading * moved.x, heading];
-        for (state, derivative) in by_bias.iter().flatten() {
-            let bias = column(*state);
-            for (value, factor) in own.iter_mut().zip(derivative.iter()) {
-                *value += bias * *factor;
-            }
-        }
-        for (other, row) in rows.iter().enumerate().take(count).skip(SCALE) {
             for (axis, value) in row.iter().enumerate() {
                 self.covariance.set(axis, other, *value);
             }
+            for (_, derivative) in by_bias.iter().flatten().filter(|(state, _)| *state == other) {
+                own += by_pose * derivative.transpose() + derivative * row.transpose();
+            }
         }
-        let [by_x, by_y, by_heading] = own;
-        let noise = turned(&motion.covariance, sine, cosine);
-        self.set_pose_covariance(&(Matrix3::from_columns(&[by_x, by_y, by_heading]) + noise));
+        self.set_pose_covariance(&own);
         if self.has_biases() {
             let walk = &model.walk;
             for (state, deviation) in [(SCALE, walk.scale), (STEERING, walk.steering), (YAW, walk.laser_yaw)] {
@@ -257,6 +246,17 @@ impl<S: Slots> Ekf<S> {
         }
         self.pose = pose;
         self.anchor.as_mut().fill(pose.position());
+    }
+
+    /// `F P F'` of the pose alone, whose heading's error moves its position sideways by `moved`, m, in W.
+    fn moved_covariance(&self, moved: &Point) -> Matrix3<f64> {
+        let of = |row, column| self.covariance.get(row, column);
+        let (hh, xh, yh) = (of(2, 2), of(0, 2), of(1, 2));
+        let (x_heading, y_heading) = (xh - moved.y * hh, yh + moved.x * hh);
+        let xx = of(0, 0) - moved.y * (xh + x_heading);
+        let xy = of(0, 1) - moved.y * yh + moved.x * x_heading;
+        let yy = of(1, 1) + moved.x * (yh + y_heading);
+        Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, hh)
     }
 
     /// Where a laser is that is mounted at `mount` in R. The yaw of the first one is part of the state.

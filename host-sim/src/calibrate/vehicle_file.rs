@@ -126,7 +126,7 @@ impl VehicleFile {
         let Vehicle::Tricycle(tricycle) = &mut parameters.vehicle else {
             return false;
         };
-        let laser = &mut parameters.lasers.first();
+        let laser = parameters.lasers.first_mut();
         for (place, value) in [
             (&mut tricycle.wheelbase, self.wheelbase_m),
             (&mut tricycle.drive_scale, self.drive_scale_m_per_tick),

@@ -46,7 +46,7 @@ impl Fault {
                 }
             }
             FaultKind::MountingWrong { deg, x } => {
-                let laser = &mut recording.parameters.lasers.first();
+                let laser = recording.parameters.lasers.first_mut();
                 *laser = Pose::new(laser.x + x, laser.y, laser.theta + deg.to_radians());
             }
             FaultKind::WheelbaseWrong { metres } => {

@@ -1,6 +1,6 @@
 //! Time of the detector on a real office log and on a synthetic storage.
 
-#[path = "../core/tests/falko/scene.rs"]
+#[path = "../../core/tests/falko/scene.rs"]
 #[allow(dead_code, reason = "the scene also serves tests")]
 mod scene;
 
