@@ -86,4 +86,5 @@ pub mod order;
 pub mod record;
 pub mod relocalization;
 pub mod sensing;
+pub mod sources;
 pub mod state;

@@ -33,6 +33,7 @@ mod second_laser;
 mod slam;
 mod slip_check;
 mod slot_life;
+mod sources;
 mod start_finder;
 mod start_search;
 mod state_slots;

@@ -4,6 +4,8 @@
 mod falko;
 #[path = "../examples/localise.rs"]
 mod localise;
+#[path = "../examples/own_source.rs"]
+mod own_source;
 
 #[test]
 fn a_recorded_tricycle_is_localised() {
@@ -13,4 +15,9 @@ fn a_recorded_tricycle_is_localised() {
 #[test]
 fn keypoints_are_found_in_a_scan() {
     falko::main();
+}
+
+#[test]
+fn a_source_of_ones_own_corrects_the_pose() {
+    own_source::main();
 }

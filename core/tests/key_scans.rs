@@ -1,6 +1,7 @@
 //! How sure a pose is that scans of the way behind hold, and when a scan becomes one of them.
 
 use agv_core::localizer::{KeyScanParameters, Parameters};
+use agv_core::sources::Switches;
 
 use super::support::stage::{Stage, parameters};
 
@@ -11,13 +12,13 @@ const HEADING_FLOOR: f64 = 0.0005;
 fn stage(key_scans: KeyScanParameters) -> Stage {
     let mut parameters: Parameters = parameters();
     parameters.maps.slam = true;
-    parameters.features.detector.farthest = 0.1;
+    parameters.sources = Switches { corners: false, end_points: false, ..Switches::ALL };
     let biases = &mut parameters.slam.biases;
     (biases.scale, biases.steering, biases.laser_yaw) = (0.0, 0.0, 0.0);
     let noise = &mut parameters.odometry_noise;
     (noise.slip, noise.side_slip, noise.yaw) = (0.3, 0.3, 0.3);
     parameters.limits.largest_heading_deviation = 3.0;
-    parameters.slam.key_scans = Some(key_scans);
+    parameters.slam.key_scans = key_scans;
     let mut stage = Stage::new(parameters);
     stage.tell(stage.truth, 1e-6, 1e-7);
     stage.scan();

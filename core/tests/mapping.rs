@@ -4,6 +4,7 @@ use agv_core::filter::BiasDeviations;
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{LandmarkSource, Localizer, Mode, Parameters, Reason};
 use agv_core::maps::{LandmarkKind, Verdict};
+use agv_core::sources::Switches;
 
 use super::support::hall::corners;
 use super::support::stage::{Small, Stage, features, parameters, reflectors};
@@ -75,7 +76,7 @@ fn given_features_are_known_whichever_way_the_vehicle_looks() {
 #[test]
 fn features_are_found_where_they_are_and_known_again_from_all_sides() {
     let mut parameters = mapping();
-    parameters.slam.key_scans = None;
+    parameters.sources.key_scans = false;
     let mut stage = without_map(parameters);
     for revolution in 0..60 {
         stage.drive(0.4, 0.9);
@@ -209,13 +210,14 @@ fn evidence_against_the_pose_loses_it_while_mapping_too() {
 
 #[test]
 fn scans_aligned_to_those_of_the_way_behind_hold_the_pose() {
-    // Features are not seen beyond a short distance, so that the walls themselves must do it.
+    // Without features, so that the walls themselves must do it.
     let drift = |key_scans: bool| {
         let mut parameters = mapping();
         if !key_scans {
-            parameters.slam.key_scans = None;
+            parameters.sources.key_scans = false;
         }
-        parameters.features.detector.farthest = 0.1;
+        parameters.sources.corners = false;
+        parameters.sources.end_points = false;
         parameters.slam.biases = BiasDeviations { scale: 0.0, steering: 0.0, laser_yaw: 0.0 };
         let mut stage = without_map(parameters);
         stage.scale = 0.95;
@@ -239,8 +241,7 @@ fn a_localiser_of_the_usual_size_maps_as_well() {
 /// Reflectors that are far enough from one another, and no features.
 fn among_reflectors() -> (Stage, Vec<Point>) {
     let mut parameters = mapping();
-    parameters.features.detector.farthest = 0.1;
-    parameters.slam.key_scans = None;
+    parameters.sources = Switches { corners: false, end_points: false, key_scans: false, ..Switches::ALL };
     let places = (0..24).map(|index| Point::new(2.2 * f64::from(index % 6) - 5.0, 2.4 * f64::from(index / 6) - 3.5));
     (without_map(parameters), places.collect())
 }

@@ -1,28 +1,10 @@
 //! What the sightings of one event say of the pose.
 
-use super::sighting::Sighting;
-use super::{LandmarkSource, LandmarkUse, Outputs, Reason};
-use crate::filter::Innovation;
-use crate::geometry::Point;
+use super::{LandmarkUse, Outputs, Reason};
 use crate::integrity::InnovationMonitor;
 use crate::maps::{LandmarkKind, Verdict};
-
-/// What became of something that was seen.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Outcome {
-    pub verdict: Verdict,
-    /// The landmark that it was compared with, and the innovation.
-    pub landmark: Option<(LandmarkSource, u16, Innovation)>,
-    /// Where it is in W, m, from the pose before it was used.
-    pub located: Point,
-    /// Whether it has corrected the filter.
-    pub is_used: bool,
-}
-
-impl Outcome {
-    pub const OUT_OF_TIME: Self =
-        Self { verdict: Verdict::OutOfTime, landmark: None, located: Point::new(0.0, 0.0), is_used: false };
-}
+use crate::sources::{Outcome, Sighting, Source};
+use crate::state::LandmarkSource;
 
 /// Way since something last happened, m.
 #[derive(Clone, Copy, Debug)]
@@ -91,6 +73,9 @@ impl<'a> Evidence<'a> {
                 self.distance.feature = 0.0;
             }
         }
+        let test_ratio = outcome.landmark.map(|(_, _, innovation)| innovation.normalised_square / self.gate);
+        let status = self.outputs.sources.of_mut(Source::of_landmark(sighting.kind));
+        status.add(sighting.time, outcome.verdict, is_accepted, test_ratio);
         let position = sighting.observation.position();
         let innovation = outcome.landmark.map(|(_, _, innovation)| innovation);
         let is_told = self.outputs.uses.push(LandmarkUse {
@@ -105,7 +90,7 @@ impl<'a> Evidence<'a> {
             residual_deviation: innovation.map_or([0.0; 2], |innovation| {
                 [libm::sqrt(innovation.covariance.m11), libm::sqrt(innovation.covariance.m22)]
             }),
-            test_ratio: innovation.map_or(0.0, |innovation| innovation.normalised_square / self.gate),
+            test_ratio: test_ratio.unwrap_or(0.0),
         });
         self.outputs.has_cut |= is_told.is_err();
     }

@@ -1,66 +1,11 @@
-//! Fusing what is seen: the same for every state of the filter.
+//! Fusing what is seen, each sighting at its own time or all at the filter's.
 
 use super::Localizer;
-use super::association::{Association, Candidate, Comparison};
-use super::evidence::{Evidence, Outcome};
-use super::maps::Maps;
-use super::sighting::Sighting;
-use super::slam::LandmarkSlots;
-use super::{LandmarkSource, Parameters};
-use crate::filter::{Correction, Ekf, Landmark, Slots};
+use super::evidence::Evidence;
 use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::Time;
-
-/// Corrects a filter by something seen from its state. A landmark of a map that is recognised enters the state, if there are
-/// `slots` and one can be freed. Tells what became of it, and the correction if one was made.
-fn correct<S: Slots, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, const LANDMARKS: usize>(
-    filter: &mut Ekf<S>,
-    mut slots: Option<&mut LandmarkSlots<LANDMARKS>>,
-    maps: &Maps<REFLECTORS, FEATURES, DYNAMIC>,
-    seen: &Sighting,
-    parameters: &Parameters,
-) -> (Outcome, Option<Correction>) {
-    let comparison = Comparison::new(filter, seen, parameters);
-    let Association { verdict, nearest } = comparison.associate(maps, slots.as_deref());
-    let (located, from, orientation) = (comparison.located, comparison.from, comparison.orientation());
-    let Some(Candidate { source, id, landmark, mut linearisation, innovation }) = nearest else {
-        return (Outcome { verdict, landmark: None, located, is_used: false }, None);
-    };
-    let outcome = Outcome { verdict, landmark: Some((source, id, innovation)), located, is_used: false };
-    if verdict != Verdict::Accepted {
-        return (outcome, None);
-    }
-    let free = slots.as_deref().and_then(LandmarkSlots::free);
-    let slot = match (landmark, free) {
-        (Landmark::Slot(slot), _) => Some(slot),
-        (Landmark::Known { position, variance }, Some(free)) => {
-            filter.add_known_landmark(free, position, variance);
-            if let Some(slots) = slots.as_deref_mut() {
-                slots.enter(free, Some(id), seen.kind, orientation);
-            }
-            let Some(by_slot) = filter.observe(&from, &seen.observation, &Landmark::Slot(free)) else {
-                return (outcome, None);
-            };
-            linearisation = by_slot;
-            Some(free)
-        }
-        (Landmark::Known { .. }, None) => None,
-    };
-    let is_used = filter.correct(&linearisation);
-    if let Some((slots, slot)) = slots.zip(slot).filter(|_| is_used) {
-        slots.see(slot);
-    }
-    let correction = match landmark {
-        Landmark::Known { position, variance } if is_used => Some(Correction {
-            observation: seen.observation,
-            mount: seen.mount,
-            landmark: position,
-            landmark_variance: variance,
-        }),
-        _ => None,
-    };
-    (Outcome { is_used, ..outcome }, correction)
-}
+use crate::sources::{LandmarkSlots, Outcome, correct};
+use crate::state::LandmarkSource;
 
 impl<
     const BEAMS: usize,
@@ -79,23 +24,23 @@ impl<
         let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none()) else {
             return;
         };
-        let (parameters, maps) = (&self.parameters, &self.maps);
-        let has_slots = parameters.maps.slam;
+        let (believed, maps) = (self.parameters.believed(), &self.maps);
+        let has_slots = believed.maps.slam;
         // With slots a vehicle without a map of reflectors finds them on its way.
         let are_reflectors_expected = !has_slots || !maps.reflectors.landmarks().is_empty();
-        let gate = parameters.association.gate;
+        let gate = believed.association.gate;
         let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, are_reflectors_expected);
         for sighting in &mut self.workspace.sightings {
             let outcome = if has_slots {
                 let moved = sighting.moved(&self.workspace.path, start, self.slam.time());
                 let (filter, slots) = self.slam.parts();
-                correct(filter, Some(slots), maps, &moved, parameters).0
+                correct(filter, Some(slots), maps, &moved, believed).0
             } else {
                 let mut outcome = Outcome::OUT_OF_TIME;
                 // What finds no place in the past is out of time.
                 let _ = timeline.fuse(sighting.time, |state| {
                     let correction;
-                    (outcome, correction) = correct(state, None::<&mut LandmarkSlots<0>>, maps, sighting, parameters);
+                    (outcome, correction) = correct(state, None::<&mut LandmarkSlots<0>>, maps, sighting, believed);
                     correction
                 });
                 outcome
@@ -129,7 +74,7 @@ impl<
             let may_be_new = sighting.kind != LandmarkKind::Reflector || !are_reflectors_given;
             if may_be_new && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
                 let moved = sighting.moved(&self.workspace.path, start, self.slam.time());
-                self.slam.discover(&moved, &self.parameters);
+                self.slam.discover(&moved, self.parameters.believed());
             }
         }
     }

@@ -40,7 +40,8 @@ impl<
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
     pub(super) fn fuse_scan_by_slam(&mut self, mount: &Pose, scan: &Scan) {
-        self.outputs.has_cut |= self.workspace.see_features(&self.parameters, mount, scan);
+        self.outputs.has_cut |=
+            self.workspace.see_features(&self.parameters.features, &self.parameters.sources, mount, scan);
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }
@@ -49,13 +50,15 @@ impl<
         }
         let place = self.workspace.path.place(self.slam.time().since(scan.start));
         // Key scans are those of the first laser.
-        let is_first = scan.laser == LaserId::FIRST;
-        if is_first {
-            self.slam.align(&self.workspace.points, &place, &self.parameters);
+        let is_aligned = scan.laser == LaserId::FIRST && self.parameters.sources.key_scans;
+        if is_aligned {
+            let status = &mut self.outputs.sources.key_scans;
+            status.begin(self.slam.time());
+            self.slam.align(&self.workspace.points, &place, &self.parameters, status);
         }
         self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
-        if is_first {
+        if is_aligned {
             self.slam.keep(&self.workspace.points, &place, &self.parameters);
         }
         self.end_slam();

@@ -3,18 +3,17 @@
 use heapless::Vec;
 
 use super::evidence::DistanceSince;
-use super::maps::Maps;
-use super::sighting::{Workspace, see_reflectors};
 use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
 use super::supervisor::{Support, supervise};
 use super::{Capacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::{Estimate, Integrity, Replacement, is_sure};
-use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView};
+use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
 use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
 use crate::sensing::{PointScan, SensorPath, detect_reflectors, falko};
+use crate::sources::{Aid, AidOutcome, Maps, Source, Statuses, Workspace, correct_by_aid, see_reflectors};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -132,7 +131,7 @@ impl<
                 reflectors: Vec::new(),
                 sightings: Vec::new(),
             },
-            outputs: Outputs { pose, uses: Vec::new(), misuse: None, has_cut: false },
+            outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
         }
     }
@@ -213,6 +212,7 @@ impl<
         &self.outputs
     }
 
+    // Samples of the odometry come ten times as often as all else: what they do not need is kept out of their way.
     /// Takes one event. Events of one sensor come in order of time. Those of the laser may be as late as the filter
     /// remembers, about 0.4 s, and ahead of the odometry by [`super::Limits::longest_extrapolation`]; an odometry that is
     /// further behind is silent.
@@ -251,6 +251,25 @@ impl<
         &self.outputs
     }
 
+    /// Takes an observation with a model of its own. With landmarks in the state there is no place for it yet: it is told to
+    /// be out of time then.
+    pub fn aid<const SIZE: usize>(&mut self, aid: &impl Aid<SIZE>) -> AidOutcome {
+        let time = aid.time();
+        let is_taken = self.parameters.sources.aids && !self.parameters.maps.slam && self.lost.is_none();
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| is_taken) else { return AidOutcome::OUT_OF_TIME };
+        let Ok(mut state) = timeline.state_at(time) else { return AidOutcome::OUT_OF_TIME };
+        let outcome = correct_by_aid(&mut state, aid);
+        if outcome.verdict == Verdict::Accepted {
+            // The state of that time was there just now.
+            let _ = timeline.set_state(time, state);
+        }
+        let status = &mut self.outputs.sources.aids;
+        status.begin(time);
+        status.add(time, outcome.verdict, outcome.verdict == Verdict::Accepted, outcome.test_ratio);
+        self.publish(true);
+        outcome
+    }
+
     /// The pose for now, and that by odometry alone.
     fn estimate(&mut self) -> Option<Estimate> {
         let timeline = self.timeline.begun_mut()?;
@@ -262,6 +281,7 @@ impl<
     /// Lets the checks compare what an event has shown with what the odometry says; `before` is the estimate before it was
     /// used, and `revolution_of` is the laser whose reflectors of a revolution the event tells, if it does: one that tells
     /// none contradicts none.
+    #[inline(never)]
     fn check(&mut self, before: &Estimate, revolution_of: Option<LaserId>) {
         let Some(after) = self.estimate() else { return };
         let uses = &self.outputs.uses;
@@ -294,13 +314,18 @@ impl<
     /// told its reflectors before.
     fn tells_reflectors(&self, event: &Event) -> bool {
         match event {
-            Event::Reflectors(_) => self.parameters.maps.reflectors,
+            Event::Reflectors(_) => self.parameters.uses_reflectors(),
             Event::Scan(scan) => self.parameters.detection_in(scan).is_some(),
             _ => false,
         }
     }
 
+    #[inline(never)]
     fn set_pose(&mut self, fix: &PoseFix) {
+        if !self.parameters.sources.given_pose {
+            return;
+        }
+        self.outputs.sources.given_pose.begin(fix.time);
         if !fix.is_sound() {
             self.outputs.misuse = Some(Misuse::NoPose);
             return;
@@ -318,6 +343,7 @@ impl<
         self.timeline.begin(fix.time, state);
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.lost = None;
+        self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
         if !is_past {
             let standing = Coasting::new(Motion::none(fix.time));
             self.outage = self.outage.map(|outage| Outage { coasting: standing, ..outage });
@@ -383,6 +409,7 @@ impl<
 
     /// Goes on to `time`, at which something was seen, if that is too far ahead of an odometry that is silent. What the
     /// odometry says later of the same time counts instead.
+    #[inline(never)]
     fn bridge(&mut self, from: Time, time: Time) {
         let limit = self.parameters.limits.longest_extrapolation;
         let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_motion().end) > limit)
@@ -435,6 +462,7 @@ impl<
         }
     }
 
+    #[inline(never)]
     fn doubt_encoders(&mut self, faults: &EncoderFaults) {
         let reason = match (faults.drive, faults.steering) {
             (Some(_), _) => Reason::DriveEncoder,
@@ -460,16 +488,20 @@ impl<
     }
 
     /// Takes reflectors that a laser has found.
+    #[inline(never)]
     fn reflectors_of(&mut self, seen: &Reflectors) {
-        if !self.parameters.maps.reflectors {
+        if !self.parameters.uses_reflectors() {
             return;
         }
         let Some(mount) = self.parameters.lasers.mount(seen.laser).copied() else {
             self.outputs.misuse = Some(Misuse::UnknownLaser);
             return;
         };
+        let time = seen.observations.first().map_or(self.timeline.now(), |first| first.time);
+        self.outputs.sources.reflectors.begin(time);
         self.workspace.sightings.clear();
-        self.outputs.has_cut |= see_reflectors(&self.parameters, &mount, seen, &mut self.workspace.sightings);
+        self.outputs.has_cut |=
+            see_reflectors(&self.parameters.reflectors, &mount, seen, &mut self.workspace.sightings);
         if self.parameters.maps.slam {
             self.fuse_lone_reflectors_by_slam(&mount);
         } else {
@@ -477,6 +509,7 @@ impl<
         }
     }
 
+    #[inline(never)]
     fn scan(&mut self, scan: &Scan) {
         let Some(mount) = self.parameters.lasers.mount(scan.laser).copied() else {
             self.outputs.misuse = Some(Misuse::UnknownLaser);
@@ -494,17 +527,24 @@ impl<
             self.outputs.has_cut |= detect_reflectors(scan, detection, &mut workspace.reflectors) > 0;
             workspace.sightings.clear();
             let seen = Reflectors { laser: scan.laser, observations: &workspace.reflectors };
-            see_reflectors(&self.parameters, &mount, &seen, &mut workspace.sightings);
+            self.outputs.sources.reflectors.begin(scan.start);
+            see_reflectors(&self.parameters.reflectors, &mount, &seen, &mut workspace.sightings);
             if maps.slam {
                 self.fuse_reflectors_by_slam(scan.start);
             } else {
                 self.fuse(scan.start);
             }
         }
+        for source in [Source::Corners, Source::EndPoints] {
+            if self.parameters.sources.of(source) {
+                self.outputs.sources.of_mut(source).begin(scan.start);
+            }
+        }
         if maps.slam {
             self.fuse_scan_by_slam(&mount, scan);
         } else if maps.features || maps.dynamic {
-            self.outputs.has_cut |= self.workspace.see_features(&self.parameters, &mount, scan);
+            self.outputs.has_cut |=
+                self.workspace.see_features(&self.parameters.features, &self.parameters.sources, &mount, scan);
             self.fuse(scan.start);
             self.update_dynamic_map();
         }

@@ -1,6 +1,5 @@
 //! The machine that owns all below: one event in, outputs out.
 
-mod association;
 mod bounds;
 mod capacities;
 mod event;
@@ -10,11 +9,9 @@ mod horizon;
 mod lasers;
 mod localize;
 mod machine;
-mod maps;
 mod output;
 mod output_predictor;
 mod parameters;
-mod sighting;
 mod slam;
 mod start_finder;
 mod start_search;
@@ -28,11 +25,14 @@ pub use localize::Localize;
 pub use machine::Localizer;
 pub use output::{Misuse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;
-pub use parameters::{AssociationParameters, FeatureParameters, Limits, MapUse, Parameters, ReflectorParameters};
+pub use parameters::{Limits, Parameters};
 
-pub use slam::{KeyScanParameters, SLAM_ENTRIES, SLAM_STATES, SlamParameters};
+pub use slam::{SLAM_ENTRIES, SLAM_STATES};
 pub use start_finder::{StartFinder, StartState};
 pub use start_search::{EFFORT_A_REVOLUTION, StartSearch};
 
 pub use crate::measurement::PoseFix;
+pub use crate::sources::{
+    AssociationParameters, FeatureParameters, KeyScanParameters, MapUse, ReflectorParameters, SlamParameters,
+};
 pub use crate::state::{LandmarkSource, LandmarkUse, Mode, PoseOutput, Reason};

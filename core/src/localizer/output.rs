@@ -2,10 +2,9 @@
 
 use heapless::Vec;
 
+pub use crate::sources::OBSERVATIONS;
+use crate::sources::Statuses;
 use crate::state::{LandmarkUse, PoseOutput};
-
-/// Observations of one event at the most.
-pub const OBSERVATIONS: usize = 128;
 
 /// Why an event was not used, or not as it stands: a fault of whoever feeds the localiser, not of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +28,8 @@ pub struct Outputs {
     pub pose: PoseOutput,
     /// What became of the event's observations, in order of time.
     pub uses: Vec<LandmarkUse, OBSERVATIONS>,
+    /// What became of each source, in the last event in which it told something.
+    pub sources: Statuses,
     /// What was wrong with the event itself, if it was not used as it stands.
     pub misuse: Option<Misuse>,
     /// Whether something of the event found no room.

@@ -3,13 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::Lasers;
-use super::slam::SlamParameters;
 use crate::geometry::Pose;
 use crate::integrity::InnovationMonitorParameters;
 use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
 use crate::odometry::{Integration, OdometryNoise, Vehicle};
-use crate::sensing::{ReflectorDetection, falko};
+use crate::sensing::ReflectorDetection;
+use crate::sources::{
+    AssociationParameters, Believed, FeatureParameters, MapUse, ReflectorParameters, SlamParameters, Switches,
+};
 
 /// What the localiser believes of its vehicle and its sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +24,8 @@ pub struct Parameters {
     pub integration: Integration,
     /// How wrong odometry may be.
     pub odometry_noise: OdometryNoise,
+    /// Which sources correct the pose.
+    pub sources: Switches,
     /// Which maps are used.
     pub maps: MapUse,
     /// Reflectors.
@@ -49,6 +53,7 @@ impl Parameters {
             lasers: Lasers::one(laser),
             integration: Integration::default(),
             odometry_noise: OdometryNoise::default(),
+            sources: Switches::default(),
             maps: MapUse::default(),
             reflectors: ReflectorParameters::default(),
             features: FeatureParameters::default(),
@@ -62,99 +67,22 @@ impl Parameters {
 
     /// How reflectors are to be found in a scan, if they are.
     pub(super) fn detection_in(&self, scan: &Scan) -> Option<&ReflectorDetection> {
-        let can_tell = self.maps.reflectors && !scan.intensities.is_empty();
-        self.reflectors.detection.as_ref().filter(|_| can_tell)
+        self.uses_reflectors().then(|| self.reflectors.detection_in(scan)).flatten()
     }
-}
 
-/// Which maps correct the pose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MapUse {
-    /// The fixed map of reflectors.
-    pub reflectors: bool,
-    /// The fixed map of natural features.
-    pub features: bool,
-    /// The dynamic map of natural features (Algorithm 1 of K).
-    pub dynamic: bool,
-    /// Landmarks, calibration and past poses in the state of the filter; the dynamic map is then not used.
-    pub slam: bool,
-}
-
-impl Default for MapUse {
-    fn default() -> Self {
-        Self { reflectors: true, features: true, dynamic: false, slam: false }
+    /// Whether reflectors correct the pose.
+    pub(super) const fn uses_reflectors(&self) -> bool {
+        self.maps.reflectors && self.sources.reflectors
     }
-}
 
-/// How reflectors are seen.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ReflectorParameters {
-    /// Standard deviation of the distance, m.
-    pub range_deviation: f64,
-    /// Standard deviation of the direction, rad.
-    pub bearing_deviation: f64,
-    /// How they are found in scans that report the strength of returns; None if the sensor finds them itself.
-    pub detection: Option<ReflectorDetection>,
-}
-
-impl Default for ReflectorParameters {
-    fn default() -> Self {
-        Self { range_deviation: 0.01, bearing_deviation: 1e-3, detection: None }
-    }
-}
-
-/// How natural features are seen.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FeatureParameters {
-    /// How they are found.
-    pub detector: falko::Parameters,
-    /// Nearest range that counts, m.
-    pub nearest: f32,
-    /// Farthest range that counts, m.
-    pub farthest: f32,
-    /// Standard deviation that is added to what the detector states, along each axis, m.
-    pub added_deviation: f64,
-    /// Whether the scan is corrected for the motion of the vehicle within the revolution.
-    pub motion_correction: bool,
-}
-
-impl Default for FeatureParameters {
-    fn default() -> Self {
-        Self {
-            detector: falko::Parameters::default(),
-            nearest: 0.5,
-            farthest: 30.0,
-            added_deviation: 0.01,
-            motion_correction: true,
+    /// What is believed of landmarks.
+    pub(super) const fn believed(&self) -> Believed<'_> {
+        Believed {
+            maps: self.maps,
+            association: &self.association,
+            dynamic_deviation: self.dynamic_map.deviation,
+            slam: &self.slam,
         }
-    }
-}
-
-/// Which observation belongs to which landmark.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AssociationParameters {
-    /// Reflectors further than this from where one was seen are not considered, m.
-    pub reflector_radius: f64,
-    /// The same for natural features, m.
-    pub feature_radius: f64,
-    /// Largest squared Mahalanobis distance, chi-square with two degrees of freedom.
-    pub gate: f64,
-    /// By how much the second best landmark must be worse, in squared Mahalanobis distance.
-    pub margin: f64,
-    /// How many observations in a row share the error of a landmark's place in the map. The filter takes errors as
-    /// independent; this multiplies the variance of the landmark, so that seeing one landmark often does not make its
-    /// place certain.
-    pub shared_map_error: f64,
-}
-
-impl Default for AssociationParameters {
-    /// The gate lets 99.7 per cent of the right ones pass.
-    fn default() -> Self {
-        Self { reflector_radius: 1.5, feature_radius: 0.3, gate: 11.83, margin: 9.0, shared_map_error: 20.0 }
     }
 }
 

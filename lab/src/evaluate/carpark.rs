@@ -12,6 +12,7 @@ use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::Time;
 use agv_core::odometry::OdometryNoise;
 use agv_core::sensing::ReflectorDetection;
+use agv_core::sources::Switches;
 use serde::Serialize;
 
 use agv_host_sim::accuracy::{Spread, pose_at, truth_at};
@@ -153,9 +154,7 @@ pub fn run(folder: &Path, noise: Noise, knowledge: Knowledge) -> Result<(Outcome
 /// Reflectors in the state, and nothing else: there are no walls to align to, and no pallets.
 fn for_slam(parameters: &mut Parameters) {
     parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: true };
-    parameters.slam.key_scans = None;
-    // No return is so near.
-    parameters.features.detector.farthest = 0.0;
+    parameters.sources = Switches { corners: false, end_points: false, key_scans: false, ..Switches::ALL };
     // A car whose wheel slips and whose steering angle is that of a wheel which does not exist.
     parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 3e-3 };
     // Without a map the uncertainty of the start remains, and grows with the distance from it.

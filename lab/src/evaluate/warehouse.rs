@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use agv_core::localizer::MapUse;
 use agv_core::sensing::falko;
+use agv_core::sources::Switches;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -78,6 +79,8 @@ pub struct Method {
     pub detector: falko::Parameters,
     /// Standard deviation that is added to what the detector states, m.
     pub added_deviation: f64,
+    /// Which sources it may use, key scans aside.
+    pub sources: Switches,
 }
 
 /// What [`falko::Parameters::mended`] keypoints scatter and wander with the viewpoint beyond what it states, m.
@@ -100,16 +103,16 @@ impl Method {
             map: Map::Dynamic,
             detector: falko::Parameters::thesis(),
             added_deviation: PRINTED_DEVIATION,
+            sources: Switches::ALL,
         },
         Self::mended("dynamic", Map::Dynamic),
         Self {
-            detector: falko::Parameters { end_points: None, ..falko::Parameters::mended() },
+            sources: Switches { end_points: false, ..Switches::ALL },
             ..Self::mended("slam with corners alone", Map::SlamCorners)
         },
         Self::mended("slam with features alone", Map::SlamFeatures),
         Self {
-            // No return is so near.
-            detector: falko::Parameters { farthest: 0.0, ..falko::Parameters::mended() },
+            sources: Switches { corners: false, end_points: false, ..Switches::ALL },
             ..Self::mended("slam with key scans alone", Map::SlamKeyScans)
         },
         Self::mended("slam", Map::Slam),
@@ -118,7 +121,13 @@ impl Method {
     ];
 
     const fn mended(name: &'static str, map: Map) -> Self {
-        Self { name, map, detector: falko::Parameters::mended(), added_deviation: MENDED_DEVIATION }
+        Self {
+            name,
+            map,
+            detector: falko::Parameters::mended(),
+            added_deviation: MENDED_DEVIATION,
+            sources: Switches::ALL,
+        }
     }
 }
 
@@ -240,9 +249,7 @@ pub fn prepare(
         // Scale and steering offset are in the state, so the noise need not stand for them.
         recording.parameters.odometry_noise.side_slip = SIDE_SLIP;
     }
-    if !method.map.has_key_scans() {
-        recording.parameters.slam.key_scans = None;
-    }
+    recording.parameters.sources = Switches { key_scans: method.map.has_key_scans(), ..method.sources };
     if method.map.has_static_features() {
         let mapping = scenario(
             BlockStoragePath::Mapping,

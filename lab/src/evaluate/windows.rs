@@ -10,6 +10,7 @@ use agv_core::measurement::PoseIncrement;
 use agv_core::odometry::{OdometryNoise, Vehicle};
 use agv_core::sensing::falko;
 use agv_core::sensing::{SurfaceAlignmentParameters, SurfaceParameters};
+use agv_core::sources::Switches;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -26,38 +27,39 @@ pub struct Candidate {
     pub name: &'static str,
     maps: MapUse,
     detector: falko::Parameters,
-    has_key_scans: bool,
+    sources: Switches,
 }
 
 const NO_MAP: MapUse = MapUse { reflectors: false, features: false, dynamic: false, slam: false };
 const SLAM: MapUse = MapUse { slam: true, ..NO_MAP };
 const DYNAMIC: MapUse = MapUse { dynamic: true, ..NO_MAP };
 
+const WITHOUT_KEY_SCANS: Switches = Switches { key_scans: false, ..Switches::ALL };
+
 impl Candidate {
     /// All candidates; the first is odometry alone.
     pub const ALL: [Self; 6] = [
-        Self { name: "odometry", maps: NO_MAP, detector: falko::Parameters::mended(), has_key_scans: false },
+        Self { name: "odometry", maps: NO_MAP, detector: falko::Parameters::mended(), sources: WITHOUT_KEY_SCANS },
         Self {
             name: "dynamic, FALKO as printed",
             maps: DYNAMIC,
             detector: falko::Parameters::thesis(),
-            has_key_scans: false,
+            sources: WITHOUT_KEY_SCANS,
         },
-        Self { name: "dynamic", maps: DYNAMIC, detector: falko::Parameters::mended(), has_key_scans: false },
+        Self { name: "dynamic", maps: DYNAMIC, detector: falko::Parameters::mended(), sources: WITHOUT_KEY_SCANS },
         Self {
             name: "slam with features alone",
             maps: SLAM,
             detector: falko::Parameters::mended(),
-            has_key_scans: false,
+            sources: WITHOUT_KEY_SCANS,
         },
         Self {
             name: "slam with key scans alone",
             maps: SLAM,
-            // No return is so near.
-            detector: falko::Parameters { farthest: 0.0, ..falko::Parameters::mended() },
-            has_key_scans: true,
+            detector: falko::Parameters::mended(),
+            sources: Switches { corners: false, end_points: false, ..Switches::ALL },
         },
-        Self { name: "slam", maps: SLAM, detector: falko::Parameters::mended(), has_key_scans: true },
+        Self { name: "slam", maps: SLAM, detector: falko::Parameters::mended(), sources: Switches::ALL },
     ];
 
     fn parameters(&self) -> Parameters {
@@ -76,7 +78,8 @@ impl Candidate {
         // Nothing tells the vehicle where it is, so it may grow uncertain.
         parameters.limits.largest_heading_deviation = 1.0;
         parameters.limits.largest_position_deviation = 10.0;
-        parameters.slam.key_scans = self.has_key_scans.then(key_scans);
+        parameters.sources = self.sources;
+        parameters.slam.key_scans = key_scans();
         parameters
     }
 }

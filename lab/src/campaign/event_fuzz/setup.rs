@@ -65,9 +65,9 @@ pub fn parameters(dice: &mut Dice<impl Source>) -> Parameters {
     if dice.once_in(2) {
         parameters.reflectors.detection = Some(ReflectorDetection::default());
     }
-    if dice.once_in(3) {
-        parameters.slam.key_scans = None;
-    }
+    parameters.sources.key_scans = !dice.once_in(3);
+    parameters.sources.corners = !dice.once_in(8);
+    parameters.sources.end_points = !dice.once_in(8);
     if dice.once_in(4) {
         parameters.dynamic_map.deviation = dice.between(0.0, 0.2);
         parameters.dynamic_map.first_hits = u16::from(dice.below(4));

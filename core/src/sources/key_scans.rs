@@ -1,20 +1,62 @@
 //! Scans of the way behind that later scans are aligned to.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
+use super::status::SourceStatus;
 use crate::filter::{Ekf, RelativePose, Slots};
 use crate::geometry::{Pose, difference};
-use crate::sensing::PointScan;
-use crate::sensing::{SurfaceScan, align_to_surfaces};
+use crate::maps::Verdict;
+use crate::measurement::Time;
+use crate::sensing::{PointScan, SurfaceAlignmentParameters, SurfaceParameters, SurfaceScan, align_to_surfaces};
 
-use super::KeyScanParameters;
+/// How scans are aligned to key scans.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct KeyScanParameters {
+    /// Way after which a scan becomes a key scan, m.
+    pub spacing: f64,
+    /// Turn after which it does, rad.
+    pub turn: f64,
+    /// How a key scan's surfaces are found.
+    pub surfaces: SurfaceParameters,
+    /// How scans are aligned to them.
+    pub alignment: SurfaceAlignmentParameters,
+    /// Least share of a scan's returns that must lie on a key scan's surfaces.
+    pub least_share: f64,
+    /// By what the covariance of an alignment is multiplied that takes returns as independent.
+    pub inflation: f64,
+    /// Standard deviation that is added along each axis, m.
+    pub position_floor: f64,
+    /// The same for the heading, rad.
+    pub heading_floor: f64,
+    /// Largest squared Mahalanobis distance from what is expected, chi-square with three degrees of freedom.
+    pub gate: f64,
+}
+
+impl Default for KeyScanParameters {
+    /// Inflation and floors of the project's feasibility study; the gate lets 99.9 per cent of the right ones pass.
+    fn default() -> Self {
+        Self {
+            spacing: 1.5,
+            turn: 0.35,
+            surfaces: SurfaceParameters::default(),
+            alignment: SurfaceAlignmentParameters::default(),
+            least_share: 0.25,
+            inflation: 12.0,
+            position_floor: 0.5e-3,
+            heading_floor: 0.9e-4,
+            gate: 16.3,
+        }
+    }
+}
 
 /// Sectors of a key scan.
 const DIRECTIONS: usize = 720;
 
 /// The surfaces that were seen at the past poses of the state.
 #[derive(Clone, Debug)]
-pub(super) struct KeyScans<const KEYS: usize> {
+pub(crate) struct KeyScans<const KEYS: usize> {
     surfaces: [SurfaceScan<DIRECTIONS>; KEYS],
     /// Place of the newest one; places are taken in turn.
     newest: usize,
@@ -22,22 +64,23 @@ pub(super) struct KeyScans<const KEYS: usize> {
 
 impl<const KEYS: usize> KeyScans<KEYS> {
     #[inline(always)]
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { surfaces: [const { SurfaceScan::new() }; KEYS], newest: 0 }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.newest = 0;
     }
 
-    /// Corrects the filter by what the scan says of the way since each key scan.
-    pub(super) fn align<const BEAMS: usize, S: Slots>(
+    /// Corrects the filter, which stands at `time`, by what the scan says of the distance since each key scan.
+    pub(crate) fn align<const BEAMS: usize, S: Slots>(
         &self,
         filter: &mut Ekf<S>,
         points: &PointScan<BEAMS>,
         place: &Pose,
         laser: &Pose,
         parameters: &KeyScanParameters,
+        (time, status): (Time, &mut SourceStatus),
     ) {
         let returns = points.ranges.iter().filter(|range| **range > 0.0).count();
         let from_place = place.inverse();
@@ -61,17 +104,16 @@ impl<const KEYS: usize> KeyScans<KEYS> {
             };
             let Some(observation) = filter.observe_relative_pose(key, &seen, laser) else { continue };
             let covariance = filter.residual_covariance(&observation);
-            let is_plausible = covariance
-                .cholesky()
-                .is_some_and(|root| observation.residual.dot(&root.solve(&observation.residual)) <= parameters.gate);
-            if is_plausible {
-                filter.correct(&observation);
-            }
+            let Some(root) = covariance.cholesky() else { continue };
+            let test_ratio = observation.residual.dot(&root.solve(&observation.residual)) / parameters.gate;
+            let is_used = test_ratio <= 1.0 && filter.correct(&observation);
+            let verdict = if is_used { Verdict::Accepted } else { Verdict::Gated };
+            status.add(time, verdict, is_used, Some(test_ratio));
         }
     }
 
     /// Makes the scan a key scan if the vehicle has come far enough from the newest one; it takes the place of the oldest.
-    pub(super) fn keep<const BEAMS: usize, S: Slots>(
+    pub(crate) fn keep<const BEAMS: usize, S: Slots>(
         &mut self,
         filter: &mut Ekf<S>,
         points: &PointScan<BEAMS>,

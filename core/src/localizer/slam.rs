@@ -4,25 +4,14 @@
 //! by the odometry. Landmarks that are given beforehand enter the state when they are seen, with the variance that the map
 //! states, so that seeing one often does not make its place certain.
 
-mod key_scans;
-mod landmark_slots;
-mod parameters;
-
-pub use parameters::{KeyScanParameters, SlamParameters};
-
-pub(super) use landmark_slots::LandmarkSlots;
-
+use super::Parameters;
 use crate::filter::{BiasModel, Ekf, PoseAndSlots, Timeline, packed_entries, slot_states};
 use crate::geometry::{Point, Pose, difference};
-use crate::localizer::Parameters;
 use crate::maps::LandmarkKind;
 use crate::measurement::Time;
 use crate::odometry::OdometryBias;
 use crate::sensing::PointScan;
-
-use super::association::Comparison;
-use super::sighting::Sighting;
-use key_scans::KeyScans;
+use crate::sources::{Believed, Comparison, KeyScans, LandmarkSlots, Sighting, SlamParameters, SourceStatus};
 
 /// A filter with room for past poses and landmarks.
 pub(super) type Filter<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize> =
@@ -132,12 +121,12 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// Takes something seen from the filter's state for a new landmark, unless one of its kind is so near that it may be that.
-    pub(super) fn discover(&mut self, seen: &Sighting, parameters: &Parameters) {
-        let comparison = Comparison::new(&self.filter, seen, parameters);
+    pub(super) fn discover(&mut self, seen: &Sighting, believed: Believed) {
+        let comparison = Comparison::new(&self.filter, seen, believed);
         let (located, from, orientation) = (comparison.located, comparison.from, comparison.orientation());
         let least = match seen.kind {
-            LandmarkKind::Reflector => 0.5 * parameters.association.reflector_radius,
-            _ => parameters.slam.least_distance,
+            LandmarkKind::Reflector => 0.5 * believed.association.reflector_radius,
+            _ => believed.slam.least_distance,
         };
         let is_near = |slot: usize| {
             self.filter
@@ -147,7 +136,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         let is_known = self
             .slots
             .occupied()
-            .any(|(slot, landmark)| landmark.resembles(seen.kind, orientation, &parameters.slam) && is_near(slot));
+            .any(|(slot, landmark)| landmark.resembles(seen.kind, orientation, believed.slam) && is_near(slot));
         if is_known {
             return;
         }
@@ -163,16 +152,16 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         self.slots.finish(are_reflectors, parameters, |slot| filter.remove_landmark(slot));
     }
 
-    /// Aligns a scan to the key scans; S is at `place` in the frame of its points. May make it a key scan.
+    /// Aligns a scan of the first laser to the key scans; S is at `place` in the frame of its points.
     pub(super) fn align<const BEAMS: usize>(
         &mut self,
         points: &PointScan<BEAMS>,
         place: &Pose,
         parameters: &Parameters,
+        status: &mut SourceStatus,
     ) {
-        if let Some(wanted) = &parameters.slam.key_scans {
-            self.key_scans.align(&mut self.filter, points, place, &parameters.lasers.first(), wanted);
-        }
+        let (mount, told) = (parameters.lasers.first(), (self.time, status));
+        self.key_scans.align(&mut self.filter, points, place, &mount, &parameters.slam.key_scans, told);
     }
 
     /// Makes a scan a key scan if it is time for one; to be called when all that it tells has been used.
@@ -182,8 +171,6 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         place: &Pose,
         parameters: &Parameters,
     ) {
-        if let Some(wanted) = &parameters.slam.key_scans {
-            self.key_scans.keep(&mut self.filter, points, place, wanted);
-        }
+        self.key_scans.keep(&mut self.filter, points, place, &parameters.slam.key_scans);
     }
 }

@@ -1,14 +1,14 @@
 //! What is known of the landmarks in the state beside their positions.
 
 use crate::geometry::difference;
-use crate::localizer::LandmarkSource;
 use crate::maps::LandmarkKind;
+use crate::state::LandmarkSource;
 
-use super::SlamParameters;
+use super::slot_parameters::SlamParameters;
 
 /// A landmark in the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::localizer) struct Slot {
+pub(crate) struct Slot {
     pub source: LandmarkSource,
     pub id: u16,
     pub kind: LandmarkKind,
@@ -21,22 +21,22 @@ pub(in crate::localizer) struct Slot {
 
 /// One for each landmark's slot of the state.
 #[derive(Clone, Debug)]
-pub(in crate::localizer) struct LandmarkSlots<const LANDMARKS: usize> {
+pub(crate) struct LandmarkSlots<const LANDMARKS: usize> {
     slots: [Option<Slot>; LANDMARKS],
     next_id: u16,
 }
 
 impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { slots: [None; LANDMARKS], next_id: 0 }
     }
 
-    pub(in crate::localizer) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.slots.fill(None);
     }
 
     /// Forgets the landmarks that were given; `remove` is called with their slots.
-    pub(in crate::localizer) fn forget_given(&mut self, mut remove: impl FnMut(usize)) {
+    pub(crate) fn forget_given(&mut self, mut remove: impl FnMut(usize)) {
         for (slot, landmark) in self.slots.iter_mut().enumerate() {
             if landmark.take_if(|landmark| landmark.source == LandmarkSource::Fixed).is_some() {
                 remove(slot);
@@ -45,18 +45,18 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
     }
 
     /// The landmarks with their slots.
-    pub(in crate::localizer) fn occupied(&self) -> impl Iterator<Item = (usize, &Slot)> {
+    pub(crate) fn occupied(&self) -> impl Iterator<Item = (usize, &Slot)> {
         self.slots.iter().enumerate().filter_map(|(slot, landmark)| Some((slot, landmark.as_ref()?)))
     }
 
-    pub(in crate::localizer) fn has_fixed(&self, id: u16, kind: LandmarkKind) -> bool {
+    pub(crate) fn has_fixed(&self, id: u16, kind: LandmarkKind) -> bool {
         self.occupied()
             .any(|(_, landmark)| landmark.source == LandmarkSource::Fixed && landmark.id == id && landmark.kind == kind)
     }
 
     /// Finds a slot for a landmark: a free one, else that of the landmark that has not been seen for longest. None if all
     /// have been seen in this scan.
-    pub(in crate::localizer) fn free(&self) -> Option<usize> {
+    pub(crate) fn free(&self) -> Option<usize> {
         let free = self.slots.iter().position(Option::is_none);
         free.or_else(|| {
             let unseen = self.occupied().filter(|(_, landmark)| landmark.unseen > 0);
@@ -66,13 +66,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
 
     /// Enters a landmark that is seen for the first time; one that was found while driving (no `fixed` name) is given a
     /// name. Returns its name.
-    pub(in crate::localizer) fn enter(
-        &mut self,
-        slot: usize,
-        fixed: Option<u16>,
-        kind: LandmarkKind,
-        orientation: f32,
-    ) -> u16 {
+    pub(crate) fn enter(&mut self, slot: usize, fixed: Option<u16>, kind: LandmarkKind, orientation: f32) -> u16 {
         let (source, id) = match fixed {
             Some(id) => (LandmarkSource::Fixed, id),
             None => {
@@ -87,7 +81,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
     }
 
     /// Notes that a landmark has been seen again.
-    pub(in crate::localizer) fn see(&mut self, slot: usize) {
+    pub(crate) fn see(&mut self, slot: usize) {
         if let Some(Some(landmark)) = self.slots.get_mut(slot) {
             landmark.hits = landmark.hits.saturating_add(1);
             landmark.unseen = 0;
@@ -96,12 +90,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
 
     /// Ends a scan of features, or one of reflectors, which may come apart; `remove` is called with the slots of landmarks
     /// that go.
-    pub(in crate::localizer) fn finish(
-        &mut self,
-        are_reflectors: bool,
-        parameters: &SlamParameters,
-        mut remove: impl FnMut(usize),
-    ) {
+    pub(crate) fn finish(&mut self, are_reflectors: bool, parameters: &SlamParameters, mut remove: impl FnMut(usize)) {
         for (slot, place) in self.slots.iter_mut().enumerate() {
             let Some(landmark) = place else { continue };
             if (landmark.kind == LandmarkKind::Reflector) != are_reflectors {
@@ -122,12 +111,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
 
 impl Slot {
     /// Whether something of that kind and orientation (rad, in W) can be this landmark. A reflector has no orientation.
-    pub(in crate::localizer) fn resembles(
-        &self,
-        kind: LandmarkKind,
-        orientation: f32,
-        parameters: &SlamParameters,
-    ) -> bool {
+    pub(crate) fn resembles(&self, kind: LandmarkKind, orientation: f32, parameters: &SlamParameters) -> bool {
         let turn = difference(f64::from(orientation), f64::from(self.orientation));
         self.kind == kind
             && (kind == LandmarkKind::Reflector || libm::fabs(turn) <= f64::from(parameters.orientation_tolerance))

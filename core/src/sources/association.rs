@@ -1,16 +1,74 @@
 //! Which landmark an observation belongs to.
 
-use super::maps::Maps;
+use serde::{Deserialize, Serialize};
+
+use super::landmark_maps::Maps;
+use super::landmark_slots::LandmarkSlots;
 use super::sighting::Sighting;
-use super::slam::LandmarkSlots;
-use super::{LandmarkSource, MapUse, Parameters};
+use super::slot_parameters::SlamParameters;
 use crate::filter::{Ekf, Innovation, Landmark, Linearisation, Slots, Viewpoint};
 use crate::geometry::{Point, difference};
 use crate::maps::{self, LandmarkKind, NearestNeighbour, Verdict};
+use crate::state::LandmarkSource;
+
+/// Which maps correct the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MapUse {
+    /// The fixed map of reflectors.
+    pub reflectors: bool,
+    /// The fixed map of natural features.
+    pub features: bool,
+    /// The dynamic map of natural features (Algorithm 1 of K).
+    pub dynamic: bool,
+    /// Landmarks, calibration and past poses in the state of the filter; the dynamic map is then not used.
+    pub slam: bool,
+}
+
+impl Default for MapUse {
+    fn default() -> Self {
+        Self { reflectors: true, features: true, dynamic: false, slam: false }
+    }
+}
+
+/// Which observation belongs to which landmark.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AssociationParameters {
+    /// Reflectors further than this from where one was seen are not considered, m.
+    pub reflector_radius: f64,
+    /// The same for natural features, m.
+    pub feature_radius: f64,
+    /// Largest squared Mahalanobis distance, chi-square with two degrees of freedom.
+    pub gate: f64,
+    /// By how much the second best landmark must be worse, in squared Mahalanobis distance.
+    pub margin: f64,
+    /// How many observations in a row share the error of a landmark's place in the map. The filter takes errors as
+    /// independent; this multiplies the variance of the landmark, so that seeing one landmark often does not make its
+    /// place certain.
+    pub shared_map_error: f64,
+}
+
+impl Default for AssociationParameters {
+    /// The gate lets 99.7 per cent of the right ones pass.
+    fn default() -> Self {
+        Self { reflector_radius: 1.5, feature_radius: 0.3, gate: 11.83, margin: 9.0, shared_map_error: 20.0 }
+    }
+}
+
+/// What is believed of landmarks, and which of them are compared.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Believed<'a> {
+    pub maps: MapUse,
+    pub association: &'a AssociationParameters,
+    /// Standard deviation of a landmark of the dynamic map along each axis, m.
+    pub dynamic_deviation: f64,
+    pub slam: &'a SlamParameters,
+}
 
 /// A landmark that an observation was compared with.
 #[derive(Clone, Debug)]
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     pub source: LandmarkSource,
     pub id: u16,
     pub landmark: Landmark,
@@ -20,26 +78,26 @@ pub(super) struct Candidate {
 
 /// The nearest landmark and what it is good for.
 #[derive(Clone, Debug)]
-pub(super) struct Association {
+pub(crate) struct Association {
     pub verdict: Verdict,
     pub nearest: Option<Candidate>,
 }
 
 /// What is compared with the landmarks: something seen from a state of the filter.
-pub(super) struct Comparison<'a, S: Slots> {
+pub(crate) struct Comparison<'a, S: Slots> {
     pub filter: &'a Ekf<S>,
     pub from: Viewpoint,
     pub seen: &'a Sighting,
     /// Where it is in W, m.
     pub located: Point,
-    pub parameters: &'a Parameters,
+    pub believed: Believed<'a>,
 }
 
 impl<'a, S: Slots> Comparison<'a, S> {
-    pub fn new(filter: &'a Ekf<S>, seen: &'a Sighting, parameters: &'a Parameters) -> Self {
+    pub fn new(filter: &'a Ekf<S>, seen: &'a Sighting, believed: Believed<'a>) -> Self {
         let from = filter.viewpoint(seen.laser, &seen.mount);
         let located = from.locate(&seen.observation.position());
-        Self { filter, from, seen, located, parameters }
+        Self { filter, from, seen, located, believed }
     }
 
     /// Direction of what is seen in W, rad.
@@ -48,7 +106,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
     }
 
     fn radius(&self) -> f64 {
-        let association = &self.parameters.association;
+        let association = self.believed.association;
         match self.seen.kind {
             LandmarkKind::Reflector => association.reflector_radius,
             _ => association.feature_radius,
@@ -63,7 +121,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
 
     /// The best of the candidates, if no other is nearly as good.
     fn decide(&self, candidates: impl Iterator<Item = Candidate>) -> Association {
-        let association = &self.parameters.association;
+        let association = self.believed.association;
         let mut nearest = NearestNeighbour::default();
         for candidate in candidates {
             let normalised_square = candidate.innovation.normalised_square;
@@ -80,7 +138,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
         maps: &Maps<REFLECTORS, FEATURES, DYNAMIC>,
         slots: Option<&LandmarkSlots<LANDMARKS>>,
     ) -> Association {
-        let MapUse { reflectors, features, dynamic, .. } = self.parameters.maps;
+        let MapUse { reflectors, features, dynamic, .. } = self.believed.maps;
         let kind = self.seen.kind;
         let in_state = slots.map(|slots| self.in_state(slots));
         let given = |landmark: &maps::Landmark| {
@@ -89,7 +147,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
             }
             let deviation = f64::from(landmark.deviation);
             // A landmark that becomes part of the state is correlated with what it has told.
-            let share = if slots.is_some() { 1.0 } else { self.parameters.association.shared_map_error };
+            let share = if slots.is_some() { 1.0 } else { self.believed.association.shared_map_error };
             let variance = share * deviation * deviation;
             let known = Landmark::Known { position: Point::new(landmark.x, landmark.y), variance };
             self.candidate(LandmarkSource::Fixed, landmark.id, known)
@@ -106,7 +164,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
         if !dynamic || slots.is_some() || lasting.verdict == Verdict::Accepted {
             return lasting;
         }
-        let variance = self.parameters.dynamic_map.deviation * self.parameters.dynamic_map.deviation;
+        let variance = self.believed.dynamic_deviation * self.believed.dynamic_deviation;
         let near = maps.dynamic.near(self.located, radius).filter(|landmark| landmark.kind == kind);
         let found = self.decide(near.filter_map(|landmark| {
             let known = Landmark::Known { position: landmark.position, variance };
@@ -124,7 +182,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
             })
         };
         slots.occupied().filter_map(move |(slot, landmark)| {
-            let may_be = is_near(slot) && landmark.resembles(self.seen.kind, orientation, &self.parameters.slam);
+            let may_be = is_near(slot) && landmark.resembles(self.seen.kind, orientation, self.believed.slam);
             may_be.then(|| self.candidate(landmark.source, landmark.id, Landmark::Slot(slot))).flatten()
         })
     }

@@ -1,0 +1,97 @@
+//! Natural features of a scan: corners and end points of contours.
+
+use nalgebra::Matrix2;
+use serde::{Deserialize, Serialize};
+
+use super::sighting::{Sighting, Workspace};
+use super::{Source, Switches};
+use crate::filter::{Cartesian, Observation};
+use crate::geometry::{Point, Pose};
+use crate::maps::{LandmarkKind, Verdict};
+use crate::measurement::Scan;
+use crate::order::insertion_sort_by;
+use crate::sensing::{KeypointKind, PointScan, falko};
+
+/// How natural features are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FeatureParameters {
+    /// How they are found.
+    pub detector: falko::Parameters,
+    /// Nearest range that counts, m.
+    pub nearest: f32,
+    /// Farthest range that counts, m.
+    pub farthest: f32,
+    /// Standard deviation that is added to what the detector states, along each axis, m.
+    pub added_deviation: f64,
+    /// Whether the scan is corrected for the motion of the vehicle within the revolution.
+    pub motion_correction: bool,
+}
+
+impl Default for FeatureParameters {
+    fn default() -> Self {
+        Self {
+            detector: falko::Parameters::default(),
+            nearest: 0.5,
+            farthest: 30.0,
+            added_deviation: 0.01,
+            motion_correction: true,
+        }
+    }
+}
+
+impl<const BEAMS: usize> Workspace<BEAMS> {
+    /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
+    /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two. True if there
+    /// was not room for all beams and features.
+    pub fn see_features(
+        &mut self,
+        features: &FeatureParameters,
+        switches: &Switches,
+        mount: &Pose,
+        scan: &Scan,
+    ) -> bool {
+        self.points.set(scan, features.nearest, features.farthest);
+        if features.motion_correction {
+            self.path.correct(scan, &mut self.points);
+        }
+        let stride = PointScan::<BEAMS>::stride(scan);
+        self.keypoints.clear();
+        let is_wanted = switches.corners || switches.end_points;
+        let left_out = if is_wanted { self.detector.detect(&self.points, &mut self.keypoints) } else { 0 };
+        insertion_sort_by(&mut self.keypoints, |a, b| a.beam.cmp(&b.beam));
+        self.sightings.clear();
+        let added = features.added_deviation * features.added_deviation;
+        for keypoint in &self.keypoints {
+            let beam = usize::from(keypoint.beam) * stride;
+            let position = Point::new(f64::from(keypoint.position.x), f64::from(keypoint.position.y));
+            let position = if features.motion_correction {
+                self.path.from_start(beam as f64 * scan.beam_interval, &position)
+            } else {
+                position
+            };
+            let [xx, xy, yy] = keypoint.covariance.map(f64::from);
+            let kind = match keypoint.kind {
+                KeypointKind::Corner => LandmarkKind::Corner,
+                KeypointKind::EndPoint => LandmarkKind::EndPoint,
+            };
+            if !switches.of(Source::of_landmark(kind)) {
+                continue;
+            }
+            let _ = self.sightings.push(Sighting {
+                time: scan.beam_time(beam),
+                laser: scan.laser,
+                mount: *mount,
+                kind,
+                observation: Observation::Cartesian(Cartesian {
+                    position,
+                    covariance: Matrix2::new(xx + added, xy, xy, yy + added),
+                }),
+                orientation: keypoint.orientation,
+                matched: None,
+                verdict: Verdict::Unknown,
+            });
+        }
+        stride > 1 || left_out > 0
+    }
+}

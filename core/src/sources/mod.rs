@@ -1,0 +1,130 @@
+//! What corrects the pose: one source a file. Each says what it needs, how it is observed, what its gate lets pass, and what
+//! became of it; each has a switch.
+//!
+//! A new source is its file and one line in the list below. What has a model of its own and no landmarks comes in by
+//! [`Aid`], also from outside this crate (`examples/own_source.rs`).
+
+mod aid;
+mod association;
+mod correction;
+mod features;
+mod key_scans;
+mod landmark_maps;
+mod landmark_slots;
+mod reflectors;
+mod sighting;
+mod slot_parameters;
+mod status;
+
+pub use aid::{Aid, AidOutcome};
+pub use association::{AssociationParameters, MapUse};
+pub use features::FeatureParameters;
+pub use key_scans::KeyScanParameters;
+pub use reflectors::ReflectorParameters;
+pub use slot_parameters::SlamParameters;
+pub use status::SourceStatus;
+
+pub(crate) use aid::correct as correct_by_aid;
+pub(crate) use association::{Believed, Comparison};
+pub(crate) use correction::{Outcome, correct};
+pub(crate) use key_scans::KeyScans;
+pub(crate) use landmark_maps::Maps;
+pub(crate) use landmark_slots::LandmarkSlots;
+pub(crate) use reflectors::see_reflectors;
+pub use sighting::OBSERVATIONS;
+pub(crate) use sighting::{Sighting, Workspace};
+
+use serde::{Deserialize, Serialize};
+
+use crate::maps::LandmarkKind;
+
+/// Makes the list of sources, a switch for each, and what became of each.
+macro_rules! sources {
+    ($($(#[$doc:meta])* $source:ident $field:ident;)+) => {
+        /// What can correct the pose.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Source {
+            $($(#[$doc])* $source,)+
+        }
+
+        impl Source {
+            /// All sources.
+            pub const ALL: &[Self] = &[$(Self::$source),+];
+        }
+
+        /// Which sources may correct the pose.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Switches {
+            $($(#[$doc])* pub $field: bool,)+
+        }
+
+        impl Default for Switches {
+            fn default() -> Self {
+                Self::ALL
+            }
+        }
+
+        impl Switches {
+            /// All of them.
+            pub const ALL: Self = Self { $($field: true,)+ };
+
+            /// Whether a source may correct the pose.
+            #[must_use]
+            pub const fn of(&self, source: Source) -> bool {
+                match source {
+                    $(Source::$source => self.$field,)+
+                }
+            }
+        }
+
+        /// What became of each source.
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct Statuses {
+            $($(#[$doc])* pub $field: SourceStatus,)+
+        }
+
+        impl Statuses {
+            /// What became of a source.
+            #[must_use]
+            pub const fn of(&self, source: Source) -> &SourceStatus {
+                match source {
+                    $(Source::$source => &self.$field,)+
+                }
+            }
+
+            pub(crate) const fn of_mut(&mut self, source: Source) -> &mut SourceStatus {
+                match source {
+                    $(Source::$source => &mut self.$field,)+
+                }
+            }
+        }
+    };
+}
+
+sources! {
+    /// Reflectors that a laser finds, or that are found in its scans: `reflectors.rs`.
+    Reflectors reflectors;
+    /// Corners of the contours: `features.rs`.
+    Corners corners;
+    /// Ends of the contours: `features.rs`.
+    EndPoints end_points;
+    /// Scans of the distance behind: `key_scans.rs`.
+    KeyScans key_scans;
+    /// Poses from outside: the pose begins anew at each.
+    GivenPose given_pose;
+    /// Models from outside: `aid.rs`.
+    Aids aids;
+}
+
+impl Source {
+    /// The source of a landmark of that kind.
+    #[must_use]
+    pub const fn of_landmark(kind: LandmarkKind) -> Self {
+        match kind {
+            LandmarkKind::Reflector => Self::Reflectors,
+            LandmarkKind::Corner => Self::Corners,
+            LandmarkKind::EndPoint => Self::EndPoints,
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Sources: each has its switch, and says what became of it; a model from outside corrects like any other.
+
+use agv_core::filter::{Ekf, Linearisation, Slots};
+use agv_core::geometry::Pose;
+use agv_core::localizer::{MapUse, Parameters};
+use agv_core::maps::Verdict;
+use agv_core::measurement::Time;
+use agv_core::sources::{Aid, Source, Switches};
+use nalgebra::{Matrix1, Vector1};
+
+use super::support::stage::{Stage, parameters};
+
+/// Drives by reflectors, features and key scans.
+fn driven(sources: Switches, slam: bool) -> Stage {
+    let mut wanted: Parameters = parameters();
+    wanted.sources = sources;
+    wanted.maps = MapUse { slam, ..wanted.maps };
+    let mut stage = Stage::new(wanted);
+    stage.tell(stage.truth, 0.02, 0.01);
+    for _ in 0..12 {
+        let revolution = stage.revolve(0.6, 0.1);
+        stage.glimpse(&revolution);
+        stage.scan();
+    }
+    stage
+}
+
+fn without(source: Source) -> Switches {
+    let mut switches = Switches::ALL;
+    match source {
+        Source::Reflectors => switches.reflectors = false,
+        Source::Corners => switches.corners = false,
+        Source::EndPoints => switches.end_points = false,
+        Source::KeyScans => switches.key_scans = false,
+        Source::GivenPose => switches.given_pose = false,
+        Source::Aids => switches.aids = false,
+    }
+    switches
+}
+
+#[test]
+fn a_source_that_is_switched_on_corrects_and_says_so() {
+    let stage = driven(Switches::ALL, true);
+    let statuses = stage.localizer.outputs().sources;
+    for source in [Source::Reflectors, Source::Corners, Source::KeyScans, Source::GivenPose] {
+        let status = statuses.of(source);
+        assert!(status.told.is_some() && status.used.is_some(), "{source:?}: {status:?}");
+        assert!(status.accepted > 0 && status.accepted <= status.observations, "{source:?}: {status:?}");
+        assert!((0.0..=1.0).contains(&status.test_ratio), "{source:?}: {status:?}");
+    }
+    let reflectors = statuses.of(Source::Reflectors);
+    assert!(reflectors.told <= reflectors.used && reflectors.used <= Some(stage.time()), "{reflectors:?}");
+    assert_eq!(statuses.of(Source::Aids).told, None);
+}
+
+#[test]
+fn a_source_that_is_switched_off_corrects_nothing() {
+    for source in Source::ALL.iter().copied() {
+        let stage = driven(without(source), true);
+        let outputs = stage.localizer.outputs();
+        assert_eq!(outputs.sources.of(source).used, None, "{source:?}");
+        let is_known = source != Source::GivenPose;
+        assert_eq!(stage.error().0 < 0.02, is_known, "{source:?}: {:?}", stage.said());
+    }
+}
+
+/// One state is told as it is, but for an error.
+struct Told {
+    time: Time,
+    state: usize,
+    value: f64,
+    deviation: f64,
+}
+
+impl Aid<1> for Told {
+    fn time(&self) -> Time {
+        self.time
+    }
+
+    fn linearise<S: Slots>(&self, state: &Ekf<S>) -> Option<Linearisation<1>> {
+        let Pose { x, y, theta } = state.pose;
+        let expected = [x, y, theta].get(self.state).copied()?;
+        let linearisation =
+            Linearisation::new(Vector1::new(self.value - expected), Matrix1::new(self.deviation * self.deviation));
+        Some(linearisation.with(self.state, Vector1::new(1.0)))
+    }
+
+    fn gate(&self) -> f64 {
+        9.0
+    }
+}
+
+#[test]
+fn an_aid_moves_the_pose_by_its_weight_and_is_gated_beyond_three_deviations() {
+    let mut stage = Stage::new(parameters());
+    stage.tell(stage.truth, 0.04, 0.01);
+    let (time, before) = (stage.time(), stage.said());
+    let told = |value: f64| Told { time, state: 0, value, deviation: 0.03 };
+    // The residual's standard deviation is 5 cm: 15 cm are its gate.
+    let far = stage.localizer.aid(&told(before.pose.x + 0.16));
+    assert_eq!(far.verdict, Verdict::Gated);
+    assert!(far.test_ratio.is_some_and(|ratio| (ratio - 0.16 * 0.16 / (9.0 * 0.0025)).abs() < 1e-9), "{far:?}");
+    assert_eq!(stage.said().pose, before.pose);
+    let near = stage.localizer.aid(&told(before.pose.x + 0.1));
+    assert_eq!(near.verdict, Verdict::Accepted);
+    let after = stage.said();
+    assert!((after.pose.x - before.pose.x - 0.1 * 16.0 / 25.0).abs() < 1e-12, "{after:?}");
+    assert!((after.covariance[0] - 0.0016 * 9.0 / 25.0).abs() < 1e-12, "{after:?}");
+    let status = stage.localizer.outputs().sources.aids;
+    assert_eq!((status.used, status.accepted, status.observations), (Some(time), 1, 1));
+}
+
+#[test]
+fn an_aid_that_is_late_is_used_where_the_vehicle_was_then() {
+    let mut stage = Stage::new(parameters());
+    stage.tell(stage.truth, 0.04, 0.001);
+    stage.drive(1.0, 0.0);
+    let (then, there) = (stage.time(), stage.truth);
+    stage.drive(1.0, 0.0);
+    let told = Told { time: then, state: 0, value: there.x + 0.02, deviation: 1e-4 };
+    assert_eq!(stage.localizer.aid(&told).verdict, Verdict::Accepted);
+    assert!((stage.said().pose.x - stage.truth.x - 0.02).abs() < 1e-3, "{:?} {:?}", stage.said().pose, stage.truth);
+    let never = Told { time: Time::from_micros(1), ..told };
+    assert_eq!(stage.localizer.aid(&never).verdict, Verdict::OutOfTime);
+    let nowhere = Told { state: 7, time: stage.time(), ..never };
+    assert_eq!(stage.localizer.aid(&nowhere).verdict, Verdict::Unknown);
+}
