@@ -38,6 +38,7 @@ const HOUSES: [House; 7] = [
             &["measurement"],
             &["maps", "odometry", "sensing"],
             &["calibration", "filter", "relocalization", "state"],
+            &["sources"],
             &["integrity"],
             &["localizer"],
             &["record"],
