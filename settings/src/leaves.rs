@@ -146,7 +146,7 @@ macro_rules! address {
 }
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 60] = [
+pub static LEAVES: [Leaf; 66] = [
     tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
     tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
     tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
