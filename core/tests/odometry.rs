@@ -10,8 +10,8 @@ use agv_core::filter::Ekf;
 use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
-    Ackermann, Control, CounterRange, Integration, Motion, Odometer, OdometryBias, OdometryError, OdometryNoise,
-    Tricycle, Vehicle,
+    Ackermann, Control, CounterRange, Integration, Motion, OdometerParameters, OdometryBias, OdometryError,
+    OdometryNoise, Tricycle, Vehicle, VehicleOdometer,
 };
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -146,8 +146,16 @@ fn tricycle() -> Tricycle {
     }
 }
 
-fn tricycle_odometer() -> Odometer {
-    Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::RungeKutta2, 100.0, 0.25)
+fn tricycle_odometer() -> VehicleOdometer {
+    VehicleOdometer::new(
+        &Vehicle::Tricycle(tricycle()),
+        &OdometerParameters {
+            noise: OdometryNoise::default(),
+            integration: Integration::RungeKutta2,
+            fastest: 100.0,
+            longest_interval: 0.25,
+        },
+    )
 }
 
 /// Error of the end pose after a drive of 2 m whose steering angle is `rate * way`, in `steps` steps, against the
@@ -203,8 +211,15 @@ fn an_arc_of_constant_steering_is_exact() {
 #[test]
 fn the_asymmetric_model_uses_the_offset_of_the_direction() {
     let asymmetric = Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
-    let mut odometer =
-        Odometer::new(Vehicle::Tricycle(asymmetric), OdometryNoise::default(), Integration::Arc, 100.0, 0.25);
+    let mut odometer = VehicleOdometer::new(
+        &Vehicle::Tricycle(asymmetric),
+        &OdometerParameters {
+            noise: OdometryNoise::default(),
+            integration: Integration::Arc,
+            fastest: 100.0,
+            longest_interval: 0.25,
+        },
+    );
     let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
     assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
     let forward = odometer.encoders(&sample(100_000, 10_000)).unwrap();
@@ -216,7 +231,15 @@ fn the_asymmetric_model_uses_the_offset_of_the_direction() {
 #[test]
 fn a_drive_counter_that_wraps_goes_on() {
     let small = Tricycle { drive_range: CounterRange::new(5_000).unwrap(), ..tricycle() };
-    let mut odometer = Odometer::new(Vehicle::Tricycle(small), OdometryNoise::default(), Integration::Arc, 20.0, 0.25);
+    let mut odometer = VehicleOdometer::new(
+        &Vehicle::Tricycle(small),
+        &OdometerParameters {
+            noise: OdometryNoise::default(),
+            integration: Integration::Arc,
+            fastest: 20.0,
+            longest_interval: 0.25,
+        },
+    );
     let mut way = 0.0;
     for step in 0u64..100 {
         let drive = (step * 700 % 5_000) as u32;
@@ -232,7 +255,15 @@ fn a_drive_counter_that_wraps_goes_on() {
 fn a_car_turns_about_the_point_that_its_wheels_agree_on() {
     // Rear-left wheel at radius R - H, rear axle's centre at R = L / tan(steering).
     let car = Ackermann { wheelbase: 2.83, encoder_offset: 0.76 };
-    let mut odometer = Odometer::new(Vehicle::Ackermann(car), OdometryNoise::default(), Integration::Arc, 100.0, 0.25);
+    let mut odometer = VehicleOdometer::new(
+        &Vehicle::Ackermann(car),
+        &OdometerParameters {
+            noise: OdometryNoise::default(),
+            integration: Integration::Arc,
+            fastest: 100.0,
+            longest_interval: 0.25,
+        },
+    );
     let steering: f64 = 0.3;
     let radius = 2.83 / steering.tan();
     let turn_rate = 0.4;
@@ -271,8 +302,15 @@ fn a_turn_that_is_not_reported_moves_no_vehicle_that_turns_in_place() {
 
 #[test]
 fn samples_that_cannot_be_are_refused() {
-    let mut odometer =
-        Odometer::new(Vehicle::Tricycle(tricycle()), OdometryNoise::default(), Integration::Arc, 2.0, 0.25);
+    let mut odometer = VehicleOdometer::new(
+        &Vehicle::Tricycle(tricycle()),
+        &OdometerParameters {
+            noise: OdometryNoise::default(),
+            integration: Integration::Arc,
+            fastest: 2.0,
+            longest_interval: 0.25,
+        },
+    );
     let sample = |time, drive: u32| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
     assert_eq!(odometer.encoders(&sample(100, 0)), Err(OdometryError::First));
     assert_eq!(odometer.encoders(&sample(100, 1)), Err(OdometryError::OutOfOrder));
@@ -286,7 +324,17 @@ fn samples_that_cannot_be_are_refused() {
 
 #[test]
 fn samples_too_far_apart_make_no_motion_and_the_next_one_does() {
-    let odometer = |vehicle| Odometer::new(vehicle, OdometryNoise::default(), Integration::Arc, 5.0, 0.25);
+    let odometer = |vehicle| {
+        VehicleOdometer::new(
+            &vehicle,
+            &OdometerParameters {
+                noise: OdometryNoise::default(),
+                integration: Integration::Arc,
+                fastest: 5.0,
+                longest_interval: 0.25,
+            },
+        )
+    };
     let time = Time::from_micros;
     let mut encoders = odometer(Vehicle::Tricycle(tricycle()));
     let mut speeds = odometer(Vehicle::Ackermann(Ackermann { wheelbase: 2.0, encoder_offset: 0.0 }));
@@ -310,8 +358,15 @@ fn a_counter_of_which_the_fastest_vehicle_may_go_half_the_range_is_not_believed(
     // Half of 16 bits are 0.328 m, which 5 m/s are in 65.5 ms.
     let short = Tricycle { drive_scale: 1e-5, drive_range: CounterRange::BITS_16, ..tricycle() };
     for (micros, is_told) in [(60_000, true), (65_000, true), (66_000, false), (120_000, false)] {
-        let mut odometer =
-            Odometer::new(Vehicle::Tricycle(short), OdometryNoise::default(), Integration::Arc, 5.0, 0.25);
+        let mut odometer = VehicleOdometer::new(
+            &Vehicle::Tricycle(short),
+            &OdometerParameters {
+                noise: OdometryNoise::default(),
+                integration: Integration::Arc,
+                fastest: 5.0,
+                longest_interval: 0.25,
+            },
+        );
         let sample = |time, drive| EncoderSample { time: Time::from_micros(time), drive, steering: 0 };
         assert_eq!(odometer.encoders(&sample(0, 0)), Err(OdometryError::First));
         // The vehicle goes at 4.9 m/s.

@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 use agv_core::geometry::{Pose, Twist};
 use agv_core::measurement::{PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
-    Ackermann, Coasting, Control, CounterRange, Integration, Motion, Odometer, OdometryBias, OdometryError,
-    OdometryNoise, Tricycle, Vehicle,
+    Ackermann, Coasting, Control, CounterRange, Integration, Motion, OdometerParameters, OdometryBias, OdometryError,
+    OdometryNoise, Tricycle, Vehicle, VehicleOdometer,
 };
 use nalgebra::{Matrix2, Matrix3, Matrix3x2};
 
@@ -31,8 +31,11 @@ const NOISE: OdometryNoise = OdometryNoise {
     unknown_turn: 0.7,
 };
 
-fn odometer(vehicle: Vehicle, fastest: f64) -> Odometer {
-    Odometer::new(vehicle, NOISE, Integration::Arc, fastest, 1.0)
+fn odometer(vehicle: Vehicle, fastest: f64) -> VehicleOdometer {
+    VehicleOdometer::new(
+        &vehicle,
+        &OdometerParameters { noise: NOISE, integration: Integration::Arc, fastest: fastest, longest_interval: 1.0 },
+    )
 }
 
 fn time(micros: u64) -> Time {

@@ -11,7 +11,7 @@ use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::{Estimate, Integrity, Replacement, is_sure};
 use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
-use crate::odometry::{Coasting, Motion, Odometer, OdometryBias, OdometryError};
+use crate::odometry::{Coasting, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::sensing::{PointScan, SensorPath, detect_reflectors, falko};
 use crate::sources::{Aid, AidOutcome, Maps, Source, Statuses, Workspace, correct_by_aid, see_reflectors};
 
@@ -36,7 +36,7 @@ pub struct Localizer<
     const ENTRIES: usize = SLAM_ENTRIES,
 > {
     pub(super) parameters: Parameters,
-    pub(super) odometer: Odometer,
+    pub(super) odometer: VehicleOdometer,
     pub(super) maps: Maps<REFLECTORS, FEATURES, DYNAMIC>,
     pub(super) timeline: Timeline<PAST>,
     pub(super) slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
@@ -104,13 +104,7 @@ impl<
             overflows: 0,
         };
         Self {
-            odometer: Odometer::new(
-                parameters.vehicle,
-                parameters.odometry_noise,
-                parameters.integration,
-                parameters.limits.fastest,
-                parameters.limits.longest_interval(),
-            ),
+            odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
             maps: Maps {
                 reflectors: FixedMap::new(),
                 features: FixedMap::new(),

@@ -10,7 +10,7 @@ use nalgebra::Matrix3;
 use super::Parameters;
 use crate::filter::Ekf;
 use crate::measurement::{EncoderFaults, EncoderSample, Time};
-use crate::odometry::{Motion, Odometer, OdometryBias};
+use crate::odometry::{Motion, OdometryBias, VehicleOdometer};
 use crate::state::{Mode, PoseOutput, Reason};
 
 /// Longest time, s, for which a localiser that says nothing is merely busy: the longest scan, twice.
@@ -21,7 +21,8 @@ const LONGEST_BUSY: f64 = 0.25;
 /// vehicle had kept its velocity for that time.
 #[derive(Clone, Debug)]
 pub struct OutputPredictor<const MOTIONS: usize = 40> {
-    odometer: Odometer,
+    odometer: VehicleOdometer,
+    lever: Option<f64>,
     dead_reckoning_from: f64,
     motions: Vec<Motion, MOTIONS>,
     base: Option<PoseOutput>,
@@ -35,13 +36,8 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
     #[must_use]
     pub fn new(parameters: &Parameters) -> Self {
         Self {
-            odometer: Odometer::new(
-                parameters.vehicle,
-                parameters.odometry_noise,
-                parameters.integration,
-                parameters.limits.fastest,
-                parameters.limits.longest_interval(),
-            ),
+            odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
+            lever: parameters.vehicle.steering_lever(),
             dead_reckoning_from: parameters.limits.dead_reckoning_from,
             motions: Vec::new(),
             base: None,
@@ -59,9 +55,8 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         let [xx, xy, yy, x_heading, y_heading, heading] = output.covariance;
         let covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, heading);
         self.state = Ekf::with_covariance(output.pose, &covariance);
-        let lever = self.odometer.vehicle().steering_lever();
         for motion in &self.motions {
-            go_on(&mut self.state, &motion.corrected(bias, lever), output.time);
+            go_on(&mut self.state, &motion.corrected(bias, self.lever), output.time);
         }
     }
 
@@ -77,7 +72,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         // There is room.
         let _ = self.motions.push(motion);
         if let Some(base) = self.base.filter(|base| motion.end > base.time) {
-            let motion = motion.corrected(&self.bias, self.odometer.vehicle().steering_lever());
+            let motion = motion.corrected(&self.bias, self.lever);
             go_on(&mut self.state, &motion, base.time);
         }
     }

@@ -7,7 +7,7 @@ use crate::geometry::Pose;
 use crate::integrity::InnovationMonitorParameters;
 use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
-use crate::odometry::{Integration, OdometryNoise, Vehicle};
+use crate::odometry::{Integration, OdometerParameters, OdometryNoise, Vehicle};
 use crate::sensing::ReflectorDetection;
 use crate::sources::{
     AssociationParameters, Believed, FeatureParameters, MapUse, ReflectorParameters, SlamParameters, Switches,
@@ -73,6 +73,17 @@ impl Parameters {
     /// Whether reflectors correct the pose.
     pub(super) const fn uses_reflectors(&self) -> bool {
         self.maps.reflectors && self.sources.reflectors
+    }
+
+    /// What an odometer of the vehicle believes.
+    #[must_use]
+    pub fn odometer(&self) -> OdometerParameters {
+        OdometerParameters {
+            noise: self.odometry_noise,
+            integration: self.integration,
+            fastest: self.limits.fastest,
+            longest_interval: self.limits.longest_interval(),
+        }
     }
 
     /// What is believed of landmarks.

@@ -8,7 +8,7 @@ use heapless::Vec;
 use super::{Event, Parameters, PoseFix};
 use crate::geometry::{Point, Pose};
 use crate::measurement::{LaserId, ReflectorObservation, Time};
-use crate::odometry::{Motion, Odometer, OdometryError, RecentMotion};
+use crate::odometry::{Motion, OdometryError, RecentMotion, VehicleOdometer};
 use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
@@ -48,7 +48,7 @@ const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 #[derive(Clone, Debug)]
 pub struct StartFinder<const SEEN: usize = 64> {
     parameters: Parameters,
-    odometer: Odometer,
+    odometer: VehicleOdometer,
     recent: RecentMotion,
     /// Nothing that was seen before is placed, as nobody knows how the vehicle moved.
     known_from: Option<Time>,
@@ -69,15 +69,8 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     /// A finder that has seen nothing.
     #[must_use]
     pub fn new(parameters: Parameters, search: RelocalizationParameters) -> Self {
-        let (vehicle, noise) = (parameters.vehicle, parameters.odometry_noise);
         Self {
-            odometer: Odometer::new(
-                vehicle,
-                noise,
-                parameters.integration,
-                parameters.limits.fastest,
-                parameters.limits.longest_interval(),
-            ),
+            odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
             recent: RecentMotion::standing(Time::default()),
             known_from: None,
             is_blind: false,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Motion, Vehicle};
+use super::Motion;
 use crate::geometry::Pose;
 
 /// Lasting errors of a vehicle's own account of its motion.
@@ -37,18 +37,6 @@ impl BiasJacobian {
         Self {
             scale: [displacement.x, 2.0 * displacement.y, displacement.theta],
             steering: [along, 0.5 * displacement.x * turn, turn],
-        }
-    }
-}
-
-impl Vehicle {
-    /// Distance from the axle to the wheel of which [`OdometryBias::steering`] is the angle, m; none without such a wheel.
-    #[must_use]
-    pub fn steering_lever(&self) -> Option<f64> {
-        match self {
-            Self::Tricycle(tricycle) => Some(tricycle.wheelbase),
-            Self::Ackermann(car) => Some(car.wheelbase),
-            Self::Increments => None,
         }
     }
 }

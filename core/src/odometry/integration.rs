@@ -3,6 +3,7 @@
 use nalgebra::Matrix3x2;
 use serde::{Deserialize, Serialize};
 
+use super::kinematics::{Believed, Step};
 use crate::geometry::{Pose, Twist};
 
 /// What the steered wheel did between two samples; its angle changes linearly with the way.
@@ -39,6 +40,16 @@ impl Control {
     /// Steering angle after a quarter of the way, rad (K 5.11: alpha_34).
     fn quarter_steering(&self) -> f64 {
         0.25 * (self.steering_end + 3.0 * self.steering_start)
+    }
+
+    /// The step that it makes in `duration` seconds, for a wheel `wheelbase` (m) ahead of the rear axle.
+    pub(super) fn step(&self, wheelbase: f64, duration: f64, believed: &Believed) -> Step {
+        Step {
+            displacement: self.displacement(wheelbase, believed.integration),
+            covariance: believed.noise.of_control(self, wheelbase, duration),
+            distance: libm::fabs(self.distance),
+            is_backward: self.distance < 0.0,
+        }
     }
 
     /// Displacement of R, in R at the start, for a wheel `wheelbase` (m) ahead of the rear axle.

@@ -3,7 +3,7 @@
 use agv_core::geometry::difference;
 use agv_core::localizer::{Mode, PoseOutput};
 use agv_core::measurement::Time;
-use agv_core::odometry::Odometer;
+use agv_core::odometry::VehicleOdometer;
 use serde::Serialize;
 
 use crate::accuracy::{pose_at, pose_error};
@@ -116,13 +116,7 @@ fn way_at(points: &[TrackPoint], time: Time) -> f64 {
 /// How far R moves with each event, by its odometry, m.
 fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
     let parameters = &recording.parameters;
-    let mut odometer = Odometer::new(
-        parameters.vehicle,
-        parameters.odometry_noise,
-        parameters.integration,
-        parameters.limits.fastest,
-        parameters.limits.longest_interval(),
-    );
+    let mut odometer = VehicleOdometer::new(&parameters.vehicle, &parameters.odometer());
     recording.events.iter().map(move |event| {
         let motion = match event {
             RecordedEvent::Encoders(sample) => odometer.encoders(sample),

@@ -11,7 +11,7 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{LandmarkUse, Mode, PoseOutput, Reason};
 use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::{EncoderFault, EncoderFaults, PoseFix, Time};
-use agv_core::odometry::{Motion, Odometer};
+use agv_core::odometry::{Motion, VehicleOdometer};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use serde::Serialize;
@@ -270,7 +270,7 @@ impl Writer {
 
 /// What is known on the way through a drive.
 struct Exporter {
-    odometer: Odometer,
+    odometer: VehicleOdometer,
     /// Integrated odometry.
     odometry: Pose,
     /// When the newest event arrived: the latest time that any event spoke of.
@@ -284,13 +284,7 @@ impl Exporter {
     fn new(recording: &Recording, now: Time) -> Self {
         let parameters = &recording.parameters;
         Self {
-            odometer: Odometer::new(
-                parameters.vehicle,
-                parameters.odometry_noise,
-                parameters.integration,
-                parameters.limits.fastest,
-                parameters.limits.longest_interval(),
-            ),
+            odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
             odometry: Pose::default(),
             now,
             scan_start: None,

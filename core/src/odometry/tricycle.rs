@@ -1,0 +1,61 @@
+//! A tricycle whose front wheel steers and drives.
+
+use serde::{Deserialize, Serialize};
+
+use super::kinematics::{Believed, Kinematics, Step};
+use super::{Control, CounterRange};
+use crate::measurement::{EncoderSample, Time};
+
+/// A tricycle whose front wheel steers and drives (K 2.1.1), with one steering offset for each direction of travel
+/// (K 2.1.2); the standard model is the one in which both are equal. It reports two counters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tricycle {
+    /// Distance from the rear axle to the driving wheel's steering axis, m (K: L).
+    pub wheelbase: f64,
+    /// Distance travelled by the driving wheel for one tick, m (K: s_w).
+    pub drive_scale: f64,
+    /// Range of the driving wheel's counter.
+    pub drive_range: CounterRange,
+    /// Steering angle for one tick, rad.
+    pub steering_scale: f64,
+    /// Range of the steering counter; readings in its upper half are negative angles.
+    pub steering_range: CounterRange,
+    /// What is added to the measured steering angle while driving forward, rad (K 2.6: alpha_F).
+    pub steering_offset_forward: f64,
+    /// What is added to the measured steering angle while driving backward, rad (K 2.6: alpha_B).
+    pub steering_offset_backward: f64,
+}
+
+impl Kinematics for Tricycle {
+    type Report = EncoderSample;
+
+    fn time(report: &EncoderSample) -> Time {
+        report.time
+    }
+
+    fn is_sound(&self, _: &EncoderSample) -> bool {
+        true
+    }
+
+    fn step(&self, from: &EncoderSample, to: &EncoderSample, duration: f64, believed: &Believed) -> Step {
+        let ticks = self.drive_range.step(from.drive, to.drive);
+        let is_backward = if ticks == 0 { believed.was_backward } else { ticks < 0 };
+        let offset = if is_backward { self.steering_offset_backward } else { self.steering_offset_forward };
+        let angle = |reading: u32| self.steering_scale * self.steering_range.signed(reading) as f64 + offset;
+        let control = Control {
+            distance: self.drive_scale * ticks as f64,
+            steering_start: angle(from.steering),
+            steering_end: angle(to.steering),
+        };
+        Step { is_backward, ..control.step(self.wheelbase, duration, believed) }
+    }
+
+    fn steering_lever(&self) -> Option<f64> {
+        Some(self.wheelbase)
+    }
+
+    /// At its fastest the vehicle may go half of the counter's range; beyond, it may seem to go the other way.
+    fn longest_interval(&self, fastest: f64) -> f64 {
+        0.5 * self.drive_range.values() as f64 * libm::fabs(self.drive_scale) / fastest
+    }
+}
