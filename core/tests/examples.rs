@@ -6,6 +6,8 @@ mod falko;
 mod localise;
 #[path = "../examples/own_source.rs"]
 mod own_source;
+#[path = "../examples/own_vehicle.rs"]
+mod own_vehicle;
 
 #[test]
 fn a_recorded_tricycle_is_localised() {
@@ -20,4 +22,9 @@ fn keypoints_are_found_in_a_scan() {
 #[test]
 fn a_source_of_ones_own_corrects_the_pose() {
     own_source::main();
+}
+
+#[test]
+fn a_vehicle_of_ones_own_is_localised() {
+    own_vehicle::main();
 }

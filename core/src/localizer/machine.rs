@@ -211,9 +211,7 @@ impl<
     /// remembers, about 0.4 s, and ahead of the odometry by [`super::Limits::longest_extrapolation`]; an odometry that is
     /// further behind is silent.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
-        self.outputs.uses.clear();
-        self.outputs.has_cut = false;
-        self.outputs.misuse = None;
+        self.begin_event();
         if let Some((from, until)) = event.seen().filter(|(_, until)| *until > self.timeline.now()) {
             self.bridge(from, until);
         }
@@ -245,10 +243,20 @@ impl<
         &self.outputs
     }
 
+    /// Takes a motion of a vehicle that is none of [`crate::odometry::Vehicle`], or why there is none; `time` is that of the
+    /// report which has told it. An [`crate::odometry::Odometer`] makes it of what the vehicle reports.
+    pub fn travel(&mut self, time: Time, motion: Result<Motion, OdometryError>) -> &Outputs {
+        self.begin_event();
+        self.move_by(time, motion);
+        self.publish(false);
+        &self.outputs
+    }
+
     /// Takes an observation with a model of its own. With landmarks in the state there is no place for it yet: it is told to
     /// be out of time then.
     pub fn aid<const SIZE: usize>(&mut self, aid: &impl Aid<SIZE>) -> AidOutcome {
         let time = aid.time();
+        self.begin_event();
         let is_taken = self.parameters.sources.aids && !self.parameters.maps.slam && self.lost.is_none();
         let Some(timeline) = self.timeline.begun_mut().filter(|_| is_taken) else { return AidOutcome::OUT_OF_TIME };
         let Ok(mut state) = timeline.state_at(time) else { return AidOutcome::OUT_OF_TIME };
@@ -262,6 +270,12 @@ impl<
         status.add(time, outcome.verdict, outcome.verdict == Verdict::Accepted, outcome.test_ratio);
         self.publish(true);
         outcome
+    }
+
+    fn begin_event(&mut self) {
+        self.outputs.uses.clear();
+        self.outputs.has_cut = false;
+        self.outputs.misuse = None;
     }
 
     /// The pose for now, and that by odometry alone.
