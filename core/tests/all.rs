@@ -26,6 +26,7 @@ mod overflow;
 mod parameters;
 mod pose_output;
 mod prediction;
+mod public_items;
 mod record;
 mod reflector_detection;
 mod reflector_search;

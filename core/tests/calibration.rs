@@ -3,11 +3,13 @@
 
 use agv_core::calibration::{
     Calibration, Calibrator, Conditioning, MountingSide, Offsets, Problem, Registration, Segment, SegmentBuilder,
-    Unobservable, calibrate, intrinsic_asymmetric, intrinsic_standard, reference_drive_bits,
+    Unobservable, calibrate, intrinsic_asymmetric, intrinsic_standard,
 };
 use agv_core::geometry::{Point, Pose};
 use agv_core::odometry::{Control, CounterRange, Integration, Tricycle};
 use proptest::prelude::*;
+
+use super::support::reference_drive::reference_drive_bits;
 
 #[derive(Clone, Copy, Debug)]
 struct Truth {

@@ -2,6 +2,9 @@
 //!
 //! The images are those of `cargo xtask firmware build`, which `cargo xtask test` runs first.
 
+#[path = "../../core/tests/support/reference_drive.rs"]
+mod reference_drive;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -128,7 +131,7 @@ fn the_emulated_controller_calibrates_to_the_same_bits() {
     // The sums of a whole drive; and all that this drive took, its own sums included, as they are on the stack.
     let [sums, stack, _] = numbers[..] else { panic!("{cost}") };
     assert!(sums <= 2048 && stack <= 2048, "{cost}");
-    let expected = agv_core::calibration::reference_drive_bits().unwrap();
+    let expected = reference_drive::reference_drive_bits().unwrap();
     let expected: Vec<String> = expected.iter().map(|number| format!("{number:016x}")).collect();
     assert_eq!(bits.lines().collect::<Vec<_>>(), expected);
 }

@@ -12,7 +12,6 @@ mod intrinsic_asymmetric;
 mod intrinsic_standard;
 mod observability;
 mod outliers;
-mod reference_drive;
 mod registration;
 mod segment;
 
@@ -24,7 +23,6 @@ pub use intrinsic_asymmetric::intrinsic_asymmetric;
 pub use intrinsic_standard::intrinsic_standard;
 pub use observability::Unobservable;
 pub use outliers::{OutlierFlags, outliers};
-pub use reference_drive::reference_drive_bits;
 pub use registration::{Registered, Registration};
 pub use segment::{Segment, SegmentBuilder};
 

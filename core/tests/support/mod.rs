@@ -1,5 +1,6 @@
 //! A hall and a vehicle in it, whose truth is known to the tests.
 
 pub mod hall;
+pub mod reference_drive;
 pub mod stage;
 pub mod view;

@@ -3,11 +3,14 @@
 #![no_std]
 #![no_main]
 
+#[path = "../../../core/tests/support/reference_drive.rs"]
+mod reference_drive;
+
 use core::fmt::Write;
 use core::mem::size_of;
 use core::panic::PanicInfo;
 
-use agv_core::calibration::{CALIBRATION_SEGMENTS, Calibrator, reference_drive_bits};
+use agv_core::calibration::{CALIBRATION_SEGMENTS, Calibrator};
 use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::panic;
 use agv_firmware::board::an500::stopwatch::Stopwatch;
@@ -25,7 +28,7 @@ fn main() -> ! {
     let mut bits = None;
     stack::paint();
     let before = stack::deepest();
-    let instructions = Stopwatch::new().count(|| bits = reference_drive_bits().ok());
+    let instructions = Stopwatch::new().count(|| bits = reference_drive::reference_drive_bits().ok());
     let depth = stack::deepest() - before;
     let mut text: String<2048> = String::new();
     let bytes = size_of::<Calibrator<CALIBRATION_SEGMENTS>>();

@@ -1,12 +1,9 @@
 //! A small drive that is the same everywhere, to hold one machine's results against another's.
 
-use super::calibrator::Calibrator;
-use super::extrinsic::MountingSide;
-use super::intrinsic::Offsets;
-use super::{Calibration, Problem, Unobservable};
-use crate::geometry::{Pose, Twist};
-use crate::measurement::{EncoderSample, Time};
-use crate::odometry::{CounterRange, Tricycle};
+use agv_core::calibration::{Calibration, Calibrator, MountingSide, Offsets, Problem, Unobservable};
+use agv_core::geometry::{Point, Pose, Twist};
+use agv_core::measurement::{EncoderSample, Time};
+use agv_core::odometry::{CounterRange, Tricycle};
 
 /// How many numbers [`reference_drive_bits`] gives.
 const NUMBERS: usize = 16;
@@ -51,8 +48,9 @@ pub fn reference_drive_bits() -> Result<[u64; NUMBERS], Unobservable> {
             let sign = if is_backward { -1.0 } else { 1.0 };
             let way = sign * 0.2498e-3 * f64::from(TICKS * SAMPLES) * (1.0 + 1e-4 * stir);
             let angle = CounterRange::BITS_16.signed(steering) as f64 * NOMINAL.steering_scale + offset;
-            let (sine, cosine) = libm::sincos(angle);
-            let moved = Pose::exp(&Twist { x: way * cosine, y: 0.0, theta: way * sine / 1.5 });
+            // By the elementary functions of the core, which are the same everywhere.
+            let wheel = Pose { theta: angle, ..Pose::default() }.transform(&Point::new(way, 0.0));
+            let moved = Pose::exp(&Twist { x: wheel.x, y: 0.0, theta: wheel.y / 1.5 });
             // The drive has room for its own segments.
             let _ = calibrator.stop(&laser.between(&moved.compose(&laser)));
         }
