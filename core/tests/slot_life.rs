@@ -153,8 +153,10 @@ fn landmarks_and_past_poses_are_where_they_were_put() {
 /// `H P H' + R` with all zeros.
 fn dense<const SIZE: usize>(filter: &Filter, told: &Linearisation<SIZE>) -> SMatrix<f64, SIZE, SIZE> {
     let mut jacobian = SMatrix::<f64, SIZE, STATES>::zeros();
-    for (place, derivative) in &told.terms {
-        jacobian.set_column(*place, derivative);
+    for (place, derivative) in
+        told.by_pose.iter().enumerate().chain(told.terms.iter().map(|(place, derivative)| (*place, derivative)))
+    {
+        jacobian.set_column(place, derivative);
     }
     jacobian * covariance(filter) * jacobian.transpose() + told.covariance
 }

@@ -9,6 +9,7 @@
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::biases::{BiasModel, SCALE, STEERING, YAW};
+use super::cholesky::Root;
 use super::observation::{Believed, Viewpoint};
 use super::positive_semidefinite::make_positive_semidefinite;
 use super::slots::{PoseOnly, Slots, Storage, pose_state, slot_states};
@@ -286,14 +287,15 @@ impl<S: Slots> Ekf<S> {
         };
         let model = observation.model(from, &believed)?;
         let [by_x, by_y] = model.by_position;
-        let mut linearisation =
-            Linearisation::new(model.residual, model.covariance).with(0, by_x).with(1, by_y).with(2, model.by_heading);
+        let mut linearisation = Linearisation::new(model.residual, model.covariance);
+        linearisation.by_pose = [by_x, by_y, model.by_heading];
         if from.has_yaw {
-            linearisation = linearisation.with(YAW, model.by_yaw);
+            linearisation.add(YAW, model.by_yaw);
         }
         if let Some(slot) = slot {
             let state = self.landmark_state(slot);
-            linearisation = linearisation.with(state, -by_x).with(state + 1, -by_y);
+            linearisation.add(state, -by_x);
+            linearisation.add(state + 1, -by_y);
         }
         Some(linearisation)
     }
@@ -310,12 +312,21 @@ impl<S: Slots> Ekf<S> {
         observation: &Linearisation<SIZE>,
     ) -> SMatrix<f64, SIZE, SIZE> {
         let mut covariance = observation.covariance;
-        for (first, by_first) in &observation.terms {
-            let mut cross = SVector::<f64, SIZE>::zeros();
-            for (second, by_second) in &observation.terms {
-                cross += by_second * self.covariance.get(*first, *second);
+        let [by_x, by_y, by_heading] = &observation.by_pose;
+        let by_pose_of = |state| {
+            let of = |axis| self.covariance.get(axis, state);
+            by_x * of(0) + by_y * of(1) + by_heading * of(2)
+        };
+        for (axis, derivative) in observation.by_pose.iter().enumerate() {
+            covariance += derivative * by_pose_of(axis).transpose();
+        }
+        for (state, derivative) in &observation.terms {
+            let by_pose = by_pose_of(*state);
+            let mut cross = by_pose;
+            for (other, by_other) in &observation.terms {
+                cross += by_other * self.covariance.get(*state, *other);
             }
-            covariance += by_first * cross.transpose();
+            covariance += cross * derivative.transpose() + derivative * by_pose.transpose();
         }
         covariance
     }
@@ -334,20 +345,21 @@ impl<S: Slots> Ekf<S> {
         let mut rows = self.covariance.cross(observation, count);
         let shares = rows.as_mut();
         let mut residual_covariance = observation.covariance;
+        for (derivative, cross) in observation.by_pose.iter().zip(shares.iter()) {
+            residual_covariance += derivative * cross.transpose();
+        }
         for (state, derivative) in &observation.terms {
             let Some(cross) = shares.get(*state) else { return false };
             residual_covariance += derivative * cross.transpose();
         }
-        let Some(root) = residual_covariance.cholesky() else { return false };
-        let root = root.unpack();
-        let Some(residual) = root.solve_lower_triangular(&observation.residual) else { return false };
+        let Some(root) = Root::of(&residual_covariance) else { return false };
+        let residual = root.whiten(&observation.residual);
         if !residual.iter().all(|value| value.is_finite()) {
             return false;
         }
         // P - P H' S^-1 H P, symmetric whatever the rounding.
         for share in shares.iter_mut().take(count) {
-            let Some(whitened) = root.solve_lower_triangular(share) else { return false };
-            *share = whitened;
+            *share = root.whiten(share);
         }
         self.covariance.subtract(shares, count);
         self.shift(shares, &residual);

@@ -2,6 +2,7 @@
 
 mod biases;
 mod cartesian;
+mod cholesky;
 mod ekf;
 mod linearisation;
 mod observation;

@@ -53,6 +53,10 @@ impl<S: Slots> PackedCovariance<S> {
     pub fn cross<const SIZE: usize>(&self, observation: &Linearisation<SIZE>, count: usize) -> S::Rows<SIZE> {
         let mut rows = S::Rows::<SIZE>::filled(SVector::zeros());
         let cross = rows.as_mut();
+        let [by_x, by_y, by_heading] = &observation.by_pose;
+        for (other, sum) in cross.iter_mut().enumerate().take(count) {
+            *sum = by_x * self.get(0, other) + by_y * self.get(1, other) + by_heading * self.get(2, other);
+        }
         for (state, derivative) in &observation.terms {
             // The row of the state up to the diagonal, then its column.
             let start = place(*state, 0);

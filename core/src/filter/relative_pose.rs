@@ -50,7 +50,8 @@ impl<S: Slots> Ekf<S> {
         let state = pose_state(slot);
         let mut linearisation = Linearisation::new(residual, seen.covariance);
         for (axis, direction) in [Point::new(1.0, 0.0), Point::new(0.0, 1.0)].iter().enumerate() {
-            linearisation = linearisation.with(axis, shift(direction)).with(state + axis, -shift(direction));
+            linearisation.add(axis, shift(direction));
+            linearisation.add(state + axis, -shift(direction));
         }
         Some(
             linearisation

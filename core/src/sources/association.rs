@@ -6,7 +6,7 @@ use super::landmark_maps::Maps;
 use super::landmark_slots::LandmarkSlots;
 use super::sighting::Sighting;
 use super::slot_parameters::SlamParameters;
-use crate::filter::{Ekf, Innovation, Landmark, Linearisation, Slots, Viewpoint};
+use crate::filter::{Ekf, Innovation, Landmark, Slots, Viewpoint};
 use crate::geometry::{Point, difference};
 use crate::maps::{self, LandmarkKind, NearestNeighbour, Verdict};
 use crate::state::LandmarkSource;
@@ -67,17 +67,16 @@ pub(crate) struct Believed<'a> {
 }
 
 /// A landmark that an observation was compared with.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
     pub source: LandmarkSource,
     pub id: u16,
     pub landmark: Landmark,
-    pub linearisation: Linearisation<2>,
     pub innovation: Innovation,
 }
 
 /// The nearest landmark and what it is good for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Association {
     pub verdict: Verdict,
     pub nearest: Option<Candidate>,
@@ -116,7 +115,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
     fn candidate(&self, source: LandmarkSource, id: u16, landmark: Landmark) -> Option<Candidate> {
         let linearisation = self.filter.observe(&self.from, &self.seen.observation, &landmark)?;
         let innovation = self.filter.innovation(&linearisation)?;
-        Some(Candidate { source, id, landmark, linearisation, innovation })
+        Some(Candidate { source, id, landmark, innovation })
     }
 
     /// The best of the candidates, if no other is nearly as good.

@@ -44,7 +44,7 @@ pub(crate) fn correct<
     let comparison = Comparison::new(filter, seen, believed);
     let Association { verdict, nearest } = comparison.associate(maps, slots.as_deref());
     let (located, from, orientation) = (comparison.located, comparison.from, comparison.orientation());
-    let Some(Candidate { source, id, landmark, mut linearisation, innovation }) = nearest else {
+    let Some(Candidate { source, id, landmark, innovation }) = nearest else {
         return (Outcome { verdict, landmark: None, located, is_used: false }, None);
     };
     let outcome = Outcome { verdict, landmark: Some((source, id, innovation)), located, is_used: false };
@@ -59,15 +59,13 @@ pub(crate) fn correct<
             if let Some(slots) = slots.as_deref_mut() {
                 slots.enter(free, Some(id), seen.kind, orientation);
             }
-            let Some(by_slot) = filter.observe(&from, &seen.observation, &Landmark::Slot(free)) else {
-                return (outcome, None);
-            };
-            linearisation = by_slot;
             Some(free)
         }
         (Landmark::Known { .. }, None) => None,
     };
-    let is_used = filter.correct(&linearisation);
+    let compared = slot.map_or(landmark, Landmark::Slot);
+    let linearisation = filter.observe(&from, &seen.observation, &compared);
+    let is_used = linearisation.is_some_and(|linearisation| filter.correct(&linearisation));
     if let Some((slots, slot)) = slots.zip(slot).filter(|_| is_used) {
         slots.see(slot);
     }

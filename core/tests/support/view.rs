@@ -1,5 +1,4 @@
 //! Observations as a filter compares them.
-#![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use agv_core::filter::{Cartesian, Ekf, Landmark, Linearisation, Observation, Slots};
 use agv_core::geometry::{Point, Pose};
@@ -34,5 +33,5 @@ pub fn observe<S: Slots>(
 
 /// The derivatives by the pose.
 pub fn by_pose(linearisation: &Linearisation<2>) -> Matrix2x3<f64> {
-    Matrix2x3::from_columns(&[0, 1, 2].map(|state| linearisation.terms[state].1))
+    Matrix2x3::from_columns(&linearisation.by_pose)
 }
