@@ -196,33 +196,23 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     /// Goes on by a motion that the odometry reported. Its start may lie before the newest entry, if measurements have
     /// been extrapolated; what was assumed is then replaced so that the total is what the odometry says.
     pub fn advance(&mut self, motion: &Motion) {
-        let rest = match self.ahead.take() {
-            Some((assumed, until)) if until < motion.end => motion.remainder(&assumed, until),
+        match self.ahead.take() {
+            Some((assumed, until)) if until < motion.end => self.append(&motion.remainder(&assumed, until)),
             // The extrapolation went past the sample; the next one sets it right.
-            Some((assumed, until)) => {
-                self.ahead = Some((motion.displacement.between(&assumed), until));
-                self.last_motion = *motion;
-                return;
-            }
+            Some((assumed, until)) => self.ahead = Some((motion.displacement.between(&assumed), until)),
+            None if motion.start >= self.now() => self.append(motion),
             // A motion that was not assumed, but told, counts.
-            None if motion.start < self.now() => {
-                self.last_motion = *motion;
-                if motion.end > self.now() {
-                    self.append(motion.split(self.now()).1);
-                }
-                return;
-            }
-            None => *motion,
-        };
+            None if motion.end > self.now() => self.append(&motion.split(self.now()).1),
+            None => {}
+        }
         self.last_motion = *motion;
-        self.append(rest);
     }
 
     /// Goes on from the newest entry by a motion that is assumed until the odometry reports what it was.
     pub fn assume(&mut self, motion: &Motion) {
         let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
         self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
-        self.append(*motion);
+        self.append(motion);
     }
 
     /// Whether the state at `time` can be told.
@@ -384,18 +374,18 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.entries.iter().rposition(|entry| entry.time() <= time)
     }
 
-    fn append(&mut self, motion: Motion) {
-        let state = self.state();
+    fn append(&mut self, motion: &Motion) {
+        self.settle(self.entries.len());
         self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
-        if let Some(last) = self.joinable(&motion) {
-            last.motion = last.motion.then(&motion);
-            last.state.predict(&motion);
+        if let Some(last) = self.joinable(motion) {
+            last.motion = last.motion.then(motion);
+            last.state.predict(motion);
             return;
         }
+        let Some(mut state) = self.entries.back().map(|entry| entry.state) else { return };
+        state.predict(motion);
         self.make_room();
-        let mut entry = Entry { motion, fusion: Fusion::Nothing, state };
-        entry.recompute(&state);
-        let _ = self.entries.push_back(entry);
+        let _ = self.entries.push_back(Entry { motion: *motion, fusion: Fusion::Nothing, state });
         self.settled = self.entries.len();
     }
 

@@ -379,18 +379,20 @@ impl<
         let Some(start) = self.timeline.begun().map(Timeline::start) else {
             return;
         };
-        match motion {
+        match &motion {
             // A pose may be given for a time between two samples; only what follows it counts.
             Ok(motion) if motion.end > start => {
-                let motion = if motion.start < start { motion.split(start).1 } else { motion };
-                let motion = if self.parameters.maps.slam {
-                    motion.corrected(&self.slam.bias(), self.parameters.vehicle.steering_lever())
-                } else {
-                    motion
-                };
                 self.outage = None;
                 self.repeated = 0;
-                self.go_on(&motion);
+                // A motion is large: it is copied only where it changes.
+                let within = (motion.start < start).then(|| motion.split(start).1);
+                let motion = within.as_ref().unwrap_or(motion);
+                if self.parameters.maps.slam {
+                    let lever = self.parameters.vehicle.steering_lever();
+                    self.go_on(&motion.corrected(&self.slam.bias(), lever));
+                } else {
+                    self.go_on(motion);
+                }
             }
             Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
             Err(OdometryError::Pause) => self.coast(time, Reason::OdometrySilent),
