@@ -63,15 +63,20 @@ impl Entry {
         self.motion.end
     }
 
-    fn recompute(&mut self, before: &Ekf) {
-        if matches!(self.fusion, Fusion::Given) {
-            return;
+    /// Goes on from the state at its start, `running`, to that behind its end.
+    fn recompute(&mut self, running: &mut Ekf) {
+        match &self.fusion {
+            Fusion::Given => {
+                *running = self.state;
+                return;
+            }
+            Fusion::Nothing => running.predict(&self.motion),
+            Fusion::Correction(correction) => {
+                running.predict(&self.motion);
+                correction.apply(running);
+            }
         }
-        self.state = *before;
-        self.state.predict(&self.motion);
-        if let Fusion::Correction(correction) = &self.fusion {
-            correction.apply(&mut self.state);
-        }
+        self.state = *running;
     }
 }
 
@@ -282,12 +287,12 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         self.settle(position + 1);
         let mut state = self.entries.get(position).ok_or(TimelineError::TooLate)?.state;
-        let (motion, rest) = self.motion_to(position, time)?;
-        state.predict(&motion);
+        let parts = self.motion_to(position, time)?;
+        state.predict(&parts.0);
         let Some(correction) = correct(&mut state) else {
             return Ok(false);
         };
-        self.divide(position, (motion, rest), Fusion::Correction(correction), state);
+        self.divide(position, &parts, Fusion::Correction(correction), &state);
         Ok(true)
     }
 
@@ -299,7 +304,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         let parts = self.motion_to(position, time)?;
         self.settle(position + 1);
-        self.divide(position, parts, Fusion::Given, state);
+        self.divide(position, &parts, Fusion::Given, &state);
         Ok(())
     }
 
@@ -315,15 +320,16 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     }
 
     /// Puts an entry with that state behind the one at `position`, at the end of the first part of the motion.
-    fn divide(&mut self, position: usize, (motion, rest): (Motion, Option<Motion>), fusion: Fusion, state: Ekf) {
+    fn divide(&mut self, position: usize, parts: &(Motion, Option<Motion>), fusion: Fusion, state: &Ekf) {
+        let (motion, rest) = parts;
         if rest.is_none() {
             let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
             self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
             self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
         }
-        let position = self.insert(position + 1, Entry { motion, fusion, state });
+        let position = self.insert(position + 1, &Entry { motion: *motion, fusion, state: *state });
         if let (Some(rest), Some(next)) = (rest, self.entries.get_mut(position + 1)) {
-            next.motion = rest;
+            next.motion = *rest;
         }
         self.settled = position + 1;
     }
@@ -411,20 +417,26 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     }
 
     /// Puts an entry at `position` and returns where it ended, one lower if the oldest entry had to go.
-    fn insert(&mut self, position: usize, entry: Entry) -> usize {
+    fn insert(&mut self, position: usize, entry: &Entry) -> usize {
         let position = if self.make_room() { position.saturating_sub(1) } else { position };
-        // It makes room at the end, where it is overwritten unless it belongs there.
-        let _ = self.entries.push_back(entry);
+        // It makes room at the end, where it stays if it belongs there.
+        let _ = self.entries.push_back(*entry);
+        if position + 1 >= self.entries.len() {
+            return position;
+        }
         let (front, back) = self.entries.as_mut_slices();
         match position.checked_sub(front.len()) {
-            Some(position) => {
-                shift(back, position, entry);
-            }
+            Some(position) => make_way(back, position),
             None => {
-                if let Some(last) = shift(front, position, entry) {
-                    shift(back, 0, last);
+                make_way(back, 0);
+                if let (Some(first), Some(last)) = (back.first_mut(), front.last()) {
+                    *first = *last;
                 }
+                make_way(front, position);
             }
+        }
+        if let Some(place) = self.entries.get_mut(position) {
+            *place = *entry;
         }
         position
     }
@@ -435,23 +447,19 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         if count <= first {
             return;
         }
-        let Some(mut before) = self.entries.get(first - 1).map(|entry| entry.state) else {
+        let Some(mut running) = self.entries.get(first - 1).map(|entry| entry.state) else {
             return;
         };
         for entry in self.entries.iter_mut().skip(first).take(count - first) {
-            entry.recompute(&before);
-            before = entry.state;
+            entry.recompute(&mut running);
         }
         self.settled = count;
     }
 }
 
-/// Moves the entries from `position` on one further and puts `entry` there. The last one falls out and is returned.
-fn shift(entries: &mut [Entry], position: usize, entry: Entry) -> Option<Entry> {
-    let entries = entries.get_mut(position..)?;
-    let (last, others) = entries.split_last()?;
-    let (last, moved) = (*last, others.len());
-    entries.copy_within(..moved, 1);
-    *entries.first_mut()? = entry;
-    Some(last)
+/// Moves the entries from `position` on one further; the last one is overwritten.
+fn make_way(entries: &mut [Entry], position: usize) {
+    if let Some(moved) = entries.len().checked_sub(position + 1) {
+        entries.copy_within(position..position + moved, position + 1);
+    }
 }

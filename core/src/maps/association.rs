@@ -42,6 +42,7 @@ impl<T> Default for NearestNeighbour<T> {
 
 impl<T> NearestNeighbour<T> {
     /// Considers a landmark at that squared Mahalanobis distance.
+    #[inline]
     pub fn consider(&mut self, landmark: T, normalised_square: f64) {
         match &self.best {
             Some(best) if normalised_square >= best.normalised_square => {
@@ -58,6 +59,7 @@ impl<T> NearestNeighbour<T> {
     /// The verdict: the best landmark must lie within `gate` (squared Mahalanobis distance), and the second best must be
     /// further away than the best by `margin`.
     #[must_use]
+    #[inline]
     pub fn decide(self, gate: f64, margin: f64) -> (Option<Match<T>>, Verdict) {
         let verdict = match &self.best {
             None => Verdict::Unknown,
