@@ -459,7 +459,8 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
 
 /// Moves the entries from `position` on one further; the last one is overwritten.
 fn make_way(entries: &mut [Entry], position: usize) {
-    if let Some(moved) = entries.len().checked_sub(position + 1) {
-        entries.copy_within(position..position + moved, position + 1);
-    }
+    let Some(entries) = entries.get_mut(position..) else { return };
+    let Some((_, others)) = entries.split_last() else { return };
+    let moved = others.len();
+    entries.copy_within(..moved, 1);
 }
