@@ -1,6 +1,7 @@
 //! The CAN bus: literal bytes, properties, and state machines against a scripted node.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "a panic is how a test fails")]
 
+mod book;
 mod canopen;
 mod controller;
 mod controller_node;
