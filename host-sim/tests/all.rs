@@ -3,6 +3,7 @@
 mod log;
 mod report;
 mod simulate;
+mod two_lasers;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
 #[test]
