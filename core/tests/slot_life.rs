@@ -1,4 +1,5 @@
 //! Slots of the filter: how they are taken and freed, and what an observation without a slot says.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use agv_core::filter::{
     BiasDeviations, Cartesian, Ekf, Landmark, Linearisation, PoseAndSlots, RelativePose, packed_entries, slot_states,

@@ -34,7 +34,7 @@ const NOISE: OdometryNoise = OdometryNoise {
 fn odometer(vehicle: Vehicle, fastest: f64) -> VehicleOdometer {
     VehicleOdometer::new(
         &vehicle,
-        &OdometerParameters { noise: NOISE, integration: Integration::Arc, fastest: fastest, longest_interval: 1.0 },
+        &OdometerParameters { noise: NOISE, integration: Integration::Arc, fastest, longest_interval: 1.0 },
     )
 }
 
