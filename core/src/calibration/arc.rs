@@ -18,7 +18,7 @@ pub(super) fn arc(sine: f64, cosine: f64, offset: f64, turn_scale: f64, wheelbas
     let (offset_sine, offset_cosine) = libm::sincos(offset);
     let along = cosine * offset_cosine - sine * offset_sine;
     let across = sine * offset_cosine + cosine * offset_sine;
-    let (way, rotation) = (wheelbase * turn_scale * along, turn_scale * across);
+    let (distance, rotation) = (wheelbase * turn_scale * along, turn_scale * across);
     let end = |rotation: f64| {
         let pose = Pose::exp(&Twist { x: 1.0, y: 0.0, theta: rotation });
         Vector2::new(pose.x, pose.y)
@@ -30,9 +30,9 @@ pub(super) fn arc(sine: f64, cosine: f64, offset: f64, turn_scale: f64, wheelbas
     } else {
         (Vector2::new(libm::cos(rotation), libm::sin(rotation)) - unit) / rotation
     };
-    let by_offset = unit * (-wheelbase * turn_scale * across) + by_rotation * (way * turn_scale * along);
-    let by_scale = unit * (wheelbase * along) + by_rotation * (way * across);
-    Arc { position: unit * way, derivative: Matrix2::from_columns(&[by_offset, by_scale]) }
+    let by_offset = unit * (-wheelbase * turn_scale * across) + by_rotation * (distance * turn_scale * along);
+    let by_scale = unit * (wheelbase * along) + by_rotation * (distance * across);
+    Arc { position: unit * distance, derivative: Matrix2::from_columns(&[by_offset, by_scale]) }
 }
 
 impl Segment {

@@ -53,7 +53,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Way of the driving wheel for one tick, m (K 2.15, 2.27: s_w).
+    /// Distance travelled by the driving wheel for one tick, m (K 2.15, 2.27: s_w).
     #[must_use]
     pub fn drive_scale(&self) -> f64 {
         self.intrinsic.turn_scale * self.wheelbase

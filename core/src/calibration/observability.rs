@@ -28,5 +28,5 @@ pub enum Unobservable {
 /// Smallest deviation of steering angles, rad, that counts as different angles.
 pub(super) const SMALLEST_STEERING_DEVIATION: f64 = 0.01;
 
-/// Smallest way of the driving wheel, in ticks over all segments, that counts as motion.
+/// Smallest distance of the driving wheel, in ticks over all segments, that counts as motion.
 pub(super) const SMALLEST_WAY: f64 = 16.0;

@@ -1,42 +1,42 @@
 //! What the corrections by landmarks say of the odometry and of the laser's mounting.
 //!
-//! Where everything is as it is believed, corrections are small and have no common direction. A laser that looks askew makes
-//! the vehicle seem to drive askew: each metre needs the same correction to the side. One that stands elsewhere needs it in
-//! each turn. A wheel of another size needs it along the way, a bent steering in the heading. So the corrections, taken as
-//! linear in the way and the turn between two of them, tell which is wrong:
-//! side = askew way + lever turn, along = scale way + lever turn, heading = bend way + gain turn.
+//! Where everything is as it is believed, corrections are small and have no common direction. A laser with a yaw error makes
+//! the vehicle seem to drive to one side: each metre needs the same correction across. One with a lever arm error needs it in each
+//! turn. A wheel of another size needs it along the distance, a bent steering in the heading. So the corrections, taken as
+//! linear in the distance and the turn between two of them, tell which is wrong:
+//! side = yaw distance + lever turn, along = scale distance + lever turn, heading = bend distance + gain turn.
 
 use nalgebra::Vector2;
 
 use crate::geometry::Pose;
 
-/// What is remembered of the way and the turn: this much, m and rad, counts by 1/e.
+/// What is remembered of the distance and the turn: this much, m and rad, counts by 1/e.
 const MEMORY: (f64, f64) = (2.5, 1.5);
 /// Corrections are summed over about this many revolutions.
 const TREND: f64 = 8.0;
-/// Way, m, and turn, rad, within the memory that the first verdict against the laser or the odometry needs.
+/// Distance, m, and turn, rad, within the memory that the first verdict against the laser or the odometry needs.
 const LEAST: (f64, f64) = (0.3, 0.3);
-/// Way, m, and turn, rad, without a contradiction after which the laser is as it is believed again, however fast the memory
+/// Distance, m, and turn, rad, without a contradiction after which the laser is as it is believed again, however fast the memory
 /// fades on them.
 const HEALING: (f32, f32) = (1.2, 0.45);
 /// Turn, rad, without a contradiction after which it does not matter that a wide bend leaves less than that in the memory:
 /// what would contradict has come through the lag of the filter by then.
 const SETTLED: f32 = 1.35;
-/// What noise adds up to over any way and turn: it must not be taken for a drift of a short one. m to the side and along,
+/// What noise adds up to over any distance and turn: it must not be taken for a drift of a short one. m to the side and along,
 /// rad.
 const NOISE: (f64, f64) = (0.012, 0.01);
-/// The laser looks askew by more than this, rad, or stands elsewhere by more than this, m.
-const ASKEW: f64 = 0.006;
-const ELSEWHERE: f64 = 0.06;
+/// Yaw error, rad, and lever arm error, m, from which on the laser is suspected.
+const YAW_ERROR: f64 = 0.006;
+const LEVER_ERROR: f64 = 0.06;
 /// It is as it is believed again if both are below this share of the limits.
 const HEALED: f64 = 0.9;
-/// A way, share of itself, and a turn, rad a metre, that the odometry cannot be wrong by.
+/// A distance, share of itself, and a turn, rad a metre, that the odometry cannot be wrong by.
 const SCALE: f64 = 0.03;
 const BEND: f64 = 0.01;
 
-/// How often the askew look counts in the trend.
-const ASKEW_WEIGHT: f64 = 4.0;
-/// Way after which the heading has been corrected, m.
+/// How often the yaw error counts in the trend.
+const YAW_ERROR_WEIGHT: f64 = 4.0;
+/// Distance after which the heading has been corrected, m.
 const BEND_LAG: f64 = 0.5;
 
 /// Which of the two is wrong.
@@ -44,33 +44,33 @@ const BEND_LAG: f64 = 0.5;
 pub enum Suspect {
     /// The odometry: its scale or its steering.
     Odometry,
-    /// The laser: it looks askew or stands elsewhere.
+    /// The laser: a yaw error or a lever arm error.
     Laser,
 }
 
 /// Sums over the corrections, with exponential forgetting.
 #[derive(Clone, Debug)]
 pub struct MountingCheck {
-    /// Of the way, of both, of the turn.
+    /// Of the distance, of both, of the turn.
     information: [f64; 3],
     along: Vector2<f64>,
     side: Vector2<f64>,
     heading: Vector2<f64>,
-    way: f64,
+    distance: f64,
     turn: f64,
     trend: Vector2<f64>,
     heading_trend: f64,
-    /// By how much the laser seems to look askew, rad.
-    askew: f64,
+    /// What the laser's yaw error seems to be, rad.
+    yaw_error: f64,
     suspect: Option<Suspect>,
-    /// Way, m, and turn, rad, since the laser was last contradicted.
+    /// Distance, m, and turn, rad, since the laser was last contradicted.
     sound: (f32, f32),
 }
 
 /// What each metre and each radian add to a correction; none of what was not driven enough.
 #[derive(Clone, Copy)]
 struct Rates {
-    way: Option<f64>,
+    distance: Option<f64>,
     turn: Option<f64>,
 }
 
@@ -91,11 +91,11 @@ impl MountingCheck {
             along: Vector2::zeros(),
             side: Vector2::zeros(),
             heading: Vector2::zeros(),
-            way: 0.0,
+            distance: 0.0,
             turn: 0.0,
             trend: Vector2::zeros(),
             heading_trend: 0.0,
-            askew: 0.0,
+            yaw_error: 0.0,
             suspect: None,
             sound: (0.0, 0.0),
         }
@@ -115,17 +115,17 @@ impl MountingCheck {
 
     /// Takes one revolution: the motion since the last one by odometry, and the correction in R after it.
     pub fn add(&mut self, motion: &Pose, correction: &Pose) {
-        let (way, turn) = (motion.x, motion.theta);
-        let remaining = libm::exp(-libm::fabs(way) / MEMORY.0 - libm::fabs(turn) / MEMORY.1);
-        let input = Vector2::new(way, turn);
+        let (distance, turn) = (motion.x, motion.theta);
+        let remaining = libm::exp(-libm::fabs(distance) / MEMORY.0 - libm::fabs(turn) / MEMORY.1);
+        let input = Vector2::new(distance, turn);
         let [of_way, of_both, of_turn] = self.information.map(|information| information * remaining);
-        self.information = [of_way + way * way, of_both + way * turn, of_turn + turn * turn];
+        self.information = [of_way + distance * distance, of_both + distance * turn, of_turn + turn * turn];
         self.along = self.along * remaining + input * correction.x;
         self.side = self.side * remaining + input * correction.y;
         self.heading = self.heading * remaining + input * correction.theta;
-        self.way = self.way * remaining + libm::fabs(way);
+        self.distance = self.distance * remaining + libm::fabs(distance);
         self.turn = self.turn * remaining + libm::fabs(turn);
-        self.sound.0 += libm::fabs(way) as f32;
+        self.sound.0 += libm::fabs(distance) as f32;
         self.sound.1 += libm::fabs(turn) as f32;
         self.trend = self.trend * (1.0 - 1.0 / TREND) + Vector2::new(correction.x, correction.y);
         self.heading_trend = self.heading_trend * (1.0 - 1.0 / TREND) + correction.theta;
@@ -133,10 +133,10 @@ impl MountingCheck {
     }
 
     /// By how much landmarks have lately corrected the pose in one direction, m and rad: what the filter lags behind by. The
-    /// heading's has what the laser seems to look askew by, several times, because the pose is off by all of it.
+    /// heading's has what the laser's yaw error seems to be, several times, because the pose is off by all of it.
     #[must_use]
     pub fn trend(&self) -> [f64; 2] {
-        [self.trend.norm(), libm::fabs(self.heading_trend) + ASKEW_WEIGHT * self.askew]
+        [self.trend.norm(), libm::fabs(self.heading_trend) + YAW_ERROR_WEIGHT * self.yaw_error]
     }
 
     /// Which of the two is wrong, if one is.
@@ -146,7 +146,7 @@ impl MountingCheck {
     }
 
     fn judge(&mut self) -> Option<Suspect> {
-        let (has_way, has_turn) = (self.way >= LEAST.0, self.turn >= LEAST.1);
+        let (has_way, has_turn) = (self.distance >= LEAST.0, self.turn >= LEAST.1);
         if !has_way && !has_turn {
             return self.suspect;
         }
@@ -155,17 +155,17 @@ impl MountingCheck {
         let (m11, m22) = (of_way + FLOOR.0, of_turn + FLOOR.1);
         let share = 1.0 / (m11 * m22 - m12 * m12);
         let rates = |sum: &Vector2<f64>| Rates {
-            way: has_way.then(|| (m22 * sum.x - m12 * sum.y) * share),
+            distance: has_way.then(|| (m22 * sum.x - m12 * sum.y) * share),
             turn: has_turn.then(|| (m11 * sum.y - m12 * sum.x) * share),
         };
         let (along, side, heading) = (rates(&self.along), rates(&self.side), rates(&self.heading));
         // Before the heading is corrected, a bent steering leads the vehicle aside, too.
-        let bend = libm::fabs(heading.way.unwrap_or(0.0));
-        let askew = side.way.map(|askew| (libm::fabs(askew) - BEND_LAG * bend).max(0.0));
-        self.askew = askew.unwrap_or(0.0);
-        let (way_noise, turn_noise) = (NOISE.0 / self.way.max(LEAST.0), NOISE.0 / self.turn.max(LEAST.1));
-        let elsewhere = ELSEWHERE + turn_noise;
-        let laser = [(askew, ASKEW + way_noise), (side.turn, elsewhere), (along.turn, elsewhere)];
+        let bend = libm::fabs(heading.distance.unwrap_or(0.0));
+        let yaw_error = side.distance.map(|yaw| (libm::fabs(yaw) - BEND_LAG * bend).max(0.0));
+        self.yaw_error = yaw_error.unwrap_or(0.0);
+        let (distance_noise, turn_noise) = (NOISE.0 / self.distance.max(LEAST.0), NOISE.0 / self.turn.max(LEAST.1));
+        let lever_error = LEVER_ERROR + turn_noise;
+        let laser = [(yaw_error, YAW_ERROR + distance_noise), (side.turn, lever_error), (along.turn, lever_error)];
         // What was not driven enough within the memory contradicts nothing, and shows nothing.
         if !laser.iter().all(|(rate, limit)| rate.is_none() || is_below(*rate, *limit)) {
             self.sound = (0.0, 0.0);
@@ -176,8 +176,8 @@ impl MountingCheck {
         if laser.iter().any(|(rate, limit)| is_beyond(*rate, *limit)) || !is_healed {
             return Some(Suspect::Laser);
         }
-        let bend_noise = NOISE.1 / self.way.max(LEAST.0);
-        (is_beyond(along.way, SCALE + way_noise) || is_beyond(heading.way, BEND + bend_noise))
+        let bend_noise = NOISE.1 / self.distance.max(LEAST.0);
+        (is_beyond(along.distance, SCALE + distance_noise) || is_beyond(heading.distance, BEND + bend_noise))
             .then_some(Suspect::Odometry)
     }
 }

@@ -6,7 +6,7 @@ use crate::maps::{LandmarkKind, Verdict};
 use crate::sources::{Outcome, Sighting, Source};
 use crate::state::LandmarkSource;
 
-/// Way since something last happened, m.
+/// Distance since something last happened, m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DistanceSince {
     pub reflector: f64,

@@ -356,7 +356,10 @@ impl<
             let standing = Coasting::new(Motion::none(fix.time));
             self.outage = self.outage.map(|outage| Outage { coasting: standing, ..outage });
         }
-        let since = self.timeline.motions(fix.time, self.timeline.now()).fold(0.0, |way, motion| way + motion.distance);
+        let since = self
+            .timeline
+            .motions(fix.time, self.timeline.now())
+            .fold(0.0, |distance, motion| distance + motion.distance);
         self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
         self.maps.dynamic.clear();
         self.count_given_pose();

@@ -109,10 +109,11 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
     pub fn output(&self) -> Option<PoseOutput> {
         let base = self.base?;
         let newest = self.motions.last().filter(|motion| motion.end > base.time);
-        let way: f64 = self.motions.iter().filter(|motion| motion.end > base.time).map(|motion| motion.distance).sum();
+        let travelled: f64 =
+            self.motions.iter().filter(|motion| motion.end > base.time).map(|motion| motion.distance).sum();
         let is_localised = !matches!(base.mode, Mode::NotLocalised | Mode::Lost);
         let time = newest.map_or(base.time, |motion| motion.end);
-        let distance = base.dead_reckoning_distance + way;
+        let distance = base.dead_reckoning_distance + travelled;
         let is_reckoned = matches!(base.mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
             && (time.since(base.time) > LONGEST_BUSY || distance > self.dead_reckoning_from);
         let (mode, reason) = match (is_localised, self.faults.drive, self.faults.steering) {

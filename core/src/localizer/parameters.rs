@@ -103,9 +103,9 @@ impl Parameters {
 pub struct Limits {
     /// Faster motions are taken as faults of the odometry, m/s.
     pub fastest: f64,
-    /// Way without a landmark after which the vehicle says that it is dead reckoning, m.
+    /// Distance without a landmark after which the vehicle says that it is dead reckoning, m.
     pub dead_reckoning_from: f64,
-    /// Way without a landmark after which it is lost, m.
+    /// Distance without a landmark after which it is lost, m.
     pub lost_after: f64,
     /// Standard deviation of the position above which it is lost, m.
     pub largest_position_deviation: f64,

@@ -35,8 +35,8 @@ pub enum StartState {
 /// Most reflectors of one revolution.
 const OBSERVATIONS: usize = 64;
 
-/// Way after which what was seen before is forgotten, m: the odometry has then carried it too far.
-const LONGEST_WAY: f64 = 10.0;
+/// Distance after which what was seen before is forgotten, m: the odometry has then carried it too far.
+const LONGEST_DISTANCE: f64 = 10.0;
 
 /// Silence after which the odometry says nothing of the present, s.
 const LONGEST_SILENCE: f64 = 0.3;
@@ -59,7 +59,7 @@ pub struct StartFinder<const SEEN: usize = 64> {
     relocalizer: ReflectorRelocalizer<SEEN>,
     /// Motion since the search began; none if no search is under way.
     since: Option<Pose>,
-    way: f64,
+    distance: f64,
     /// Whether the odometry has said something since the last revolution.
     has_spoken: bool,
     found: Vec<ReflectorObservation, OBSERVATIONS>,
@@ -77,7 +77,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             snapshot: ReflectorSnapshot::new(),
             relocalizer: ReflectorRelocalizer::new(search),
             since: None,
-            way: 0.0,
+            distance: 0.0,
             has_spoken: false,
             found: Vec::new(),
             parameters,
@@ -130,7 +130,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     fn stand(&mut self, time: Time) {
         self.snapshot.clear();
         self.since = None;
-        self.way = 0.0;
+        self.distance = 0.0;
         self.recent = RecentMotion::standing(time);
         self.known_from = Some(time);
     }
@@ -144,10 +144,10 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 let shift = 0.5 * (covariance.m11 + covariance.m22);
                 self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
                 self.since = self.since.map(|since| since.compose(&motion.displacement));
-                self.way += motion.distance;
+                self.distance += motion.distance;
                 self.recent.add(&motion);
                 self.known_from.get_or_insert(motion.start);
-                if self.way > LONGEST_WAY {
+                if self.distance > LONGEST_DISTANCE {
                     self.forget();
                 }
             }

@@ -9,7 +9,7 @@ use crate::geometry::Pose;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OdometryBias {
-    /// True way over the reported one, minus one.
+    /// True distance over the reported one, minus one.
     pub scale: f64,
     /// True steering angle minus the assumed one, rad; for a vehicle without a steered wheel the turn that it does not
     /// report, rad/m.
@@ -27,7 +27,7 @@ pub struct BiasJacobian {
 
 impl BiasJacobian {
     /// That of a displacement which is short against its radius; a steered wheel stands `lever` (m) before the axle, if
-    /// there is one. It goes less far along the more it is turned; a turn that is not reported changes no way.
+    /// there is one. It goes less far along the more it is turned; a turn that is not reported changes no distance.
     #[must_use]
     pub fn of(displacement: &Pose, lever: Option<f64>) -> Self {
         let (turn, along) = match lever {

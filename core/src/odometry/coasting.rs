@@ -8,7 +8,7 @@ const LONGEST: f64 = 1e3;
 
 /// A vehicle that is assumed to keep its last believed velocity, though it may have braked, sped up or turned.
 ///
-/// An unknown constant acceleration gives the way a deviation of `a t^2 / 2` after `t` seconds, an unknown angular
+/// An unknown constant acceleration gives the distance a deviation of `a t^2 / 2` after `t` seconds, an unknown angular
 /// acceleration the heading likewise.
 #[derive(Clone, Copy, Debug)]
 pub struct Coasting {
@@ -18,7 +18,7 @@ pub struct Coasting {
 
 impl Coasting {
     /// Whoever begins to coast takes the mean velocity of this time, s: samples come unevenly, so that one interval may hold
-    /// the way of two, and the next one none.
+    /// the distance of two, and the next one none.
     pub const SPAN: f64 = 0.1;
 
     /// Coasting behind the last motion that was believed.

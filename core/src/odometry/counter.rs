@@ -39,7 +39,7 @@ impl CounterRange {
         self.0
     }
 
-    /// The shortest way from one reading to the next, ticks, in `-values/2 .. values/2`. Readings at or beyond the
+    /// The shortest step from one reading to the next, ticks, in `-values/2 .. values/2`. Readings at or beyond the
     /// range are taken modulo the range.
     #[must_use]
     pub const fn step(self, from: u32, to: u32) -> i64 {

@@ -1,4 +1,4 @@
-//! From the way and the angle of a steered wheel to the displacement of the logical point.
+//! From the distance and the angle of a steered wheel to the displacement of the logical point.
 
 use nalgebra::Matrix3x2;
 use serde::{Deserialize, Serialize};
@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::kinematics::{Believed, Step};
 use crate::geometry::{Pose, Twist};
 
-/// What the steered wheel did between two samples; its angle changes linearly with the way.
+/// What the steered wheel did between two samples; its angle changes linearly with the distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Control {
-    /// Way of the wheel, m, negative backward (K: v dt).
+    /// Distance travelled by the wheel, m, negative backward (K: v dt).
     pub distance: f64,
     /// Steering angle at the start, rad, offset included (K: alpha_(k-1)).
     pub steering_start: f64,
@@ -37,7 +37,7 @@ impl Control {
         0.5 * (self.steering_end + self.steering_start)
     }
 
-    /// Steering angle after a quarter of the way, rad (K 5.11: alpha_34).
+    /// Steering angle after a quarter of the distance, rad (K 5.11: alpha_34).
     fn quarter_steering(&self) -> f64 {
         0.25 * (self.steering_end + 3.0 * self.steering_start)
     }
@@ -67,8 +67,8 @@ impl Control {
         let (sine, cosine) = libm::sincos(self.mean_steering());
         let heading = 0.5 * self.distance / wheelbase * libm::sin(self.quarter_steering());
         let (heading_sine, heading_cosine) = libm::sincos(heading);
-        let way = self.distance * cosine;
-        Pose::new(way * heading_cosine, way * heading_sine, self.distance / wheelbase * sine)
+        let along = self.distance * cosine;
+        Pose::new(along * heading_cosine, along * heading_sine, self.distance / wheelbase * sine)
     }
 
     fn arc(&self, wheelbase: f64) -> Pose {
@@ -77,13 +77,13 @@ impl Control {
     }
 
     fn runge_kutta_4(&self, wheelbase: f64) -> Pose {
-        // The steering angle depends on the way alone, so the heading's two middle slopes coincide.
+        // The steering angle depends on the distance alone, so the heading's two middle slopes coincide.
         let slope = |steering: f64| self.distance / wheelbase * libm::sin(steering);
         let (start, middle, end) = (slope(self.steering_start), slope(self.mean_steering()), slope(self.steering_end));
         let step = |heading: f64, steering: f64| {
             let (sine, cosine) = libm::sincos(heading);
-            let way = self.distance * libm::cos(steering);
-            (way * cosine, way * sine)
+            let along = self.distance * libm::cos(steering);
+            (along * cosine, along * sine)
         };
         let first = step(0.0, self.steering_start);
         let second = step(0.5 * start, self.mean_steering());
@@ -96,7 +96,7 @@ impl Control {
         )
     }
 
-    /// Derivative of the displacement (K 5.8) by the way (first column) and by a shift of the steering angle (second).
+    /// Derivative of the displacement (K 5.8) by the distance (first column) and by a shift of the steering angle (second).
     #[must_use]
     pub fn jacobian(&self, wheelbase: f64) -> Matrix3x2<f64> {
         let (sine, cosine) = libm::sincos(self.mean_steering());
@@ -104,14 +104,14 @@ impl Control {
         let heading_by_way = 0.5 / wheelbase * quarter_sine;
         let heading_by_steering = 0.5 * self.distance / wheelbase * quarter_cosine;
         let (heading_sine, heading_cosine) = libm::sincos(self.distance * heading_by_way);
-        let way = self.distance;
+        let distance = self.distance;
         Matrix3x2::new(
-            cosine * (heading_cosine - way * heading_sine * heading_by_way),
-            -way * (heading_sine * heading_by_steering * cosine + heading_cosine * sine),
-            cosine * (heading_sine + way * heading_cosine * heading_by_way),
-            way * (heading_cosine * heading_by_steering * cosine - heading_sine * sine),
+            cosine * (heading_cosine - distance * heading_sine * heading_by_way),
+            -distance * (heading_sine * heading_by_steering * cosine + heading_cosine * sine),
+            cosine * (heading_sine + distance * heading_cosine * heading_by_way),
+            distance * (heading_cosine * heading_by_steering * cosine - heading_sine * sine),
             sine / wheelbase,
-            way / wheelbase * cosine,
+            distance / wheelbase * cosine,
         )
     }
 }

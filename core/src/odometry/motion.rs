@@ -16,7 +16,7 @@ pub struct Motion {
     pub displacement: Pose,
     /// Covariance of the displacement: x, y, heading.
     pub covariance: Matrix3<f64>,
-    /// Length of the way, m, not negative: that of the wheel that drives, or of R for a vehicle that integrates itself.
+    /// Distance travelled, m, not negative: that of the wheel that drives, or of R for a vehicle that integrates itself.
     pub distance: f64,
 }
 

@@ -14,7 +14,7 @@ pub struct OdometryNoise {
     pub speed: f64,
     /// Standard deviation of the steering angle, independent from sample to sample, rad.
     pub steering: f64,
-    /// Random walk of the way of the wheel (slip), m for a square root of a metre.
+    /// Random walk of the distance travelled by the wheel (slip), m for a square root of a metre.
     pub slip: f64,
     /// Random walk across the direction of travel, m for a square root of a metre.
     pub side_slip: f64,

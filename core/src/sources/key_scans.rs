@@ -1,4 +1,4 @@
-//! Scans of the way behind that later scans are aligned to.
+//! Scans of the distance behind that later scans are aligned to.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use crate::sensing::{PointScan, SurfaceAlignmentParameters, SurfaceParameters, S
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KeyScanParameters {
-    /// Way after which a scan becomes a key scan, m.
+    /// Distance after which a scan becomes a key scan, m.
     pub spacing: f64,
     /// Turn after which it does, rad.
     pub turn: f64,

@@ -50,7 +50,7 @@ pub enum Reason {
     SteeringEncoder,
     /// The laser has moved otherwise than the odometry says: the vehicle has slid or was carried, or the laser was knocked.
     MotionDisagrees,
-    /// The laser looks askew, or stands elsewhere on the vehicle than is believed.
+    /// The laser is turned, or stands elsewhere on the vehicle than is believed.
     LaserMoved,
     /// The odometry's scale or steering is not what is believed; landmarks make up for it.
     OdometryDisagrees,

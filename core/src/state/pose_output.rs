@@ -19,7 +19,7 @@ pub struct PoseOutput {
     pub mode: Mode,
     /// Why.
     pub reason: Reason,
-    /// Way since a landmark last corrected the pose, m.
+    /// Distance since a landmark last corrected the pose, m.
     pub dead_reckoning_distance: f64,
     /// By how far landmarks have moved the position since the output before, m.
     pub correction: f64,
@@ -29,7 +29,7 @@ pub struct PoseOutput {
     pub acceptance: f64,
     /// What the pose may lag behind by, for the [protection level](super::ProtectionLevel), which counts 30 per cent of it:
     /// the sum of the position's corrections of about eight revolutions, m; that of the heading's plus four times what the
-    /// laser seems to look askew by, rad, as the pose is off by all of the latter.
+    /// laser seems to be turned by, rad, as the pose is off by all of the latter.
     pub drift: [f64; 2],
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
@@ -60,7 +60,7 @@ impl PoseOutput {
     }
 
     /// A position that is no less sure than this in any direction, m, and a heading, rad, are good enough to leave the
-    /// reflectors: on a way of 12 m by features alone they leave most of 2 cm and 0.1 deg to the drive.
+    /// reflectors: on a distance of 12 m by features alone they leave most of 2 cm and 0.1 deg to the drive.
     pub const GOOD_DEVIATIONS: (f64, f64) = (0.005, 0.524e-3);
 
     /// Whether the pose is good enough to begin a drive without reflectors. A vehicle that stands among them becomes surer
