@@ -54,7 +54,7 @@ fn the_tricycle_keeps_its_counters() {
             steering_offset_backward: 0.01,
         }
     );
-    let laser = recording.parameters.lasers.first();
+    let laser = *recording.parameters.lasers.first();
     assert_eq!((laser.x, laser.y), (1.5, 0.25));
     assert!((laser.theta - std::f64::consts::FRAC_PI_4).abs() < 1e-12);
     let RecordedEvent::Encoders(second) = recording.events[1] else { panic!() };
@@ -201,7 +201,7 @@ fn a_log_of_scans_becomes_a_drive() {
     let mut log = ScanLog { scans: (0..3).map(posed).collect(), increments: vec![] };
 
     let recording = drive(&log).unwrap();
-    assert!(close(&recording.parameters.lasers.first(), &laser));
+    assert!(close(recording.parameters.lasers.first(), &laser));
     let moved = recording.events.iter().fold(robots[0], |pose, event| match event {
         RecordedEvent::Increment(increment) => pose.compose(&increment.displacement),
         _ => pose,

@@ -62,7 +62,7 @@ fn steps(criterion: &mut Criterion) {
     });
     let ready = localizer();
     // Seen 2 cm from where the reflector at (2.3 m, 0.4 m) is expected.
-    let pose = ready.outputs().pose.pose.compose(&parameters().lasers.first());
+    let pose = ready.outputs().pose.pose.compose(parameters().lasers.first());
     let seen = pose.inverse_transform(&nalgebra::Vector2::new(2.32, 0.4));
     let observation = ReflectorObservation {
         time: Time::from_micros(490_000),

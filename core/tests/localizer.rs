@@ -57,7 +57,7 @@ impl Drive {
     fn start() -> Self {
         let mut localizer = Box::new(Small::new(parameters()));
         localizer.add_landmarks(&reflectors()).unwrap();
-        Self { localizer, step: 0, offset: 0.0, stood: 0, laser: parameters().lasers.first() }
+        Self { localizer, step: 0, offset: 0.0, stood: 0, laser: *parameters().lasers.first() }
     }
 
     fn time(&self) -> Time {
@@ -117,7 +117,7 @@ impl Drive {
             self.stood += 1;
             self.localizer.handle(&Event::Encoders(EncoderSample { time: self.time(), drive: 0, steering: 0 }));
         }
-        let laser = parameters().lasers.first();
+        let laser = *parameters().lasers.first();
         let observations: Vec<_> = reflectors()
             .iter()
             .filter(|reflector| sees(reflector.id))

@@ -76,7 +76,7 @@ impl Drive {
     /// True pose of S.
     fn sensor(&self, time: Time) -> Pose {
         let way = self.way - self.speed * self.time().since(time);
-        Pose::new(way, 0.0, 0.0).compose(&parameters().lasers.first())
+        Pose::new(way, 0.0, 0.0).compose(parameters().lasers.first())
     }
 
     /// Takes what is seen of these points in the revolution that began at `start`.

@@ -28,7 +28,7 @@ impl Search {
         map.extend(&reflectors).unwrap();
         index.build(map.view());
         let finder = StartFinder::new(parameters, RelocalizationParameters::default());
-        Self { map, index, finder, laser: parameters.lasers.first() }
+        Self { map, index, finder, laser: *parameters.lasers.first() }
     }
 
     fn tell(&mut self, event: &Event) -> StartState {

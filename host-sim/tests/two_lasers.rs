@@ -79,8 +79,8 @@ fn two_sensors_localise_one_vehicle() {
     let [front, rear] = [front, rear].map(recording);
     let second = LaserId::new(1).unwrap();
     let mut parameters = front.parameters;
-    parameters.lasers = parameters.lasers.with(second, rear.parameters.lasers.first());
-    assert!(parameters.lasers.first().between(&rear.parameters.lasers.first()).x.abs() > 0.1);
+    parameters.lasers = parameters.lasers.with(second, *rear.parameters.lasers.first());
+    assert!(parameters.lasers.first().between(rear.parameters.lasers.first()).x.abs() > 0.1);
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(parameters));
     localizer.add_landmarks(&front.landmarks).unwrap();
     let mut links = [Link::new(&front, LaserId::FIRST, 77), Link::new(&rear, second, 1_000_000)];

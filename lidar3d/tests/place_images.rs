@@ -6,6 +6,7 @@
 
 mod support;
 
+use std::cell::OnceCell;
 use std::sync::OnceLock;
 
 use agv_lidar3d::cloud::Cloud;
@@ -29,26 +30,55 @@ const A: Protocol = Protocol { name: "A", spacing: 2, right: 3.0, wrong: 3.0 };
 const A10: Protocol = Protocol { name: "A10", spacing: 10, right: 5.5, wrong: 5.5 };
 const A10B: Protocol = Protocol { name: "A10b", spacing: 10, right: 5.5, wrong: 7.5 };
 
-/// Scans, as both methods see them.
-struct Described {
+/// A scan, as both methods see it.
+struct Signatures {
     image: PlaceImage,
     context: ScanContext,
+}
+
+/// A scan, as it is aligned.
+struct View {
     panorama: Panorama,
     /// Levelled, with heights above the floor.
     points: Vec<[f32; 3]>,
 }
 
-impl Described {
-    fn new(points: &Points, is_levelled: bool) -> Self {
-        let cloud = Cloud::new(points, RINGS).unwrap();
-        let floor = Floor::find(&cloud).unwrap();
-        let floor = if is_levelled { floor.without_small_slope() } else { Floor::level(floor.height) };
-        Self {
-            image: PlaceImage::new(&cloud, &floor),
-            context: ScanContext::new(points),
-            panorama: Panorama::new(&cloud, &floor, Span::HDL64E),
-            points: cloud.seen().map(|point| floor.levelled(point)).collect(),
-        }
+/// All scans of the drive with something done to their points. Each is looked at when it is asked for: the map has few.
+struct Scans<'a> {
+    change: Box<dyn Fn(usize, &Points) -> Points + 'a>,
+    signatures: Vec<OnceCell<Signatures>>,
+    views: Vec<OnceCell<View>>,
+}
+
+impl<'a> Scans<'a> {
+    fn new(change: impl Fn(usize, &Points) -> Points + 'a) -> Self {
+        let (_, points) = drive().unwrap();
+        let signatures = points.iter().map(|_| OnceCell::new()).collect();
+        Self { change: Box::new(change), signatures, views: points.iter().map(|_| OnceCell::new()).collect() }
+    }
+
+    fn points(&self, key: usize) -> Points {
+        let (_, points) = drive().unwrap();
+        (self.change)(key, &points[key])
+    }
+
+    fn signatures(&self, key: usize) -> &Signatures {
+        self.signatures[key].get_or_init(|| {
+            let points = self.points(key);
+            let cloud = Cloud::new(&points, RINGS).unwrap();
+            let floor = Floor::find(&cloud).unwrap().without_small_slope();
+            Signatures { image: PlaceImage::new(&cloud, &floor), context: ScanContext::new(&points) }
+        })
+    }
+
+    fn view(&self, key: usize) -> &View {
+        self.views[key].get_or_init(|| {
+            let points = self.points(key);
+            let cloud = Cloud::new(&points, RINGS).unwrap();
+            let floor = Floor::find(&cloud).unwrap().without_small_slope();
+            let panorama = Panorama::new(&cloud, &floor, Span::HDL64E);
+            View { panorama, points: cloud.seen().map(|point| floor.levelled(point)).collect() }
+        })
     }
 }
 
@@ -131,32 +161,32 @@ fn thinned(points: &Points) -> Points {
     points.iter().enumerate().map(keep).collect()
 }
 
-fn both(map: &[Described], asked: &[Described], protocol: Protocol) -> [Score; 2] {
+fn both(map: &Scans, asked: &Scans, protocol: Protocol) -> [Score; 2] {
     let (drive, _) = drive().unwrap();
     let image = |query: usize, node: usize| {
-        map[node].image.likeness(&asked[query].image).map_or(f64::MAX, |likeness| f64::from(likeness.distance))
+        let likeness = map.signatures(node).image.likeness(&asked.signatures(query).image);
+        likeness.map_or(f64::MAX, |likeness| f64::from(likeness.distance))
     };
-    [
-        score(drive, protocol, image),
-        score(drive, protocol, |query, node| map[node].context.distance(&asked[query].context)),
-    ]
+    let context = |query: usize, node: usize| map.signatures(node).context.distance(&asked.signatures(query).context);
+    [score(drive, protocol, image), score(drive, protocol, context)]
 }
 
 /// The best ten of the images, aligned: one less the greatest score. Answers farther away than right ones are none.
-fn verified(map: &[Described], asked: &[Described], protocol: Protocol) -> Score {
+fn verified(map: &Scans, asked: &Scans, protocol: Protocol) -> Score {
     let (drive, _) = drive().unwrap();
     let keys = &drive.keys;
     let nodes: Vec<usize> =
         (0..keys.len()).step_by(protocol.spacing).filter(|key| keys[*key].travelled <= 150.0).collect();
     let stored: Vec<Option<Stored>> =
-        (0..keys.len()).map(|key| nodes.contains(&key).then(|| Stored::new(&map[key].panorama))).collect();
+        (0..keys.len()).map(|key| nodes.contains(&key).then(|| Stored::new(&map.view(key).panorama))).collect();
     let mut seconds = Vec::new();
     let mut scores = vec![vec![f64::MAX; keys.len()]; keys.len()];
     for query in (1..keys.len()).step_by(2) {
-        let alike = |node: &usize| Some((map[*node].image.likeness(&asked[query].image)?, *node));
+        let alike = |node: &usize| Some((map.signatures(*node).image.likeness(&asked.signatures(query).image)?, *node));
         let mut best: Vec<_> = nodes.iter().filter_map(alike).collect();
         best.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
-        let scan = Asked::new(&asked[query].panorama, asked[query].points.iter().copied());
+        let view = asked.view(query);
+        let scan = Asked::new(&view.panorama, view.points.iter().copied());
         for (likeness, node) in best.into_iter().take(10) {
             let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
             let began = std::time::Instant::now();
@@ -180,10 +210,12 @@ fn report(condition: &str, protocol: Protocol, [image, context]: [Score; 2]) {
 
 #[test]
 fn whole_scans_are_recognised_better_than_by_scan_context() {
-    let Some((_, points)) = drive() else { return };
-    let described: Vec<Described> = points.iter().map(|points| Described::new(points, true)).collect();
+    if drive().is_none() {
+        return;
+    }
+    let whole = Scans::new(|_, points| points.clone());
     for (protocol, least) in [(A, [0.93, 0.98]), (A10, [0.807, 0.947]), (A10B, [0.94, 0.97])] {
-        let [image, context] = both(&described, &described, protocol);
+        let [image, context] = both(&whole, &whole, protocol);
         report("clean", protocol, [image, context]);
         assert!(image.r1 >= least[0] && image.f1 >= least[1], "{image:?}");
         if protocol.name == "A10" {
@@ -191,7 +223,7 @@ fn whole_scans_are_recognised_better_than_by_scan_context() {
             assert!(context.r1 >= 0.775 && context.f1 >= 0.917, "{context:?}");
         }
     }
-    let found = verified(&described, &described, A10);
+    let found = verified(&whole, &whole, A10);
     println!("A10 clean, verified: {:.3} / {:.3}", found.r1, found.f1);
     assert!(found.r1 >= 0.98 && found.f1 >= 0.99, "{found:?}");
 }
@@ -202,22 +234,14 @@ fn at_least_as_scan_context(condition: &str, scores: [Score; 2]) {
     assert!(image.r1 >= context.r1 && image.f1 >= context.f1, "{condition}: {image:?} {context:?}");
 }
 
-fn described(change: impl Fn(usize, &Points) -> Points) -> Vec<Described> {
-    let (_, points) = drive().unwrap();
-    points.iter().enumerate().map(|(number, points)| Described::new(&change(number, points), true)).collect()
-}
-
 /// Masks of a width, the mean of eight directions: in the question alone, or in the map as well and the heading reversed.
 fn with_masks(width: f32, is_both: bool) -> [Score; 2] {
-    let whole = if is_both { Vec::new() } else { described(|_, points| points.clone()) };
+    let whole = Scans::new(|_, points| points.clone());
     let mut mean = [Score { r1: 0.0, f1: 0.0 }; 2];
     for direction in (0..8).map(|eighth| 45.0 * eighth as f32) {
-        let asked = described(|_, points| masked(points, (direction, width), is_both));
-        let scores = if is_both {
-            both(&described(|_, points| masked(points, (direction, width), false)), &asked, A10)
-        } else {
-            both(&whole, &asked, A10)
-        };
+        let asked = Scans::new(|_, points| masked(points, (direction, width), is_both));
+        let partial = Scans::new(|_, points| masked(points, (direction, width), false));
+        let scores = both(if is_both { &partial } else { &whole }, &asked, A10);
         for (mean, score) in mean.iter_mut().zip(scores) {
             mean.r1 += score.r1 / 8.0;
             mean.f1 += score.f1 / 8.0;
@@ -242,8 +266,8 @@ fn masked_scans_are_verified() {
     if drive().is_none() {
         return;
     }
-    let map = described(|_, points| masked(points, (0.0, 120.0), false));
-    let asked = described(|_, points| masked(points, (0.0, 120.0), true));
+    let map = Scans::new(|_, points| masked(points, (0.0, 120.0), false));
+    let asked = Scans::new(|_, points| masked(points, (0.0, 120.0), true));
     let found = verified(&map, &asked, A10);
     println!("A10 both, reversed, 120, ahead, verified: {:.3} / {:.3}", found.r1, found.f1);
     // Short of what whole scans reach: a third of what the map and the question see is not the same third.
@@ -255,8 +279,8 @@ fn leaning_and_coarse_scans_are_recognised() {
     if drive().is_none() {
         return;
     }
-    let whole = described(|_, points| points.clone());
-    let leaning = described(|number, points| tilted(points, 2.4 * number as f32));
+    let whole = Scans::new(|_, points| points.clone());
+    let leaning = Scans::new(|number, points| tilted(points, 2.4 * number as f32));
     report("tilt 3 deg", A10, both(&whole, &leaning, A10));
-    at_least_as_scan_context("16 of 64 rings", both(&whole, &described(|_, points| thinned(points)), A10));
+    at_least_as_scan_context("16 of 64 rings", both(&whole, &Scans::new(|_, points| thinned(points)), A10));
 }

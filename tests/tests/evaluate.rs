@@ -26,7 +26,7 @@ fn the_car_park_is_localised_to_seven_centimetres() {
     assert_eq!((outcome.lost_at_s, outcome.wrong_at_s), (None, None));
     // A second account of the error, from poses and receiver alone: at each reference the pose nearest in time, which at
     // 40 samples a second and 2 m/s is up to 3 cm old.
-    let laser = recording.parameters.lasers.first();
+    let laser = *recording.parameters.lasers.first();
     let squares = recording.references.iter().skip(1).map(|reference| {
         let nearest = replay
             .poses

@@ -62,7 +62,7 @@ fn settings_of_the_firmware_take_a_vehicle_file() {
     // What replay makes of the file is what the firmware starts with.
     assert!(file.apply(&mut parameters));
     assert_eq!(settings.parameters.vehicle, parameters.vehicle);
-    assert_eq!(settings.parameters.lasers.first(), parameters.lasers.first());
+    assert_eq!(*settings.parameters.lasers.first(), *parameters.lasers.first());
     assert_eq!(file.settings().count(), 8);
 }
 

@@ -112,7 +112,7 @@ fn what_was_exported_is_imported() {
     for (format, input) in [("mcap", &mcap), ("auto", &mcap), ("rosbag2", &bag), ("auto", &bag)] {
         run(&["import", format, input, "-o", &back, "--json"]);
         let (imported, _) = log::read(Path::new(&back)).unwrap();
-        let (laser, known) = (imported.parameters.lasers.first(), recording.parameters.lasers.first());
+        let (laser, known) = (*imported.parameters.lasers.first(), *recording.parameters.lasers.first());
         assert!((laser.position() - known.position()).norm() < 1e-12 && (laser.theta - known.theta).abs() < 1e-12);
         let scans = |events: &[RecordedEvent]| -> Vec<Vec<f32>> {
             let ranges = events.iter().filter_map(|event| match event {
@@ -146,7 +146,7 @@ fn the_recording_of_another_vehicle_is_imported() {
         let summary = run(&["import", "rosbag2", &bag, "-o", &back, "--json"]);
         assert_eq!((&summary["scans"], &summary["odometry"]), (&10.into(), &20.into()));
         let (imported, _) = log::read(Path::new(&back)).unwrap();
-        let laser = imported.parameters.lasers.first();
+        let laser = *imported.parameters.lasers.first();
         assert!((laser.x - 1.2).abs() < 1e-12 && (laser.y - 0.5).abs() < 1e-12);
         assert!((laser.theta - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         let mut pose = Pose::default();

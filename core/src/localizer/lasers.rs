@@ -34,8 +34,9 @@ impl Lasers {
 
     /// The mount of the first laser; the origin of R if there is none.
     #[must_use]
-    pub fn first(&self) -> Pose {
-        self.mount(LaserId::FIRST).copied().unwrap_or_default()
+    pub fn first(&self) -> &Pose {
+        const ORIGIN: Pose = Pose { x: 0.0, y: 0.0, theta: 0.0 };
+        self.mount(LaserId::FIRST).unwrap_or(&ORIGIN)
     }
 
     /// Mounts a laser.

@@ -160,7 +160,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
         parameters: &Parameters,
         status: &mut SourceStatus,
     ) {
-        let (mount, told) = (parameters.lasers.first(), (self.time, status));
+        let (mount, told) = (*parameters.lasers.first(), (self.time, status));
         self.key_scans.align(&mut self.filter, points, place, &mount, &parameters.slam.key_scans, told);
     }
 

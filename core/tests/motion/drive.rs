@@ -201,7 +201,7 @@ impl<'a> Drive<'a> {
     /// The reflectors that are seen in a revolution, each at its own time.
     pub fn revolution(&self, index: u64) -> Vec<ReflectorObservation> {
         let start = Time::from_micros(START + index * REVOLUTION);
-        let laser = self.localizer.parameters().lasers.first();
+        let laser = *self.localizer.parameters().lasers.first();
         let mut seen: Vec<_> = reflectors()
             .iter()
             .filter_map(|reflector| {

@@ -123,7 +123,7 @@ impl Drive {
         if travelled < shortest {
             return Err(Refusal::NoMotion);
         }
-        let nominal = VehicleModel::nominal(&tricycle, &input.parameters.lasers.first());
+        let nominal = VehicleModel::nominal(&tricycle, input.parameters.lasers.first());
         let mut drive = Self {
             nominal,
             tricycle,

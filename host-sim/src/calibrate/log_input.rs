@@ -113,7 +113,7 @@ impl LogInput {
                 }
             }
             Event::SetPose(fix) if fix.is_sound() => {
-                let pose = fix.pose.compose(&self.parameters.lasers.first());
+                let pose = fix.pose.compose(self.parameters.lasers.first());
                 self.given_poses.push(LaserPose { time: fix.time, pose });
             }
             _ => {}

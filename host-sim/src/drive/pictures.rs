@@ -134,7 +134,7 @@ fn outlines(recording: &Recording, track: &Track) -> Vec<[(f64, f64); 2]> {
             let pose = pose_at(&poses, view.beam_time(beam)).filter(|_| is_return)?;
             let (sine, cosine) = (scan.first_bearing + beam as f64 * scan.bearing_step).sin_cos();
             let seen = Point::new(f64::from(range) * cosine, f64::from(range) * sine);
-            Some(pose.compose(&recording.parameters.lasers.first()).transform(&seen))
+            Some(pose.compose(recording.parameters.lasers.first()).transform(&seen))
         };
         let stride = scan.ranges.len().div_ceil(OUTLINE_PIECES).max(1);
         let points: Vec<Option<Point>> = (0..scan.ranges.len()).step_by(stride).map(locate).collect();

@@ -150,7 +150,7 @@ fn errors_of_truth(recording: &Recording, points: &[TrackPoint]) -> Vec<TrackErr
 fn errors_of_references(recording: &Recording, points: &[TrackPoint]) -> Vec<TrackError> {
     let outputs: Vec<PoseOutput> = points.iter().map(|point| point.output).collect();
     let errors = recording.references.iter().filter_map(|reference| {
-        let laser = pose_at(&outputs, reference.time)?.compose(&recording.parameters.lasers.first());
+        let laser = pose_at(&outputs, reference.time)?.compose(recording.parameters.lasers.first());
         Some(TrackError {
             time: reference.time,
             way: way_at(points, reference.time),

@@ -240,7 +240,7 @@ impl Writer {
 
     /// What is true all the time: where the laser is, and the map.
     fn write_statics(&mut self, now: Time, recording: &Recording) -> Result<(), McapExportError> {
-        let laser = transform(now, BASE, LASER, recording.parameters.lasers.first());
+        let laser = transform(now, BASE, LASER, *recording.parameters.lasers.first());
         self.write(Topic::StaticTransforms, now, &Transforms { transforms: vec![laser] })?;
         let mut markers = Vec::new();
         for (number, kind) in (0..).zip(KINDS) {

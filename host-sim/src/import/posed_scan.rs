@@ -34,7 +34,7 @@ impl PosedScan {
         });
         let posed = scans.filter_map(|scan| {
             let robot = truth_at(&poses, scan.start)?;
-            Some(Self { scan: scan.clone(), laser: robot.compose(&recording.parameters.lasers.first()), robot })
+            Some(Self { scan: scan.clone(), laser: robot.compose(recording.parameters.lasers.first()), robot })
         });
         posed.collect()
     }

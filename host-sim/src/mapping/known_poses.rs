@@ -23,7 +23,7 @@ pub fn sightings(
     };
     let replay = replay(&by_odometry(recording, first.pose), |_| {})?;
     let sightings = replay.uses.iter().filter(|used| is_wanted(used.kind)).filter_map(|used| {
-        let laser = truth_at(poses, used.time)?.compose(&recording.parameters.lasers.first());
+        let laser = truth_at(poses, used.time)?.compose(recording.parameters.lasers.first());
         let [x, y] = used.position.map(f64::from);
         Some(Sighting { kind: used.kind, position: laser.transform(&Point::new(x, y)), pose_variance: 0.0 })
     });

@@ -35,7 +35,7 @@ pub fn slam_poses(
         _ => None,
     });
     let odometry = odometry(recording, start.unwrap_or_default())?;
-    let laser = recording.parameters.lasers.first();
+    let laser = *recording.parameters.lasers.first();
     let scans: Vec<_> = recording
         .events
         .iter()

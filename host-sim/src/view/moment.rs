@@ -136,7 +136,7 @@ impl Timeline {
             time_s: time.seconds(),
             pose,
             truth: truth.as_ref().map(numbers),
-            laser: numbers(&self.parameters.lasers.first()),
+            laser: numbers(self.parameters.lasers.first()),
             health: Health {
                 drive: faults.drive,
                 steering: faults.steering,
@@ -148,7 +148,7 @@ impl Timeline {
             hits: self.landmarks.iter().map(|landmark| self.hits.of(landmark.kind, landmark.id, time)).collect(),
             found: self.hits.found(time),
         };
-        let scan = self.scans.at(time).map(|found| (found, self.poses_near(time), self.parameters.lasers.first()));
+        let scan = self.scans.at(time).map(|found| (found, self.poses_near(time), *self.parameters.lasers.first()));
         Draft { moment, scan }
     }
 

@@ -184,7 +184,7 @@ fn judge(recording: &Recording, replay: &Replay, headings: &[Truth]) -> Outcome 
         .references
         .iter()
         .filter_map(|reference| {
-            let laser = pose_at(&localised, reference.time)?.compose(&recording.parameters.lasers.first());
+            let laser = pose_at(&localised, reference.time)?.compose(recording.parameters.lasers.first());
             Some((reference.time, (laser.position() - reference.position()).norm()))
         })
         .collect();

@@ -119,7 +119,7 @@ fn judge(start: &mut Start, pose: &PoseOutput, truth: &[Truth], recording: &Reco
     if pose.mode == Mode::NotLocalised {
         return;
     }
-    let laser = &recording.parameters.lasers.first();
+    let laser = recording.parameters.lasers.first();
     if let Some(expected) = truth_at(truth, pose.time) {
         let error = pose.pose.compose(laser).position() - expected.compose(laser).position();
         start.position_error_m = Some(error.norm());

@@ -114,7 +114,7 @@ impl Plan {
         let agv_core::odometry::Vehicle::Tricycle(tricycle) = parameters.vehicle else {
             anyhow::bail!("only a tricycle can be calibrated");
         };
-        let means = self.means(&tricycle, &parameters.lasers.first());
+        let means = self.means(&tricycle, parameters.lasers.first());
         let planned = plan(&means)?;
         if let Some(path) = &self.scenario {
             let text = toml::to_string(&planned.scenario(&means, &tricycle))?;

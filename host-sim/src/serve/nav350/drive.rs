@@ -100,7 +100,7 @@ impl Drive {
             let end = turn.start.offset(frame.period);
             let index = recording.truth.partition_point(|truth| truth.time <= end);
             let truth = recording.truth.get(index.saturating_sub(1));
-            turn.pose = truth.map(|truth| truth.pose.compose(&recording.parameters.lasers.first()));
+            turn.pose = truth.map(|truth| truth.pose.compose(recording.parameters.lasers.first()));
         }
         let layout = layout_file::layout(&recording.landmarks);
         if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, begin, layout, frame }) }

@@ -198,7 +198,7 @@ impl Drive {
 
     fn reflectors<'a>(&mut self, dice: &mut Dice<impl Source>, lists: &'a mut Lists) -> Event<'a> {
         let start = self.time(dice);
-        let sensor = self.truth.compose(&self.parameters.lasers.first());
+        let sensor = self.truth.compose(self.parameters.lasers.first());
         let observations = &mut lists.observations;
         observations.clear();
         for (landmark, number) in reflectors().zip(0_u32..) {
@@ -238,7 +238,7 @@ impl Drive {
         let mut bearing_step = if is_backward { -TAU } else { TAU } / beams as f64;
         let mut first_bearing = dice.between(-3.2, 3.2);
         let mut beam_interval = if dice.once_in(4) { 0.0 } else { 0.125 / beams as f64 };
-        let sensor = self.truth.compose(&self.parameters.lasers.first());
+        let sensor = self.truth.compose(self.parameters.lasers.first());
         let Lists { ranges, intensities, .. } = lists;
         // Noise that costs no choices: one seed for all beams.
         let mut noise = u32::from(dice.byte());

@@ -144,7 +144,7 @@ pub fn read(folder: &Path) -> anyhow::Result<Run> {
             Some(LaserPose { time: reference.time, pose: Pose::new(reference.x, reference.y, reference.heading?) })
         })
         .collect();
-    Ok(Run { nominal, laser: recording.parameters.lasers.first(), counted, faults, poses })
+    Ok(Run { nominal, laser: *recording.parameters.lasers.first(), counted, faults, poses })
 }
 
 /// Windows of which quarters.
