@@ -15,6 +15,8 @@ use support::moosmann::{Drive, RINGS};
 use support::scan_context::ScanContext;
 
 type Points = Vec<Option<[f32; 3]>>;
+/// Something done to the points of a scan of that number.
+type Change<'a> = dyn Fn(usize, &Points) -> Points + 'a;
 
 #[derive(Clone, Copy)]
 struct Protocol {
@@ -45,7 +47,7 @@ struct View {
 
 /// All scans of the drive with something done to their points. Each is looked at when it is asked for: the map has few.
 struct Scans<'a> {
-    change: Box<dyn Fn(usize, &Points) -> Points + 'a>,
+    change: Box<Change<'a>>,
     signatures: Vec<OnceCell<Signatures>>,
     views: Vec<OnceCell<View>>,
 }
