@@ -5,12 +5,6 @@ use nalgebra::SVector;
 use super::Linearisation;
 use super::slots::{PoseOnly, Slots, Storage};
 
-/// Entries of the lower triangle of a square matrix with that many rows.
-#[must_use]
-pub const fn packed_entries(states: usize) -> usize {
-    states * (states + 1) / 2
-}
-
 /// The covariance of all states of a filter with room for `S`, row by row up to the diagonal.
 #[derive(Clone, Debug)]
 pub struct PackedCovariance<S: Slots> {

@@ -4,7 +4,6 @@ use core::fmt::Debug;
 
 use nalgebra::SVector;
 
-use super::packed_covariance::packed_entries;
 use crate::geometry::{Point, Pose};
 
 /// Memory for a number of values that is known when it is compiled.
@@ -88,6 +87,12 @@ impl<const POSES: usize, const LANDMARKS: usize, const STATES: usize, const ENTR
         assert!(STATES == slot_states(POSES, LANDMARKS) && ENTRIES == packed_entries(STATES));
         STATES
     };
+}
+
+/// Entries of the lower triangle of a square matrix with that many rows.
+#[must_use]
+pub const fn packed_entries(states: usize) -> usize {
+    states * (states + 1) / 2
 }
 
 /// First of the past poses' states.

@@ -3,6 +3,7 @@
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Mode, Reason, Relocalization};
 
+use super::error::ControllerError;
 use super::field::*;
 use super::numbers::*;
 use crate::can::canopen::{NodeId, receive_pdo_id, transmit_pdo_id};
@@ -91,17 +92,6 @@ pub enum Content {
         /// Whether the vehicle stands still, by the brakes or by order.
         is_standstill: bool,
     },
-}
-
-/// Why a frame is none of the controller's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ControllerError {
-    /// Another identifier.
-    Foreign,
-    /// The frame has not eight bytes.
-    Length,
-    /// A mode, reason or fault has no meaning.
-    Value,
 }
 
 impl Content {

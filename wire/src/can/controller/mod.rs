@@ -18,13 +18,15 @@
 //! unsigned one. Deviations are rounded up and end at the second highest value.
 
 mod content;
+mod error;
 mod field;
 mod numbers;
 mod orders;
 mod publisher;
 mod receiver;
 
-pub use content::{Content, ControllerError, Health};
+pub use content::{Content, Health};
+pub use error::ControllerError;
 pub use orders::OrderReceiver;
 pub use publisher::{PERIOD, PosePublisher, contents};
 pub use receiver::{PoseReceiver, PublishedPose};

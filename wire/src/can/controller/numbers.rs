@@ -3,7 +3,7 @@
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Mode, Reason, Relocalization};
 
-use super::content::ControllerError;
+use super::error::ControllerError;
 use super::field::Field;
 
 /// Numbers of the modes on the bus.
