@@ -206,7 +206,6 @@ impl<
         &self.outputs
     }
 
-    // Samples of the odometry come ten times as often as all else: what they do not need is kept out of their way.
     /// Takes one event. Events of one sensor come in order of time. Those of the laser may be as late as the filter
     /// remembers, about 0.4 s, and ahead of the odometry by [`super::Limits::longest_extrapolation`]; an odometry that is
     /// further behind is silent.
@@ -218,6 +217,7 @@ impl<
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
         let revolution_of = event.laser().filter(|_| self.tells_reflectors(event));
+        // Samples of the odometry come ten times as often as all else: what they do not need is never inlined here.
         match event {
             Event::Encoders(sample) => {
                 let motion = self.odometer.encoders(sample);

@@ -65,8 +65,8 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
     }
 
     /// Enters a landmark that is seen for the first time; one that was found while driving (no `fixed` name) is given a
-    /// name. Returns its name.
-    pub(crate) fn enter(&mut self, slot: usize, fixed: Option<u16>, kind: LandmarkKind, orientation: f32) -> u16 {
+    /// name.
+    pub(crate) fn enter(&mut self, slot: usize, fixed: Option<u16>, kind: LandmarkKind, orientation: f32) {
         let (source, id) = match fixed {
             Some(id) => (LandmarkSource::Fixed, id),
             None => {
@@ -77,7 +77,6 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
         if let Some(place) = self.slots.get_mut(slot) {
             *place = Some(Slot { source, id, kind, orientation, hits: 1, unseen: 0 });
         }
-        id
     }
 
     /// Notes that a landmark has been seen again.
