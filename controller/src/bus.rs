@@ -12,6 +12,7 @@ use agv_wire::can::frame::Frame;
 
 use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
 use super::localization::Estimate;
+use super::progress::{Progress, PublishedPose, Told};
 use super::standstill::Standstill;
 
 /// Motions that the localiser may be behind: more than a scan takes. All of them are redone when it has spoken, which with
@@ -44,7 +45,9 @@ pub enum BusOutput {
     /// A frame is to be sent.
     Send(Frame),
     /// The localiser is told something.
-    Event(BusEvent),
+    Event(Told),
+    /// A pose went out, in the frames before.
+    Published(PublishedPose),
 }
 
 /// The encoders, the controller's own node, and the pose for now.
@@ -55,6 +58,7 @@ pub struct Bus {
     node: ControllerNode,
     publisher: PosePublisher,
     predictor: OutputPredictor<MOTIONS>,
+    progress: Progress,
     standstill: Standstill,
     faults: EncoderFaults,
     relocalization: Relocalization,
@@ -73,6 +77,7 @@ impl Bus {
             node: ControllerNode::new(nodes.controller, start),
             publisher: PosePublisher::new(nodes.controller, start),
             predictor: OutputPredictor::new(&settings.parameters),
+            progress: Progress::default(),
             standstill: Standstill::new(),
             faults: EncoderFaults::default(),
             relocalization: Relocalization::Idle,
@@ -83,24 +88,22 @@ impl Bus {
 
     /// The localiser has said something.
     pub fn update(&mut self, estimate: &Estimate) {
-        self.predictor.update(&estimate.pose, &estimate.bias);
+        // Only the search may have got further.
+        if core::mem::replace(&mut self.progress.answered, estimate.answered) != estimate.answered {
+            self.predictor.update(&estimate.pose, &estimate.bias);
+        }
         self.relocalization = estimate.relocalization;
-    }
-
-    /// How far the search for a pose has come.
-    pub fn set_relocalization(&mut self, relocalization: Relocalization) {
-        self.relocalization = relocalization;
     }
 
     /// Takes a frame that came at `heard`: at most two events and an answer.
     pub fn hear(&mut self, frame: &Frame, heard: Time, mut take: impl FnMut(BusOutput)) {
-        let Self { encoders, predictor, standstill, .. } = self;
+        let Self { encoders, predictor, progress, standstill, .. } = self;
         encoders.hear(frame, heard, |event| {
             if let BusEvent::Encoders(sample) = &event {
                 predictor.encoders(sample);
                 standstill.sample(sample);
             }
-            take(BusOutput::Event(event));
+            take(BusOutput::Event(progress.tell(event)));
         });
         if let Some(answer) = self.node.handle(frame) {
             take(BusOutput::Send(answer));
@@ -110,7 +113,7 @@ impl Bus {
     /// Does what is due at `now`. To be called at least every 5 ms; a pose that is late is left out, the next one is for its
     /// own time.
     pub fn poll(&mut self, now: Time, laser: LaserHealth, mut take: impl FnMut(BusOutput)) {
-        let Self { encoders, predictor, faults, .. } = self;
+        let Self { encoders, predictor, progress, faults, .. } = self;
         encoders.poll(now, |output| match output {
             EncoderOutput::Send(frame) => take(BusOutput::Send(frame)),
             EncoderOutput::Event(event) => {
@@ -118,7 +121,7 @@ impl Bus {
                     *faults = *found;
                     predictor.doubt_encoders(found);
                 }
-                take(BusOutput::Event(event));
+                take(BusOutput::Event(progress.tell(event)));
             }
         });
         while let Some(frame) = self.node.poll(now) {
@@ -135,8 +138,13 @@ impl Bus {
         let Some(output) = self.predictor.output() else { return };
         let EncoderFaults { drive, steering, .. } = self.faults;
         let health = Health { drive, steering, laser, start_search: self.relocalization };
+        let mut has_published = false;
         for frame in self.publisher.poll(now, &output, &health).iter().flatten() {
+            has_published = true;
             take(BusOutput::Send(*frame));
+        }
+        if has_published {
+            take(BusOutput::Published(PublishedPose { pose: output, progress: self.progress }));
         }
     }
 

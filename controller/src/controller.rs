@@ -1,7 +1,8 @@
 //! All parts as one value.
 
-use agv_core::localizer::{Event, Localize, Localizer, Outputs, PoseFix};
+use agv_core::localizer::{Localize, Localizer, PoseFix};
 use agv_core::measurement::Time;
+use agv_core::record::Record;
 use agv_core::state::PoseOutput;
 use agv_settings::Settings;
 use agv_wire::can::frame::Frame;
@@ -32,7 +33,7 @@ pub enum LaserOrder<'a> {
 /// A controller that does one thing after the other: that of a desktop, in simulated time. A board runs its parts at three
 /// priorities.
 ///
-/// `observe` is told each event that was handled and what came of it, for a log.
+/// `log` is given all that a log of the drive holds, in its order.
 #[derive(Debug)]
 pub struct Controller<L = Localizer> {
     laser: Laser<TELEGRAM>,
@@ -69,24 +70,19 @@ impl<L: Localize> Controller<L> {
         bytes: &[u8],
         now: Time,
         mut order: impl FnMut(LaserOrder),
-        mut observe: impl FnMut(&Event, &Outputs),
+        mut log: impl FnMut(&Record),
     ) {
         let mut rest = bytes;
         while !rest.is_empty() {
             // A telegram is shorter than the session's room, so it always takes some.
             let taken = self.laser.receive(rest, now);
             rest = rest.get(taken..).unwrap_or_default();
-            self.poll_laser(now, &mut order, &mut observe);
+            self.poll_laser(now, &mut order, &mut log);
         }
     }
 
     /// Does what there is to do with the laser.
-    pub fn poll_laser(
-        &mut self,
-        now: Time,
-        mut order: impl FnMut(LaserOrder),
-        mut observe: impl FnMut(&Event, &Outputs),
-    ) {
+    pub fn poll_laser(&mut self, now: Time, mut order: impl FnMut(LaserOrder), mut log: impl FnMut(&Record)) {
         loop {
             match self.laser.poll(now, &mut self.revolution) {
                 Step::Wait(_) => return,
@@ -95,7 +91,7 @@ impl<L: Localize> Controller<L> {
                 Step::Send(bytes) => order(LaserOrder::Send(bytes)),
                 Step::Report(_) => {}
                 Step::Revolution => {
-                    self.localization.revolution(&self.revolution, &mut observe);
+                    self.localization.revolution(&self.revolution, &mut log);
                     self.bus.update(&self.localization.estimate());
                 }
             }
@@ -103,65 +99,33 @@ impl<L: Localize> Controller<L> {
     }
 
     /// Takes a frame of the bus.
-    pub fn hear_bus(
-        &mut self,
-        frame: &Frame,
-        now: Time,
-        mut send: impl FnMut(&Frame),
-        mut observe: impl FnMut(&Event, &Outputs),
-    ) {
+    pub fn hear_bus(&mut self, frame: &Frame, now: Time, mut send: impl FnMut(&Frame), mut log: impl FnMut(&Record)) {
         let Self { bus, localization, .. } = self;
-        let mut has_spoken = false;
-        bus.hear(frame, now, |output| match output {
-            BusOutput::Send(frame) => send(&frame),
-            BusOutput::Event(event) => {
-                has_spoken = true;
-                localization.handle(&event.event(), &mut observe);
-            }
-        });
-        if has_spoken {
-            bus.update(&localization.estimate());
-        }
+        bus.hear(frame, now, |output| take(localization, output, &mut send, &mut log));
+        bus.update(&localization.estimate());
     }
 
     /// Does what there is to do on the bus.
-    pub fn poll_bus(&mut self, now: Time, mut send: impl FnMut(&Frame), mut observe: impl FnMut(&Event, &Outputs)) {
+    pub fn poll_bus(&mut self, now: Time, mut send: impl FnMut(&Frame), mut log: impl FnMut(&Record)) {
         let Self { bus, localization, laser, .. } = self;
-        let mut has_spoken = false;
-        bus.poll(now, laser.health(now), |output| match output {
-            BusOutput::Send(frame) => send(&frame),
-            BusOutput::Event(event) => {
-                has_spoken = true;
-                localization.handle(&event.event(), &mut observe);
-            }
-        });
-        if has_spoken {
-            bus.update(&localization.estimate());
-        }
+        bus.poll(now, laser.health(now), |output| take(localization, output, &mut send, &mut log));
+        bus.update(&localization.estimate());
     }
 
     /// Somebody tells where the vehicle is.
-    pub fn tell(&mut self, fix: PoseFix, observe: impl FnOnce(&Event, &Outputs)) {
-        self.localization.handle(&BusEvent::SetPose(fix).event(), observe);
+    pub fn tell(&mut self, fix: PoseFix, log: impl FnMut(&Record)) {
+        self.localization.hear(&BusEvent::SetPose(fix).into(), log);
         self.bus.update(&self.localization.estimate());
     }
 
     /// Searches a pose if there is none, as long as a millisecond allows.
-    pub fn search(&mut self, mut observe: impl FnMut(&Event, &Outputs)) {
+    pub fn search(&mut self, mut log: impl FnMut(&Record)) {
         for _ in 0..SLICES {
-            let mut has_spoken = false;
-            let is_busy = self.localization.search(|event, outputs| {
-                has_spoken = true;
-                observe(event, outputs);
-            });
-            if has_spoken {
-                self.bus.update(&self.localization.estimate());
-            }
-            if !is_busy {
+            if !self.localization.search(&mut log) {
                 break;
             }
         }
-        self.bus.set_relocalization(self.localization.relocalization());
+        self.bus.update(&self.localization.estimate());
     }
 
     /// The pose for now. None before the localiser has said anything.
@@ -174,5 +138,19 @@ impl<L: Localize> Controller<L> {
     #[must_use]
     pub fn localizer(&self) -> &L {
         self.localization.localizer()
+    }
+}
+
+/// Does what the bus wants done.
+fn take<L: Localize>(
+    localization: &mut Localization<L>,
+    output: BusOutput,
+    send: &mut impl FnMut(&Frame),
+    log: &mut impl FnMut(&Record),
+) {
+    match output {
+        BusOutput::Send(frame) => send(&frame),
+        BusOutput::Event(told) => localization.hear(&told, log),
+        BusOutput::Published(published) => localization.published(&published, log),
     }
 }

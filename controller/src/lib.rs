@@ -9,7 +9,8 @@
 //! | [`Localization`] | the localiser, and the search for a pose that it does not have | the main loop |
 //! | [`Controller`] | all of them as one value, one after the other | a desktop, in simulated time |
 //!
-//! A board runs the parts at three priorities and passes [`BusEvent`]s, revolutions and [`Estimate`]s between them.
+//! A board runs the parts at three priorities and passes events of the bus ([`Told`]), revolutions,
+//! [`Estimate`]s and what was published ([`PublishedPose`]) between them.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -18,6 +19,7 @@ mod controller;
 mod encoders;
 mod laser;
 mod localization;
+mod progress;
 mod standstill;
 
 pub use bus::{Bus, BusOutput, MOTIONS, Troubles};
@@ -25,4 +27,5 @@ pub use controller::{Controller, LaserOrder, TELEGRAM};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels};
 pub use laser::Laser;
 pub use localization::{Estimate, Localization};
+pub use progress::{Progress, PublishedPose, Told};
 pub use standstill::Standstill;

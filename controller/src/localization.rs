@@ -1,14 +1,19 @@
 //! The localiser, and the search for a pose that it does not have.
 
-use agv_core::localizer::{Event, Localize, Outputs, StartSearch};
+use agv_core::localizer::{Event, Localize, StartSearch};
 use agv_core::odometry::OdometryBias;
+use agv_core::record::{Output, Published, Record};
 use agv_core::state::{PoseOutput, Relocalization};
 use agv_settings::Settings;
 use agv_wire::nav350::Revolution;
 
+use super::progress::{PublishedPose, Told};
+
 /// What the localiser has said last, for whoever publishes it.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
+    /// Events that it has answered, wrapping.
+    pub answered: u32,
     /// Its pose.
     pub pose: PoseOutput,
     /// What it has learnt of the odometry.
@@ -17,11 +22,14 @@ pub struct Estimate {
     pub relocalization: Relocalization,
 }
 
-/// One event in, outputs out, and a search in the time between events.
+/// One event in, outputs out, and a search in the time between events. What is told and answered, and what was published
+/// meanwhile, is handed to `log` as records of a log.
 #[derive(Clone, Debug)]
 pub struct Localization<L> {
     localizer: L,
     search: StartSearch,
+    answered: u32,
+    told: u32,
 }
 
 impl<L: Localize> Localization<L> {
@@ -30,7 +38,7 @@ impl<L: Localize> Localization<L> {
     #[inline(always)]
     pub fn new(localizer: L, settings: &Settings) -> Self {
         let search = StartSearch::new(&settings.parameters, settings.start_search);
-        let mut localization = Self { localizer, search };
+        let mut localization = Self { localizer, search, answered: 0, told: 0 };
         localization.index();
         localization
     }
@@ -51,10 +59,24 @@ impl<L: Localize> Localization<L> {
         self.search.index(self.localizer.reflectors());
     }
 
-    /// Takes an event. `observe` is told what came of it.
-    pub fn handle(&mut self, event: &Event, observe: impl FnOnce(&Event, &Outputs)) {
+    /// Takes an event that the bus has told, or somebody else.
+    pub fn hear(&mut self, told: &Told, mut log: impl FnMut(&Record)) {
+        if let Some(progress) = told.progress {
+            self.told = progress.told;
+            let behind = self.answered.wrapping_sub(progress.answered);
+            if behind != 0 {
+                log(&Record::Behind(behind));
+            }
+        }
+        self.handle(&told.event.event(), log);
+    }
+
+    /// Takes an event.
+    pub fn handle(&mut self, event: &Event, mut log: impl FnMut(&Record)) {
         let outputs = self.localizer.handle(event);
-        observe(event, outputs);
+        self.answered = self.answered.wrapping_add(1);
+        log(&Record::Event(*event));
+        log(&Record::Output(Output::from(outputs)));
         let mode = outputs.pose.mode;
         self.search.handle(event, mode, self.localizer.reflectors());
     }
@@ -63,22 +85,35 @@ impl<L: Localize> Localization<L> {
     pub fn revolution<const BEAMS: usize, const REFLECTORS: usize>(
         &mut self,
         revolution: &Revolution<BEAMS, REFLECTORS>,
-        mut observe: impl FnMut(&Event, &Outputs),
+        mut log: impl FnMut(&Record),
     ) {
         if let Some(reflectors) = revolution.reflectors() {
-            self.handle(&Event::Reflectors(reflectors), &mut observe);
+            self.handle(&Event::Reflectors(reflectors), &mut log);
         }
         if let Some(scan) = revolution.scan() {
-            self.handle(&Event::Scan(scan), &mut observe);
+            self.handle(&Event::Scan(scan), &mut log);
         }
+    }
+
+    /// Takes what was published. Where it stands in the log matters: behind all events that the bus had told
+    /// ([`Localization::told`]), and before the next of them.
+    pub fn published(&self, published: &PublishedPose, mut log: impl FnMut(&Record)) {
+        let behind = self.answered.wrapping_sub(published.progress.answered);
+        log(&Record::Published(Published { pose: published.pose, behind }));
+    }
+
+    /// Number of the last event that the bus has told.
+    #[must_use]
+    pub fn told(&self) -> u32 {
+        self.told
     }
 
     /// Goes on with the search for a pose for a slice of time, and returns whether there is more to do. A pose that is found
     /// is an event like any other, so that a replay of the log needs no search.
-    pub fn search(&mut self, observe: impl FnOnce(&Event, &Outputs)) -> bool {
+    pub fn search(&mut self, log: impl FnMut(&Record)) -> bool {
         let (is_busy, found) = self.search.advance(self.localizer.reflectors());
         if let Some(fix) = found {
-            self.handle(&Event::SetPose(fix), observe);
+            self.handle(&Event::SetPose(fix), log);
         }
         is_busy
     }
@@ -93,6 +128,7 @@ impl<L: Localize> Localization<L> {
     #[must_use]
     pub fn estimate(&self) -> Estimate {
         Estimate {
+            answered: self.answered,
             pose: self.localizer.outputs().pose,
             bias: self.localizer.odometry_bias(),
             relocalization: self.relocalization(),

@@ -12,8 +12,8 @@ use agv_core::measurement::{
 };
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
-    DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Raw, RawSource, Record, Reference, Scratch,
-    Step, Truth, encode,
+    DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Published, Raw, RawSource, Record,
+    Reference, Scratch, Step, Truth, encode,
 };
 use proptest::prelude::*;
 
@@ -30,6 +30,8 @@ enum Owned {
     EncoderFaults(EncoderFaults),
     SetPose(PoseFix),
     Output(PoseOutput, Vec<LandmarkUse>),
+    Behind(u32),
+    Published(Published),
     Truth(Truth),
     Reference(Reference),
     Note(String),
@@ -62,6 +64,8 @@ impl Owned {
             }
             Self::SetPose(fix) => Record::Event(Event::SetPose(*fix)),
             Self::Output(pose, uses) => Record::Output(Output { pose: *pose, uses }),
+            Self::Behind(count) => Record::Behind(*count),
+            Self::Published(published) => Record::Published(*published),
             Self::Truth(truth) => Record::Truth(*truth),
             Self::Reference(reference) => Record::Reference(*reference),
             Self::Note(text) => Record::Note(text),
@@ -226,6 +230,8 @@ fn record() -> impl Strategy<Value = Owned> {
         }),
         (pose_output(), prop::collection::vec(landmark_use(), 0..128))
             .prop_map(|(pose, uses)| Owned::Output(pose, uses)),
+        any::<u32>().prop_map(Owned::Behind),
+        (pose_output(), any::<u32>()).prop_map(|(pose, behind)| Owned::Published(Published { pose, behind })),
         (time(), pose()).prop_map(|(time, pose)| Owned::Truth(Truth { time, pose })),
         (time(), number(), number(), prop::option::of(number()))
             .prop_map(|(time, x, y, heading)| Owned::Reference(Reference { time, x, y, heading })),
@@ -458,14 +464,18 @@ fn missing_and_repeated_frames_are_reported() {
 #[test]
 fn another_version_is_told_apart_from_damage() {
     let (frames, _) = small_log();
-    let mut frame = frames[2].clone();
-    frame[4] = 9;
-    let end = frame.len() - 4;
-    let checksum = crc32(&frame[..end]);
-    frame[end..].copy_from_slice(&checksum.to_le_bytes());
-    let (again, damages) = read_again(&frame, 1000);
-    assert!(again.is_empty());
-    assert_eq!(damages[0].reason, DamageReason::Version(9));
+    for (version, is_read) in [(7, false), (8, true), (9, true), (10, false)] {
+        let mut frame = frames[2].clone();
+        frame[4] = version;
+        let end = frame.len() - 4;
+        let checksum = crc32(&frame[..end]);
+        frame[end..].copy_from_slice(&checksum.to_le_bytes());
+        let (again, damages) = read_again(&frame, 1000);
+        assert_eq!(again.len(), usize::from(is_read), "version {version}");
+        if !is_read {
+            assert_eq!(damages[0].reason, DamageReason::Version(version));
+        }
+    }
 }
 
 #[test]
@@ -489,7 +499,7 @@ fn the_header_of_a_localiser_s_log_states_its_room() {
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 8, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 9, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }

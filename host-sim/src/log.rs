@@ -9,11 +9,11 @@ use agv_core::localizer::{Localizer, Parameters};
 use agv_core::maps::Landmark;
 use agv_core::record::{
     self, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
-    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Output, Record, Scratch,
+    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, OLDEST_VERSION, Output, Record, Scratch,
 };
 
 use crate::file_kind;
-use crate::recording::{RecordedOutput, Recording, keep};
+use crate::recording::{Publishing, RecordedOutput, RecordedPose, Recording, keep};
 
 /// Name and version that this program leaves in its logs.
 pub const SOFTWARE: &str = concat!("agv ", env!("CARGO_PKG_VERSION"));
@@ -53,7 +53,7 @@ pub enum LogError {
         looks_like: &'static str,
     },
     /// The log was written by a program with another format.
-    #[error("{}: the log has format version {found}, this program reads {FORMAT_VERSION}", path.display())]
+    #[error("{}: the log has format version {found}, this program reads {OLDEST_VERSION} to {FORMAT_VERSION}", path.display())]
     Version {
         /// The file.
         path: PathBuf,
@@ -381,6 +381,8 @@ pub struct Contents {
     pub recording: Recording,
     /// What the localiser answered while the log was written, in the order of the events; empty if that was not logged.
     pub outputs: Vec<RecordedOutput>,
+    /// What the vehicle was given while the log was written; empty if that was not logged.
+    pub publishing: Publishing,
     /// Everything that is wrong with the log.
     pub damages: Vec<Damage>,
 }
@@ -404,7 +406,7 @@ pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Conte
     let mut header = None;
     let mut is_complete = false;
     let (mut landmarks, mut events, mut truth, mut references) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut outputs = Vec::new();
+    let (mut outputs, mut publishing) = (Vec::new(), Publishing::default());
     // An output behind damage may belong to an event that is lost.
     let mut is_answer_expected = false;
     while let Some(item) = reader.next()? {
@@ -432,6 +434,10 @@ pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Conte
                     is_answer_expected = false;
                     outputs.push(RecordedOutput { event: events.len() - 1, pose, uses: uses.to_vec() });
                 }
+                Record::Behind(count) => publishing.behind.push((events.len(), count)),
+                Record::Published(published) => {
+                    publishing.poses.push(RecordedPose { events: events.len(), published });
+                }
                 Record::Truth(one) => truth.push(one),
                 Record::Reference(one) => references.push(one),
                 Record::End => is_complete = true,
@@ -446,7 +452,7 @@ pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Conte
     match header {
         Some((software, parameters)) => {
             let recording = Recording { parameters, landmarks, events, truth, references };
-            Ok(Contents { software, recording, outputs, damages })
+            Ok(Contents { software, recording, outputs, publishing, damages })
         }
         None => Err(LogError::Header { path: path.to_owned(), damage: damages.first().copied() }),
     }

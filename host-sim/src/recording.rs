@@ -4,7 +4,7 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{AnyEvent, AsReflectors, AsScan, Event, LandmarkUse, Parameters, PoseOutput};
 use agv_core::maps::Landmark;
 use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
-use agv_core::record::Output;
+use agv_core::record::{Output, Published};
 pub use agv_core::record::{Reference, Truth};
 
 /// A scan that owns its ranges; the fields are those of [`Scan`].
@@ -128,6 +128,25 @@ impl RecordedOutput {
     pub fn view(&self) -> Output<'_> {
         Output { pose: self.pose, uses: &self.uses }
     }
+}
+
+/// What the vehicle was given when it was recorded, and what the localiser had not answered by then.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Publishing {
+    /// Index of an event of the bus, and how many events before it had not been answered when the bus heard it; events before
+    /// which all had been answered are left out.
+    pub behind: Vec<(usize, u32)>,
+    /// The poses.
+    pub poses: Vec<RecordedPose>,
+}
+
+/// A pose as the vehicle was given it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedPose {
+    /// How many events stand before it in the log.
+    pub events: usize,
+    /// The pose, and what it rests on.
+    pub published: Published,
 }
 
 impl Recording {

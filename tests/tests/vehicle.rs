@@ -62,6 +62,9 @@ fn assert_replayed(drive: &Drive, least: usize) {
     let comparison = replay::compare(&contents.outputs, &again);
     assert_eq!(comparison.first_difference, None);
     assert!(comparison.compared >= least, "{}", comparison.compared);
+    let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
+    assert_eq!(published.first_difference, None);
+    assert!(published.compared >= least / 2, "{} poses were published", published.compared);
 }
 
 /// Waits until something is so, and says how long that took.

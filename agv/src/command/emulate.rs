@@ -115,13 +115,14 @@ impl Emulate {
         let errors = vehicle::errors(&driven, recording).context("the controller has said no pose")?;
         let contents = log::read_contents(&driven.log, |_| ())?;
         let again = replay::replay(&contents.recording, |_| ())?;
-        let comparison = replay::compare(&contents.outputs, &again);
+        let outputs = replay::compare(&contents.outputs, &again);
+        let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
         Ok(Outcome {
             errors,
             records: driven.stream.records,
             damages: driven.stream.damages,
             events: contents.recording.events.len(),
-            is_bit_equal: comparison.first_difference.is_none() && comparison.compared > 0,
+            is_bit_equal: outputs.is_equal() && published.is_equal(),
         })
     }
 }

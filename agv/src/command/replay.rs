@@ -11,7 +11,7 @@ use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::map_file;
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
-use agv_host_sim::replay::{Comparison, compare, replay};
+use agv_host_sim::replay::{Comparison, compare, compare_published, replay};
 use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
@@ -37,8 +37,9 @@ Keys of --json:
   observations [kind, accepted, gated, ambiguous, unknown, out_of_time],
   innovations [kind, rms_first_mm, rms_second_mm, rms_bearing_deg, mean_normalised_square],
   accuracy {against, compared, position_mm, position_end_mm, heading_deg, heading_end_deg, nees, ok_share},
-  outputs {compared, first_difference}, damage [offset, skipped, reason].
-accuracy is null if nobody knows where the vehicle was, outputs if the log holds none that can be compared.";
+  outputs {compared, first_difference}, published {compared, first_difference}, damage [offset, skipped, reason].
+accuracy is null if nobody knows where the vehicle was; outputs, and published for the poses that the vehicle was given, are null
+if the log holds none that can be compared.";
 
 /// Run the localiser on a log.
 #[derive(clap::Args)]
@@ -108,7 +109,14 @@ struct Summary<'a> {
     #[serde(flatten)]
     figures: &'a Figures,
     outputs: Option<Comparison>,
+    published: Option<Comparison>,
     damage: Vec<DamageEntry>,
+}
+
+/// How what the log says the controller has said compares with the replay.
+struct Said {
+    outputs: Comparison,
+    published: Comparison,
 }
 
 #[derive(Serialize)]
@@ -129,7 +137,7 @@ impl Replay {
         let reading = progress::bar("reading", size);
         let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
-        let Contents { software, mut recording, outputs, damages } = contents;
+        let Contents { software, mut recording, outputs, publishing, damages } = contents;
         let is_as_recorded = self.map.is_empty()
             && self.landmarks.is_empty()
             && self.start.is_none()
@@ -154,13 +162,16 @@ impl Replay {
         let replay = replay(&recording, |events| running.set_position(events as u64))
             .with_context(|| self.log.display().to_string())?;
         running.finish_and_clear();
-        let comparison = (is_as_recorded && !outputs.is_empty()).then(|| compare(&outputs, &replay));
+        let said = is_as_recorded.then(|| Said {
+            outputs: compare(&outputs, &replay),
+            published: compare_published(&recording, &publishing, &replay),
+        });
         if let Some(path) = &self.output {
             log::write_with_outputs(path, &recording, |event| replay.output(event))?;
         }
         let track = Track::new(&recording, &replay);
         let figures = Figures::new(&recording, &replay, &track);
-        let mut remarks = self.remarks(&software, comparison, &damages);
+        let mut remarks = self.remarks(&software, said.as_ref(), &damages);
         if figures.poses == 0 {
             remarks.push(["start".to_owned(), "no pose is given in the log; --start gives one".to_owned()]);
         }
@@ -177,8 +188,15 @@ impl Replay {
                 skipped: damage.skipped,
                 reason: damage.reason.to_string(),
             });
-            let summary =
-                Summary { software: &software, figures: &figures, outputs: comparison, damage: damage.collect() };
+            let compared =
+                |comparison: fn(&Said) -> Comparison| said.as_ref().map(comparison).filter(|it| it.compared > 0);
+            let summary = Summary {
+                software: &software,
+                figures: &figures,
+                outputs: compared(|said| said.outputs),
+                published: compared(|said| said.published),
+                damage: damage.collect(),
+            };
             println!("{}", serde_json::to_string_pretty(&summary)?);
             return Ok(());
         }
@@ -203,7 +221,7 @@ impl Replay {
     }
 
     /// What there is to say about the log itself.
-    fn remarks(&self, software: &str, comparison: Option<Comparison>, damages: &[Damage]) -> Vec<[String; 2]> {
+    fn remarks(&self, software: &str, said: Option<&Said>, damages: &[Damage]) -> Vec<[String; 2]> {
         let mut rows =
             vec![["log".to_owned(), self.log.display().to_string()], ["written by".to_owned(), software.to_owned()]];
         rows.extend(self.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
@@ -215,12 +233,9 @@ impl Replay {
         if damages.len() > LISTED_DAMAGES {
             rows.push(["damage".to_owned(), format!("in {} more places", damages.len() - LISTED_DAMAGES)]);
         }
-        if let Some(Comparison { compared, first_difference }) = comparison {
-            let verdict = match first_difference {
-                None => format!("equal to the {compared} recorded ones, bit for bit"),
-                Some(event) => format!("differ from the recorded ones, first at event {event}"),
-            };
-            rows.push(["outputs".to_owned(), verdict]);
+        if let Some(said) = said {
+            rows.extend(said.outputs.verdict().map(|verdict| ["outputs".to_owned(), verdict]));
+            rows.extend(said.published.verdict().map(|verdict| ["published".to_owned(), verdict]));
         }
         rows
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use agv_host_sim::drive::{Figures, ReplayedDrive, Track, report_page};
 use agv_host_sim::log::{self, Contents};
-use agv_host_sim::replay::{compare, replay};
+use agv_host_sim::replay::{compare, compare_published, replay};
 use agv_host_sim::report::write_pdf;
 use anyhow::{Context, ensure};
 use serde::Serialize;
@@ -70,18 +70,16 @@ impl Report {
 
 /// Replays a log.
 fn drive(path: &Path) -> anyhow::Result<ReplayedDrive> {
-    let Contents { software, recording, outputs, damages } = log::read_contents(path, |_| ())?;
+    let Contents { software, recording, outputs, publishing, damages } = log::read_contents(path, |_| ())?;
     let bar = progress::bar("replaying", recording.events.len() as u64);
     let replay =
         replay(&recording, |events| bar.set_position(events as u64)).with_context(|| path.display().to_string())?;
     bar.finish_and_clear();
     let mut remarks = vec![["written by".to_owned(), software]];
-    if !outputs.is_empty() {
-        let verdict = match compare(&outputs, &replay).first_difference {
-            None => "equal to the recorded ones, bit for bit".to_owned(),
-            Some(event) => format!("differ from the recorded ones, first at event {event}"),
-        };
-        remarks.push(["outputs".to_owned(), verdict]);
+    for (what, comparison) in
+        [("outputs", compare(&outputs, &replay)), ("published", compare_published(&recording, &publishing, &replay))]
+    {
+        remarks.extend(comparison.verdict().map(|verdict| [what.to_owned(), verdict]));
     }
     remarks.push(["damage".to_owned(), format!("in {} places", damages.len())]);
     let track = Track::new(&recording, &replay);

@@ -21,12 +21,14 @@
 mod frame;
 mod log;
 mod payload;
+mod published;
 mod truth;
 
 pub use frame::{
     CHECKSUM_LENGTH, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, MAGIC,
-    MAX_FRAME, MAX_PAYLOAD,
+    MAX_FRAME, MAX_PAYLOAD, OLDEST_VERSION,
 };
 pub use log::{Item, LogReader, Step, encode};
 pub use payload::{EncodeError, Header, LANDMARKS_A_RECORD, Output, RAW_A_RECORD, Raw, RawSource, Record, Scratch};
+pub use published::Published;
 pub use truth::{Reference, Truth};

@@ -4,6 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
+use super::published::Published;
 use super::truth::{Reference, Truth};
 use crate::localizer::{Capacities, Event, LandmarkUse, Outputs, Parameters, PoseOutput};
 use crate::maps::Landmark;
@@ -49,6 +50,11 @@ pub enum Record<'a> {
     Event(Event<'a>),
     /// What the localiser answered to the event before.
     Output(Output<'a>),
+    /// How many of the events before it in the log the localiser had not answered yet when whoever publishes heard the next
+    /// event; not written where it had answered all of them.
+    Behind(u32),
+    /// A pose as the vehicle was given it.
+    Published(Published),
     /// Where the vehicle really was; only a host writes it.
     Truth(Truth),
     /// Where another instrument has seen the laser; only a host writes it.
@@ -136,6 +142,8 @@ mod kind {
     pub const NOTE: u8 = 11;
     pub const END: u8 = 12;
     pub const RAW: u8 = 13;
+    pub const BEHIND: u8 = 15;
+    pub const PUBLISHED: u8 = 16;
 }
 
 /// What stands before the beams of a scan.
@@ -169,6 +177,8 @@ impl Record<'_> {
             Self::Landmarks(_) => kind::LANDMARKS,
             Self::Event(event) => event.code(),
             Self::Output(_) => kind::OUTPUT,
+            Self::Behind(_) => kind::BEHIND,
+            Self::Published(_) => kind::PUBLISHED,
             Self::Truth(_) => kind::TRUTH,
             Self::Reference(_) => kind::REFERENCE,
             Self::Note(_) => kind::NOTE,
@@ -195,6 +205,8 @@ impl Record<'_> {
             Self::Event(Event::Scan(scan)) => put_scan(scan, room),
             Self::Event(Event::SetPose(fix)) => put(fix, room),
             Self::Output(output) => put(&(&output.pose, output.uses), room),
+            Self::Behind(count) => put(count, room),
+            Self::Published(published) => put(published, room),
             Self::Truth(truth) => put(truth, room),
             Self::Reference(reference) => put(reference, room),
             Self::Note(text) => put_bytes(text.as_bytes(), room),
@@ -238,6 +250,8 @@ impl Record<'_> {
                 take_each(rest, &mut scratch.uses)?;
                 Record::Output(Output { pose, uses: &scratch.uses })
             }
+            kind::BEHIND => Record::Behind(take(payload)?),
+            kind::PUBLISHED => Record::Published(take(payload)?),
             kind::TRUTH => Record::Truth(take(payload)?),
             kind::REFERENCE => Record::Reference(take(payload)?),
             kind::NOTE => Record::Note(core::str::from_utf8(payload).map_err(|_| DecodeError::Content)?),

@@ -33,7 +33,8 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, troubles: Troubles
             BusOutput::Send(frame) => {
                 port.send(&frame);
             }
-            BusOutput::Event(event) => exchange::pass_on(event),
+            BusOutput::Event(told) => exchange::pass_on(told),
+            BusOutput::Published(published) => exchange::log_published(published),
         };
         if let Either::First((frame, heard)) = &woken {
             bus.hear(frame, *heard, &mut take);

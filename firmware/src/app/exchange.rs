@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 
-use agv_controller::{BusEvent, Estimate};
+use agv_controller::{Estimate, PublishedPose, Told};
 use agv_core::measurement::Time;
 use agv_core::state::LaserHealth;
 use agv_wire::nav350::{Revolution, SensorWatch};
@@ -17,7 +17,13 @@ use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 pub const EVENTS: usize = 64;
 
 /// Events of the bus, in order.
-pub static BUS_EVENTS: Channel<CriticalSectionRawMutex, BusEvent, EVENTS> = Channel::new();
+pub static BUS_EVENTS: Channel<CriticalSectionRawMutex, Told, EVENTS> = Channel::new();
+
+/// Published poses that wait for the log: those of a revolution, which takes the localiser longest.
+const PUBLISHED_POSES: usize = 8;
+
+/// What the bus has published, for the log.
+static PUBLISHED: Channel<CriticalSectionRawMutex, PublishedPose, PUBLISHED_POSES> = Channel::new();
 
 /// The end of the revolutions' channel at the laser, and that at the localiser.
 pub type RevolutionSender = zerocopy_channel::Sender<'static, CriticalSectionRawMutex, Revolution>;
@@ -34,8 +40,8 @@ static ARE_SETTINGS_SOUND: AtomicBool = AtomicBool::new(true);
 static LOST_EVENTS: AtomicU32 = AtomicU32::new(0);
 
 /// Leaves an event to the localiser. If it is so far behind that there is no room, the event is lost and counted.
-pub fn pass_on(event: BusEvent) {
-    if BUS_EVENTS.try_send(event).is_err() {
+pub fn pass_on(told: Told) {
+    if BUS_EVENTS.try_send(told).is_err() {
         LOST_EVENTS.fetch_add(1, Ordering::Relaxed);
     }
 }
@@ -44,6 +50,19 @@ pub fn pass_on(event: BusEvent) {
 #[must_use]
 pub fn lost_events() -> u32 {
     LOST_EVENTS.load(Ordering::Relaxed)
+}
+
+/// Leaves what was published to the log; without room it is left out, as records are that the network is too slow for.
+pub fn log_published(published: PublishedPose) {
+    let _ = PUBLISHED.try_send(published);
+}
+
+/// The next pose that was published before the bus told more than so many events.
+#[must_use]
+pub fn published_until(told: u32) -> Option<PublishedPose> {
+    let next = PUBLISHED.try_peek().ok()?;
+    // The count wraps: what is ahead by less than half of its range is later.
+    if next.progress.told.wrapping_sub(told) as i32 > 0 { None } else { PUBLISHED.try_receive().ok() }
 }
 
 /// The localiser has said something.

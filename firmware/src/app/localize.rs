@@ -1,7 +1,6 @@
 //! The localiser's loop, below all interrupts.
 
-use agv_core::localizer::{Event, Outputs};
-use agv_core::record::{Output, Record};
+use agv_core::localizer::Event;
 
 use super::exchange::{self, BUS_EVENTS, RevolutionReceiver};
 use super::log_stream::LogWriter;
@@ -23,6 +22,7 @@ impl Localization {
     /// comes meanwhile waits, and the bus publishes without it. A search takes what time is left.
     pub fn step(&mut self, revolutions: &mut RevolutionReceiver) -> bool {
         supervision::check_in(Task::Localizer);
+        self.log_published(self.localization.told());
         if self.take_bus_event() {
             return true;
         }
@@ -30,7 +30,7 @@ impl Localization {
             return self.search();
         };
         let Self { localization, log } = self;
-        localization.revolution(revolution, |event, outputs| write(log, event, outputs));
+        localization.revolution(revolution, |record| log.write(record));
         exchange::publish(localization.estimate());
         revolutions.receive_done();
         true
@@ -38,15 +38,28 @@ impl Localization {
 
     /// Handles what the bus has told, and returns whether there was anything.
     pub fn take_bus_event(&mut self) -> bool {
-        let Ok(event) = BUS_EVENTS.try_receive() else { return false };
-        self.handle(&event.event());
+        let Ok(told) = BUS_EVENTS.try_receive() else { return false };
+        if let Some(progress) = told.progress {
+            self.log_published(progress.told.wrapping_sub(1));
+        }
+        let Self { localization, log } = self;
+        localization.hear(&told, |record| log.write(record));
+        exchange::publish(localization.estimate());
         true
+    }
+
+    /// Logs what was published before the bus told more than so many events.
+    fn log_published(&mut self, told: u32) {
+        let Self { localization, log } = self;
+        while let Some(published) = exchange::published_until(told) {
+            localization.published(&published, |record| log.write(record));
+        }
     }
 
     /// Tells the localiser something, publishes what it says, and logs both.
     pub fn handle(&mut self, event: &Event) {
         let Self { localization, log } = self;
-        localization.handle(event, |event, outputs| write(log, event, outputs));
+        localization.handle(event, |record| log.write(record));
         exchange::publish(localization.estimate());
     }
 
@@ -55,18 +68,13 @@ impl Localization {
         let Self { localization, log } = self;
         let before = localization.relocalization();
         let mut has_spoken = false;
-        let is_busy = localization.search(|event, outputs| {
+        let is_busy = localization.search(|record| {
             has_spoken = true;
-            write(log, event, outputs);
+            log.write(record);
         });
         if has_spoken || localization.relocalization() != before {
             exchange::publish(localization.estimate());
         }
         is_busy
     }
-}
-
-fn write(log: &mut LogWriter, event: &Event, outputs: &Outputs) {
-    log.write(&Record::Event(*event));
-    log.write(&Record::Output(Output::from(outputs)));
 }

@@ -118,7 +118,7 @@ async fn converse<F: NorFlash>(
             send(socket, room.get(..length).unwrap_or_default()).await?;
             match action {
                 Action::None => {}
-                Action::SetPose(fix) => exchange::pass_on(BusEvent::SetPose(fix)),
+                Action::SetPose(fix) => exchange::pass_on(BusEvent::SetPose(fix).into()),
                 Action::ForgetPanic => (actions.forget_panic)(),
                 Action::Reboot => {
                     let _ = with_timeout(PATIENCE, socket.flush()).await;

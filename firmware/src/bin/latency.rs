@@ -71,7 +71,7 @@ async fn encoders(parameters: Parameters) {
         predictor.encoders(&sample);
         let delay = exchange::now().micros().saturating_sub(time.micros());
         LATEST.fetch_max(u32::try_from(delay).unwrap_or(u32::MAX), Ordering::Relaxed);
-        exchange::pass_on(BusEvent::Encoders(sample));
+        exchange::pass_on(BusEvent::Encoders(sample).into());
         due += PERIOD;
     }
 }

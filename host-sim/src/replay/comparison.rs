@@ -9,10 +9,27 @@ use crate::recording::RecordedOutput;
 /// How recorded outputs compare with those of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Comparison {
-    /// Number of recorded outputs.
+    /// Number of recorded outputs, or of published poses.
     pub compared: usize,
     /// Index of the first event whose output is not the recorded one, bit for bit; None if all are.
     pub first_difference: Option<usize>,
+}
+
+impl Comparison {
+    /// The comparison as a sentence; None if nothing was compared.
+    #[must_use]
+    pub fn verdict(&self) -> Option<String> {
+        (self.compared > 0).then(|| match self.first_difference {
+            None => format!("equal to the {} recorded ones, bit for bit", self.compared),
+            Some(event) => format!("differ from the recorded ones, first at event {event}"),
+        })
+    }
+
+    /// Whether something was compared, and all of it is equal.
+    #[must_use]
+    pub fn is_equal(&self) -> bool {
+        self.compared > 0 && self.first_difference.is_none()
+    }
 }
 
 /// Compares recorded outputs with those of a replay of the same events.

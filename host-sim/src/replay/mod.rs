@@ -1,15 +1,18 @@
 //! The core against a recording.
 
 mod comparison;
+mod publishing;
 mod start_search;
 
 pub use comparison::{Comparison, compare};
+pub use publishing::compare_published;
 pub use start_search::{StartSearchError, find_start};
 
 use std::time::{Duration, Instant};
 
 use agv_core::localizer::{LandmarkUse, Localizer, PoseOutput};
 use agv_core::maps::MapError;
+use agv_core::odometry::OdometryBias;
 use agv_core::record::Output;
 use thiserror::Error;
 
@@ -20,6 +23,8 @@ use crate::recording::Recording;
 pub struct Replay {
     /// The pose after each event.
     pub poses: Vec<PoseOutput>,
+    /// What had been learnt of the odometry after each event.
+    pub biases: Vec<OdometryBias>,
     /// What became of each observation, event by event.
     pub uses: Vec<LandmarkUse>,
     /// For each event, how many observations there were up to and including it.
@@ -68,6 +73,7 @@ pub fn replay(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<
         replay.poses.push(outputs.pose);
         replay.uses.extend_from_slice(&outputs.uses);
         replay.use_ends.push(replay.uses.len());
+        replay.biases.push(localizer.odometry_bias());
         if index % 1024 == 0 {
             progress(index);
         }

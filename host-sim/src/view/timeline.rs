@@ -224,7 +224,8 @@ impl Timeline {
                 self.truth.push(*truth);
             }
             Record::Note(text) => self.happen(self.now(), HappeningKind::Note, (*text).to_owned()),
-            Record::Reference(_) | Record::Raw(_) | Record::End => {}
+            // The page shows what the localiser says, and the pose that is published follows it.
+            Record::Behind(_) | Record::Published(_) | Record::Reference(_) | Record::Raw(_) | Record::End => {}
         }
     }
 

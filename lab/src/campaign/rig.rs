@@ -86,7 +86,7 @@ pub fn drive(
             if let (Some(controller), Some(RecordedEvent::SetPose(fix))) = (&mut controller, recording.events.first()) {
                 let mut fix = *fix;
                 fix.time = now;
-                controller.tell(fix, |_, _| ());
+                controller.tell(fix, |_| ());
             }
         }
         if is(FaultKind::PowerCut) {
@@ -108,9 +108,9 @@ pub fn drive(
             // The controller and its laser.
             let mut wishes = Vec::new();
             while let Some(bytes) = from_laser.receive(now) {
-                controller.hear_laser(&bytes, now, |order| wishes.push(Wish::of(order)), |_, _| ());
+                controller.hear_laser(&bytes, now, |order| wishes.push(Wish::of(order)), |_| ());
             }
-            controller.poll_laser(now, |order| wishes.push(Wish::of(order)), |_, _| ());
+            controller.poll_laser(now, |order| wishes.push(Wish::of(order)), |_| ());
             for wish in wishes {
                 match wish {
                     Wish::Connect if is_unreachable => controller.unreachable(),
@@ -129,15 +129,15 @@ pub fn drive(
             }
             // The controller and its bus.
             while let Some(frame) = from_bus.receive(now) {
-                controller.hear_bus(&frame, now, |_| (), |_, _| ());
+                controller.hear_bus(&frame, now, |_| (), |_| ());
             }
             let answer = |frame: &Frame| {
                 for answer in pair.handle(frame) {
                     from_bus.send_frame(now, time, answer, faults);
                 }
             };
-            controller.poll_bus(now, answer, |_, _| ());
-            controller.search(|_, _| ());
+            controller.poll_bus(now, answer, |_| ());
+            controller.search(|_| ());
         }
         if let Some(connection) = &mut connection {
             let mut answers = Vec::new();

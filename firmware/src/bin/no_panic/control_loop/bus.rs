@@ -51,7 +51,7 @@ impl Bus {
         black_box((self.bus.nodes(), self.bus.emergency(any(0))));
         if let Some(pose) = self.bus.output() {
             let (bias, relocalization) = (any(OdometryBias::default()), any(Relocalization::Idle));
-            self.bus.update(&Estimate { pose: any(pose), bias, relocalization });
+            self.bus.update(&Estimate { answered: any(0), pose: any(pose), bias, relocalization });
         }
     }
 

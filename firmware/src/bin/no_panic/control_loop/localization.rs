@@ -2,9 +2,10 @@
 
 use core::hint::black_box;
 
+use agv_controller::{BusEvent, Progress, PublishedPose, Told};
 use agv_core::geometry::Pose;
 use agv_core::integrity::ProtectionLevel;
-use agv_core::localizer::{self, Event, Outputs, PoseFix};
+use agv_core::localizer::{self, Event, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
     EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
@@ -77,16 +78,28 @@ impl Localization {
         let Self { localization, frame, .. } = self;
         let _ = black_box(localization.localizer_mut().add_landmarks(part(&LANDMARKS)));
         localization.index();
-        localization.handle(&event, |event, outputs| log(frame, event, outputs));
-        black_box(localization.search(|event, outputs| log(frame, event, outputs)));
+        localization.handle(&event, |record| log(frame, record));
+        localization.hear(
+            &any(Told::from(BusEvent::Encoders(EncoderSample { time: Time::default(), drive: 0, steering: 0 }))),
+            |record| log(frame, record),
+        );
+        localization.published(
+            &any(PublishedPose { pose: localization.estimate().pose, progress: Progress::default() }),
+            |record| {
+                log(frame, record);
+            },
+        );
+        black_box(localization.told());
+        black_box(localization.search(|record| log(frame, record)));
         black_box(localization.estimate());
         let outputs = self.slam.handle(&event);
         let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
     }
 }
 
-fn log(frame: &mut [u8], event: &Event, outputs: &Outputs) {
-    let _ = black_box(encode(&Record::Event(*event), any(0), frame));
-    let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), frame));
-    black_box(ProtectionLevel::of(&outputs.pose));
+fn log(frame: &mut [u8], record: &Record) {
+    let _ = black_box(encode(record, any(0), frame));
+    if let Record::Output(output) = record {
+        black_box(ProtectionLevel::of(&output.pose));
+    }
 }
