@@ -86,16 +86,45 @@ fn checksum(before: u32, piece: &[u8]) -> u32 {
 }
 
 /// Flash whose work is done when it returns, as the storage wants it.
+///
+/// The first and the last word of a page are marks of the storage: they are erased, or written with [`MARK`]. One whose writing
+/// was cut off is read as written, as it could not be written again.
 struct Immediate<F>(F);
+
+/// What the storage marks a page with.
+const MARK: u8 = 0;
+
+/// Longest word, bytes.
+const LONGEST_WORD: usize = 32;
+
+impl<F: NorFlash> Immediate<F> {
+    /// Whether a mark lies at `offset`, and anything of it was written.
+    fn is_marked(&mut self, offset: u32) -> Result<bool, F::Error> {
+        let place = offset as usize % F::ERASE_SIZE;
+        let word = place - place % F::WRITE_SIZE;
+        if word != 0 && word != F::ERASE_SIZE - F::WRITE_SIZE {
+            return Ok(false);
+        }
+        let mut bytes = [0xFF; LONGEST_WORD];
+        let Some(whole) = bytes.get_mut(..F::WRITE_SIZE) else { return Ok(false) };
+        self.0.read(offset - (place - word) as u32, whole)?;
+        Ok(whole.iter().any(|byte| *byte != 0xFF))
+    }
+}
 
 impl<F: ErrorType> embedded_storage_async::nor_flash::ErrorType for Immediate<F> {
     type Error = F::Error;
 }
 
-impl<F: ReadNorFlash> embedded_storage_async::nor_flash::ReadNorFlash for Immediate<F> {
+impl<F: NorFlash> embedded_storage_async::nor_flash::ReadNorFlash for Immediate<F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        // The storage reads marks apart from items.
+        if bytes.len() <= F::WRITE_SIZE && self.is_marked(offset)? {
+            bytes.fill(MARK);
+            return Ok(());
+        }
         self.0.read(offset, bytes)
     }
 
@@ -153,7 +182,13 @@ impl<F: NorFlash> Store<F> {
         landmarks: &mut Vec<Landmark, LANDMARKS>,
     ) -> Result<Loaded, StoreError> {
         let mut loaded = Loaded::default();
-        let has_items = match self.load_leaves(settings, &mut loaded) {
+        // Of all that the storage does, only looking for one item mends a page whose erasure was cut off.
+        let first = self.load_leaves(settings, &mut loaded);
+        let outcome = match first {
+            Err(FetchError::Rubbish) if self.fetch(KEY_ITEM).is_ok() => self.load_leaves(settings, &mut loaded),
+            outcome => outcome,
+        };
+        let has_items = match outcome {
             Ok(has_items) => has_items,
             Err(FetchError::Flash) => return Err(StoreError::Flash),
             Err(_) => {

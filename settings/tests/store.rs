@@ -96,11 +96,21 @@ fn a_full_page_is_read_a_few_times_and_not_once_for_each_setting() {
 
 #[test]
 fn a_loss_of_power_at_any_point_leaves_each_setting_old_or_new() {
+    // So that pages are full, and erased, at other points of the work.
+    for starts in [0, 20, 40, 60, 80] {
+        lose_power_after(starts);
+    }
+}
+
+fn lose_power_after(starts: usize) {
     let (old, new) = (changed(0.3), changed(0.6));
     let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
     store.provision_key(&[9; 32]).unwrap();
     store.store_leaves(&Settings::default()).unwrap();
     store.store_leaves(&old).unwrap();
+    for _ in 0..starts {
+        store.count_start().unwrap();
+    }
     let flash = store.into_flash();
     let mut has_finished = false;
     let mut met = [0; 2];
