@@ -75,7 +75,7 @@ impl Bus {
             nodes,
             encoders: Encoders::new(&nodes, &settings.parameters, start),
             node: ControllerNode::new(nodes.controller, start),
-            publisher: PosePublisher::new(nodes.controller, start),
+            publisher: PosePublisher::new(nodes.controller, settings.parameters.alert_limits, start),
             predictor: OutputPredictor::new(&settings.parameters),
             progress: Progress::default(),
             standstill: Standstill::new(),

@@ -9,7 +9,7 @@ use agv_core::localizer::{Localizer, Parameters};
 use agv_core::maps::Landmark;
 use agv_core::record::{
     self, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
-    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, OLDEST_VERSION, Output, Record, Scratch,
+    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Output, Record, Scratch,
 };
 
 use crate::file_kind;
@@ -53,7 +53,7 @@ pub enum LogError {
         looks_like: &'static str,
     },
     /// The log was written by a program with another format.
-    #[error("{}: the log has format version {found}, this program reads {OLDEST_VERSION} to {FORMAT_VERSION}", path.display())]
+    #[error("{}: the log has format version {found}, this program reads {FORMAT_VERSION}", path.display())]
     Version {
         /// The file.
         path: PathBuf,

@@ -146,7 +146,7 @@ macro_rules! address {
 }
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 66] = [
+pub static LEAVES: [Leaf; 70] = [
     tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
     tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
     tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
@@ -202,7 +202,11 @@ pub static LEAVES: [Leaf; 66] = [
     number!(263, "limits.largest_position_deviation", "m", parameters.limits.largest_position_deviation),
     number!(264, "limits.largest_heading_deviation", "rad", parameters.limits.largest_heading_deviation),
     number!(265, "limits.longest_extrapolation", "s", parameters.limits.longest_extrapolation),
-    whole!(300, "can.controller_node", "", 1.0, 127.0, nodes.controller),
+    number!(280, "alert_limits.travel.position", "m", parameters.alert_limits.travel.position),
+    number!(281, "alert_limits.travel.heading", "rad", parameters.alert_limits.travel.heading),
+    number!(282, "alert_limits.docking.position", "m", parameters.alert_limits.docking.position),
+    number!(283, "alert_limits.docking.heading", "rad", parameters.alert_limits.docking.heading),
+    whole!(300, "can.controller_node", "", 1.0, 95.0, nodes.controller),
     whole!(301, "can.drive_node", "", 1.0, 127.0, nodes.drive),
     whole!(302, "can.steering_node", "", 1.0, 127.0, nodes.steering),
     whole!(303, "can.encoder_period", "ms", 1.0, 50.0, encoder_period),

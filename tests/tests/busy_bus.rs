@@ -245,7 +245,7 @@ fn drive_on(recording: &Recording, rate: f64, load: f64, seconds: f64) {
     let mut pair = EncoderPair::new(&drive, &steering, 0.010, start);
     let mut controller = ControllerNode::new(own[2], start);
     let mut orders = OrderReceiver::new(own[2]);
-    let mut publisher = PosePublisher::new(own[2], start);
+    let mut publisher = PosePublisher::new(own[2], recording.parameters.alert_limits, start);
     let mut receiver = PoseReceiver::new(own[2]);
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
     let pose = recording.truth[0].pose;

@@ -288,7 +288,7 @@ impl Pose {
                 continue;
             }
             println!(
-                "x {:10.4} m  y {:10.4} m  heading {:9.4} deg  +- {:.4} {:.4} m {:.3} deg  {:?} ({:?})  {:.2} m without correction",
+                "x {:10.4} m  y {:10.4} m  heading {:9.4} deg  +- {:.4} {:.4} m {:.3} deg  {:?} ({:?})  within {:.3} m {:.2} deg  {:.2} m without correction",
                 pose.pose.x,
                 pose.pose.y,
                 pose.pose.theta.to_degrees(),
@@ -297,6 +297,8 @@ impl Pose {
                 pose.deviations[2].to_degrees(),
                 pose.mode,
                 pose.reason,
+                pose.level.position,
+                pose.level.heading.to_degrees(),
                 pose.dead_reckoning_distance,
             );
         }
@@ -320,6 +322,8 @@ fn pose_json(pose: &PublishedPose) -> serde_json::Value {
         "resets": pose.resets,
         "last_reset_m": pose.last_reset,
         "overflows": pose.overflows,
+        "protection_level": {"position_m": pose.level.position, "heading_deg": pose.level.heading.to_degrees()},
+        "alarm": pose.alarm,
         "counter": pose.counter,
         "time_ms": pose.time,
     })

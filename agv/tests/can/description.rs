@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::Stdio;
 
+use agv_core::integrity::{Alarm, AlertLimit, ProtectionLevel};
 use agv_core::localizer::{Mode, Reason};
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Relocalization};
@@ -41,6 +42,18 @@ fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
                 ("CorrelationXY", correlations[0]),
                 ("CorrelationXHeading", correlations[1]),
                 ("CorrelationYHeading", correlations[2]),
+            ]),
+        ));
+        let level = ProtectionLevel { position: number.abs(), heading: 0.5 * number.abs() };
+        let limit = AlertLimit { position: number.abs(), heading: 0.25 * number.abs() };
+        all.push((
+            Content::Integrity { level, limit, alarm: Alarm::Docking },
+            BTreeMap::from([
+                ("ProtectionPosition", level.position),
+                ("ProtectionHeading", level.heading),
+                ("LimitPosition", limit.position),
+                ("LimitHeading", limit.heading),
+                ("Alarm", 1.0),
             ]),
         ));
         all.push((
@@ -180,7 +193,10 @@ fn tolerance(signal: &str) -> f64 {
         "DeviationX" | "DeviationY" => 0.00025,
         "DeviationHeading" | "HeadingDeviation" => 1e-4,
         "CorrelationXY" | "CorrelationXHeading" | "CorrelationYHeading" => 0.01,
-        "PositionDeviation" => 1e-3,
+        "PositionDeviation" | "ProtectionPosition" => 1e-3,
+        "ProtectionHeading" => 0.25e-3,
+        "LimitPosition" => 0.5e-3,
+        "LimitHeading" => 0.125e-3,
         _ => 0.0,
     }
 }

@@ -8,12 +8,14 @@
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
 //! | [`MountingCheck`] | corrections with the motion since the last one | a laser mounted elsewhere, an odometry of another scale |
 
+mod alert_limits;
 mod innovation_monitor;
 mod jump_check;
 mod mounting_check;
 mod protection_level;
 mod slip_check;
 
+pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
 pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
 pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
 pub use mounting_check::{MountingCheck, Suspect};

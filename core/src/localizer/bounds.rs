@@ -37,7 +37,7 @@ const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     }
 }
 
-const BOUNDS: [Bound; 41] = [
+const BOUNDS: [Bound; 45] = [
     Bound {
         leaf: "vehicle.wheelbase",
         least: 0.05,
@@ -230,6 +230,30 @@ const BOUNDS: [Bound; 41] = [
         least: 0.0,
         most: 10.0,
         get: |parameters| Some(parameters.limits.longest_extrapolation),
+    },
+    Bound {
+        leaf: "alert_limits.travel.position",
+        least: 0.001,
+        most: 1.0,
+        get: |parameters| Some(parameters.alert_limits.travel.position),
+    },
+    Bound {
+        leaf: "alert_limits.travel.heading",
+        least: 0.0001,
+        most: 0.25,
+        get: |parameters| Some(parameters.alert_limits.travel.heading),
+    },
+    Bound {
+        leaf: "alert_limits.docking.position",
+        least: 0.001,
+        most: 1.0,
+        get: |parameters| Some(parameters.alert_limits.docking.position),
+    },
+    Bound {
+        leaf: "alert_limits.docking.heading",
+        least: 0.0001,
+        most: 0.25,
+        get: |parameters| Some(parameters.alert_limits.docking.heading),
     },
     Bound {
         leaf: "dynamic_map.first_hits",

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Lasers;
 use crate::geometry::Pose;
-use crate::integrity::InnovationMonitorParameters;
+use crate::integrity::{AlertLimits, InnovationMonitorParameters};
 use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
 use crate::odometry::{Integration, OdometerParameters, OdometryNoise, Vehicle};
@@ -42,6 +42,8 @@ pub struct Parameters {
     pub consistency: InnovationMonitorParameters,
     /// When the vehicle is dead reckoning, and when it is lost.
     pub limits: Limits,
+    /// What the vehicle can live with.
+    pub alert_limits: AlertLimits,
 }
 
 impl Parameters {
@@ -62,6 +64,7 @@ impl Parameters {
             slam: SlamParameters::default(),
             consistency: InnovationMonitorParameters::default(),
             limits: Limits::default(),
+            alert_limits: AlertLimits::default(),
         }
     }
 

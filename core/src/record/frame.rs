@@ -7,11 +7,8 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 /// First bytes of every frame. The first of them is no ASCII, so a text file never begins like a log.
 pub const MAGIC: [u8; 4] = [0xD6, b'A', b'G', b'V'];
 
-/// Version of the kinds and payloads that this program writes.
+/// Version of the kinds and payloads that this program writes, and the only one that it reads.
 pub const FORMAT_VERSION: u8 = 9;
-
-/// Oldest version that this program reads: from it on kinds were only added.
-pub const OLDEST_VERSION: u8 = 8;
 
 /// Length of what stands before the payload, bytes.
 pub const HEADER_LENGTH: usize = 12;
@@ -92,10 +89,7 @@ impl fmt::Display for DamageReason {
             Self::Checksum => write!(formatter, "the record's checksum is wrong"),
             Self::Cut => write!(formatter, "the log is cut off"),
             Self::Version(version) => {
-                write!(
-                    formatter,
-                    "the record has format version {version}, this program reads {OLDEST_VERSION} to {FORMAT_VERSION}"
-                )
+                write!(formatter, "the record has format version {version}, this program reads {FORMAT_VERSION}")
             }
             Self::Kind(kind) => write!(formatter, "records of kind {kind} are unknown"),
             Self::Payload => write!(formatter, "the record's content is not what its kind demands"),
@@ -200,7 +194,7 @@ fn parse(bytes: &[u8]) -> Parsed<'_> {
     if checksum(checked) != u32::from_le_bytes(*stated) {
         return Parsed::Bad(DamageReason::Checksum);
     }
-    if !(OLDEST_VERSION..=FORMAT_VERSION).contains(&version) {
+    if version != FORMAT_VERSION {
         return Parsed::Bad(DamageReason::Version(version));
     }
     let payload = checked.get(HEADER_LENGTH..).unwrap_or_default();

@@ -26,7 +26,7 @@ mod truth;
 
 pub use frame::{
     CHECKSUM_LENGTH, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, MAGIC,
-    MAX_FRAME, MAX_PAYLOAD, OLDEST_VERSION,
+    MAX_FRAME, MAX_PAYLOAD,
 };
 pub use log::{Item, LogReader, Step, encode};
 pub use payload::{EncodeError, Header, LANDMARKS_A_RECORD, Output, RAW_A_RECORD, Raw, RawSource, Record, Scratch};

@@ -29,6 +29,7 @@ mod function {
     pub const EMERGENCY: u16 = 0x080;
     pub const TRANSMIT_PDO: u16 = 0x180;
     pub const RECEIVE_PDO: u16 = 0x200;
+    pub const FIFTH_TRANSMIT_PDO: u16 = 0x680;
     pub const SDO_RESPONSE: u16 = 0x580;
     pub const SDO_REQUEST: u16 = 0x600;
     pub const HEARTBEAT: u16 = 0x700;
@@ -181,6 +182,13 @@ impl Message {
 pub fn transmit_pdo_id(node: NodeId, number: u8) -> Id {
     let offset = u16::from(number.clamp(1, 4) - 1) << 8;
     standard_id(function::TRANSMIT_PDO + offset + u16::from(node.number()))
+}
+
+/// The identifier of a node's fifth transmit PDO. None is predefined for it; this one is free for nodes up to 95 (CiA 301,
+/// tables 38 and 39).
+#[must_use]
+pub fn fifth_transmit_pdo_id(node: NodeId) -> Id {
+    standard_id(function::FIFTH_TRANSMIT_PDO + u16::from(node.number()))
 }
 
 /// The predefined identifier of a node's receive PDO, 1 to 4; higher numbers count as 4, zero as 1.

@@ -14,16 +14,18 @@ pub const HEARTBEAT_TIME: u16 = 100;
 
 /// PDOs that the controller receives and transmits.
 const RECEIVE_PDOS: u16 = 3;
-const TRANSMIT_PDOS: u16 = 4;
+const TRANSMIT_PDOS: u16 = 5;
 /// Event timer of the transmit PDOs, ms.
 const EVENT_TIMER: u16 = 10;
 /// Transmission type of all PDOs: when the device decides (CiA 301, table 72).
 const BY_EVENT: u8 = 254;
-/// The first object that a PDO holds; 64 bits each, as they follow each other.
-const FIRST_CONTENT: u16 = 0x2001;
+/// What the transmit PDOs hold, an object of 64 bits each.
+const TRANSMITTED: [u16; TRANSMIT_PDOS as usize] = [0x2001, 0x2002, 0x2003, 0x2004, 0x2008];
+/// What the receive PDOs hold.
+const RECEIVED: [u16; RECEIVE_PDOS as usize] = [0x2005, 0x2006, 0x2007];
 
 /// Revision of what is said and heard: it goes up where a signal changes its meaning.
-const REVISION: u32 = 2;
+const REVISION: u32 = 3;
 
 /// The controller as a node.
 #[derive(Clone, Copy, Debug)]
@@ -103,7 +105,7 @@ impl ControllerNode {
         // An object of 64 bits: the whole content of a PDO.
         let mapping = |sub: u8, content: u16| match sub {
             0 => Ok(Value::from(1u8)),
-            1 => Ok(Value::from(u32::from(FIRST_CONTENT + content) << 16 | 64)),
+            1 => Ok(Value::from(u32::from(content) << 16 | 64)),
             _ => Err(missing),
         };
         let id = |base: u32, number: u16| Value::from(base + 0x100 * u32::from(number) + u32::from(self.node.number()));
@@ -118,6 +120,7 @@ impl ControllerNode {
         if let Some(number) = transmit(0x1800) {
             return match sub {
                 0 => Ok(Value::from(5u8)),
+                1 if number == 4 => Ok(id(0x680, 0)),
                 1 => Ok(id(0x180, number)),
                 2 => Ok(Value::from(BY_EVENT)),
                 3 => Ok(Value::from(0u16)),
@@ -125,11 +128,12 @@ impl ControllerNode {
                 _ => Err(missing),
             };
         }
+        let content = |list: &[u16], number: u16| list.get(usize::from(number)).copied().ok_or(missing);
         if let Some(number) = transmit(0x1A00) {
-            return mapping(sub, number);
+            return mapping(sub, content(&TRANSMITTED, number)?);
         }
         if let Some(number) = receive(0x1600) {
-            return mapping(sub, TRANSMIT_PDOS + number);
+            return mapping(sub, content(&RECEIVED, number)?);
         }
         match (index, sub) {
             (0x1000, 0) => Ok(Value::from(0u32)),
@@ -139,7 +143,7 @@ impl ControllerNode {
             (0x1018, 3) => Ok(Value::from(REVISION)),
             (0x1018, 1 | 2 | 4) => Ok(Value::from(0u32)),
             // Longer than an expedited transfer; they are heard and sent as PDOs.
-            (0x2001..=0x2007, 0) => Err(AbortCode::UnsupportedAccess),
+            (0x2001..=0x2008, 0) => Err(AbortCode::UnsupportedAccess),
             _ => Err(missing),
         }
     }

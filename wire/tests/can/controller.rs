@@ -1,6 +1,7 @@
 //! What the controller says and hears.
 
 use agv_core::geometry::Pose;
+use agv_core::integrity::{Alarm, AlertLimit, AlertLimits, ProtectionLevel};
 use agv_core::localizer::{Mode, PoseFix, PoseOutput, Reason};
 use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
@@ -50,7 +51,9 @@ fn health() -> Health {
 fn literal_frames() {
     // By hand: x 123456 and y -70001 in 30 bits each, counter 5.
     let payload = 123_456u64 | ((-70_001i64 as u64) & 0x3FFF_FFFF) << 30 | 5 << 60;
-    let [position, heading, covariance, status] = contents(&pose(), &health()).map(|content| content.encode(node(), 5));
+    let limits = AlertLimits::default();
+    let [position, heading, covariance, status, integrity] =
+        contents(&pose(), &health(), &limits).map(|content| content.encode(node(), 5));
     assert_eq!(position, Frame::of(standard_id(0x190), payload.to_le_bytes()));
     // Heading -1234567 (0xED2979), time 70123 modulo 65536 (0x11EB), distance 124 cm rounded up (0x7C).
     assert_eq!(heading, frame("290#7929EDEB117C0050"));
@@ -61,13 +64,40 @@ fn literal_frames() {
     // up), too few reflectors (3), six scans that were too large (6 modulo 4).
     let payload = 3 | 87 << 10 | 43 << 17 | 3 << 31 | 1 << 35 | 0xA7 << 37 | 7 << 45 | 3 << 53 | 2 << 58 | 5u64 << 60;
     assert_eq!(status, Frame::of(standard_id(0x490), payload.to_le_bytes()));
+    assert_eq!(integrity.id(), standard_id(0x690));
     // Sure to 5 mm and 0.03 deg, and corrected by 2 cm: one bit each.
     let sure = PoseOutput { covariance: [2e-5, 0.0, 1e-5, 0.0, 0.0, 2e-7], correction: 0.02, ..pose() };
-    let [.., status] = contents(&sure, &health()).map(|content| content.encode(node(), 5));
+    let [.., status, _] = contents(&sure, &health(), &limits).map(|content| content.encode(node(), 5));
     assert_eq!(status, Frame::of(standard_id(0x490), (payload | 3 << 56).to_le_bytes()));
     // Sure along the axes only.
     let slanted = PoseOutput { covariance: [2e-5, 1.9e-5, 2e-5, 0.0, 0.0, 2e-7], ..sure };
     assert!(sure.is_good() && !slanted.is_good() && !PoseOutput { mode: Mode::Lost, ..sure }.is_good());
+}
+
+#[test]
+fn a_protection_level_is_never_told_smaller_than_it_is() {
+    let limit = AlertLimit { position: 0.15, heading: 0.035 };
+    let told = |position, heading| {
+        let content = Content::Integrity { level: ProtectionLevel { position, heading }, limit, alarm: Alarm::Travel };
+        let frame = content.encode(node(), 5);
+        let (Content::Integrity { level, limit, alarm }, 5) = Content::decode(&frame, node()).unwrap() else {
+            panic!()
+        };
+        assert!(alarm == Alarm::Travel && (limit.position - 0.15).abs() < 1e-9 && (limit.heading - 0.035).abs() < 1e-9);
+        (frame, level)
+    };
+    // 38 mm rounded up, 26 steps of 0.25 mrad rounded up, limits of 150 mm and 140 steps, alarm 2.
+    let payload = 38 | 26 << 14 | 150 << 27 | 140 << 37 | 2 << 47 | 5u64 << 60;
+    assert_eq!(told(0.0371, 0.0063).0, Frame::of(standard_id(0x690), payload.to_le_bytes()));
+    for level in [0.0, 1e-9, 0.001, 0.0409, 0.15, 2.0, 16.38] {
+        let (_, found) = told(level, level * 0.1);
+        assert!((-1e-8..=1.001e-3).contains(&(found.position - level)), "{level}: {found:?}");
+        assert!((-1e-8..=0.251e-3).contains(&(found.heading - level * 0.1)), "{level}: {found:?}");
+    }
+    for level in [16.39, 1e9, f64::INFINITY, f64::NAN, -1.0] {
+        let (_, found) = told(level, level);
+        assert!(found.position.is_infinite() && found.heading.is_infinite(), "{level}: {found:?}");
+    }
 }
 
 #[test]
@@ -109,7 +139,7 @@ proptest! {
 
     #[test]
     fn what_was_decoded_is_encoded_again(frame in any_classic()) {
-        for id in [0x190, 0x290, 0x390, 0x490, 0x210, 0x310, 0x410] {
+        for id in [0x190, 0x290, 0x390, 0x490, 0x690, 0x210, 0x310, 0x410] {
             let frame = Frame::new(standard_id(id), frame.data()).unwrap();
             match Content::decode(&frame, node()) {
                 Ok((content, counter)) => {
@@ -128,7 +158,7 @@ proptest! {
 
 #[test]
 fn poses_come_every_10_ms_and_are_put_together_again() {
-    let mut publisher = PosePublisher::new(node(), Time::default());
+    let mut publisher = PosePublisher::new(node(), AlertLimits::default(), Time::default());
     let mut receiver = PoseReceiver::new(node());
     let mut counters = Vec::new();
     for millisecond in 0..1000 {
@@ -137,7 +167,7 @@ fn poses_come_every_10_ms_and_are_put_together_again() {
         for (index, frame) in frames.iter().enumerate() {
             // The third pose loses a frame.
             let received = if millisecond == 20 && index == 2 { None } else { receiver.handle(frame) };
-            assert_eq!(received.is_some(), index == 3 && millisecond != 20);
+            assert_eq!(received.is_some(), index == 4 && millisecond != 20);
             if let Some(received) = received {
                 counters.push(received.counter);
                 assert_eq!((received.mode, received.reason, received.health), (Mode::Mixed, Reason::None, health()));

@@ -75,7 +75,7 @@ fn every_object_of_the_description_is_read_as_described() {
     for (object, reason) in [
         (Object::new(0x1017, 0), AbortCode::ReadOnly),
         (Object::new(0x1018, 5), AbortCode::NoSuchSubindex),
-        (Object::new(0x1804, 0), AbortCode::NoSuchObject),
+        (Object::new(0x1805, 0), AbortCode::NoSuchObject),
     ] {
         let response = ask(&mut controller, Request::Write(object, Value::from(7u16)));
         assert_eq!(response, Response::Abort(object, reason));
@@ -86,7 +86,7 @@ fn every_object_of_the_description_is_read_as_described() {
 fn who_reads_the_revision_knows_which_content_comes() {
     let mut controller = ControllerNode::new(node(), at(0));
     let object = Object::new(0x1018, 3);
-    assert_eq!(ask(&mut controller, Request::Read(object)), Response::Read(object, Value::from(2u32)));
+    assert_eq!(ask(&mut controller, Request::Read(object)), Response::Read(object, Value::from(3u32)));
 }
 
 #[test]

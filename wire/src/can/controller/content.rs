@@ -1,12 +1,13 @@
 //! The content of each frame.
 
+use agv_core::integrity::{Alarm, AlertLimit, ProtectionLevel};
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Mode, Reason, Relocalization};
 
 use super::error::ControllerError;
 use super::field::*;
 use super::numbers::*;
-use crate::can::canopen::{NodeId, receive_pdo_id, transmit_pdo_id};
+use crate::can::canopen::{NodeId, fifth_transmit_pdo_id, receive_pdo_id, transmit_pdo_id};
 use crate::can::frame::{Frame, Id};
 
 /// State of what the pose rests on.
@@ -71,6 +72,15 @@ pub enum Content {
         /// How often there was not room for all that was seen, modulo 4: [`PoseOutput::overflows`].
         overflows: u8,
     },
+    /// How wrong the pose may be.
+    Integrity {
+        /// What the errors do not exceed; infinite if it is not known or too large to be told.
+        level: ProtectionLevel,
+        /// What travelling can live with.
+        limit: AlertLimit,
+        /// What the pose must not be used for.
+        alarm: Alarm,
+    },
     /// Position where the vehicle shall believe to be.
     InitialPosition {
         /// Along the first axis of W, m.
@@ -101,6 +111,7 @@ impl Content {
             Self::Heading { .. } => transmit_pdo_id(node, 2),
             Self::Covariance { .. } => transmit_pdo_id(node, 3),
             Self::Status { .. } => transmit_pdo_id(node, 4),
+            Self::Integrity { .. } => fifth_transmit_pdo_id(node),
             Self::InitialPosition { .. } => receive_pdo_id(node, 1),
             Self::InitialHeading { .. } => receive_pdo_id(node, 2),
             Self::Command { .. } => receive_pdo_id(node, 3),
@@ -157,6 +168,13 @@ impl Content {
                 let payload = OVERFLOWS.put_raw(payload, u64::from(overflows));
                 CORRECTED.put_raw(payload, u64::from(has_jumped))
             }
+            Self::Integrity { level, limit, alarm } => {
+                let payload = PROTECTION_POSITION.put_bound(payload, level.position);
+                let payload = PROTECTION_HEADING.put_bound(payload, level.heading);
+                let payload = LIMIT_POSITION.put(payload, limit.position);
+                let payload = LIMIT_HEADING.put(payload, limit.heading);
+                ALARM.put_raw(payload, number_of(&ALARMS, &alarm, ALARM))
+            }
             Self::InitialHeading { heading, position_deviation, heading_deviation } => {
                 let payload = HEADING.put(payload, heading);
                 let payload = INITIAL_POSITION_DEVIATION.put_deviation(payload, position_deviation);
@@ -172,7 +190,8 @@ impl Content {
     /// # Errors
     /// See [`ControllerError`].
     pub fn decode(frame: &Frame, node: NodeId) -> Result<(Self, u8), ControllerError> {
-        let transmitted = (1..=4).find(|number| transmit_pdo_id(node, *number) == frame.id());
+        let fifth = (fifth_transmit_pdo_id(node) == frame.id()).then_some(5);
+        let transmitted = (1..=4).find(|number| transmit_pdo_id(node, *number) == frame.id()).or(fifth);
         let received = (1..=3).find(|number| receive_pdo_id(node, *number) == frame.id());
         if (transmitted, received) == (None, None) || frame.is_remote() {
             return Err(ControllerError::Foreign);
@@ -190,6 +209,14 @@ impl Content {
                 deviations: [DEVIATION_X, DEVIATION_Y, DEVIATION_HEADING].map(|field| field.take(payload)),
                 correlations: [CORRELATION_XY, CORRELATION_X_HEADING, CORRELATION_Y_HEADING]
                     .map(|field| field.take(payload)),
+            },
+            (Some(5), _) => Self::Integrity {
+                level: ProtectionLevel {
+                    position: PROTECTION_POSITION.take_bound(payload),
+                    heading: PROTECTION_HEADING.take_bound(payload),
+                },
+                limit: AlertLimit { position: LIMIT_POSITION.take(payload), heading: LIMIT_HEADING.take(payload) },
+                alarm: value_of(&ALARMS, ALARM.take_raw(payload))?,
             },
             (Some(_), _) => Self::Status {
                 mode: value_of(&MODES, MODE.take_raw(payload))?,

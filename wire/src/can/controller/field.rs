@@ -55,6 +55,19 @@ impl Field {
         self.put_raw(payload, steps as u64)
     }
 
+    /// A bound: never smaller than it is, and not known if it is too large.
+    pub(super) fn put_bound(self, payload: u64, value: f64) -> u64 {
+        let steps = libm::ceil(value / self.scale - 1e-6);
+        let is_known = (0.0..=self.largest()).contains(&steps);
+        self.put_raw(payload, if is_known { steps as u64 } else { self.unknown() })
+    }
+
+    /// The bound, or infinity if it is not known.
+    pub(super) fn take_bound(self, payload: u64) -> f64 {
+        let value = self.take(payload);
+        if value.is_nan() { f64::INFINITY } else { value }
+    }
+
     /// The number, or NaN if it is not known.
     pub(super) fn take(self, payload: u64) -> f64 {
         let raw = self.take_raw(payload);
@@ -92,6 +105,11 @@ pub(super) const START_SEARCH: Field = Field::unsigned(53, 3, 1.0);
 pub(super) const POSE_IS_GOOD: Field = Field::unsigned(56, 1, 1.0);
 pub(super) const CORRECTED: Field = Field::unsigned(57, 1, 1.0);
 pub(super) const OVERFLOWS: Field = Field::unsigned(58, 2, 1.0);
+pub(super) const PROTECTION_POSITION: Field = Field::unsigned(0, 14, 0.001);
+pub(super) const PROTECTION_HEADING: Field = Field::unsigned(14, 13, 0.00025);
+pub(super) const LIMIT_POSITION: Field = Field::unsigned(27, 10, 0.001);
+pub(super) const LIMIT_HEADING: Field = Field::unsigned(37, 10, 0.00025);
+pub(super) const ALARM: Field = Field::unsigned(47, 3, 1.0);
 pub(super) const INITIAL_POSITION_DEVIATION: Field = Field::unsigned(24, 16, 1e-3);
 pub(super) const INITIAL_HEADING_DEVIATION: Field = Field::unsigned(40, 16, 1e-4);
 pub(super) const STANDSTILL: Field = Field::unsigned(20, 1, 1.0);

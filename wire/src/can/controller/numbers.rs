@@ -1,5 +1,6 @@
 //! Numbers that stand for modes, reasons, faults and states.
 
+use agv_core::integrity::Alarm;
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Mode, Reason, Relocalization};
 
@@ -46,6 +47,9 @@ pub(super) const FAULTS: [(u64, EncoderFault); 8] = [
     (7, EncoderFault::HeartbeatLost),
     (8, EncoderFault::WrongRange),
 ];
+
+pub(super) const ALARMS: [(u64, Alarm); 4] =
+    [(0, Alarm::None), (1, Alarm::Docking), (2, Alarm::Travel), (3, Alarm::NoPose)];
 
 pub(super) const LASERS: [(u64, LaserHealth); 4] =
     [(0, LaserHealth::Unknown), (1, LaserHealth::Sound), (2, LaserHealth::Silent), (3, LaserHealth::Faulty)];

@@ -1,5 +1,6 @@
 //! The pose, as it is said again and again.
 
+use agv_core::integrity::{AlertLimits, ProtectionLevel};
 use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
 
@@ -17,15 +18,16 @@ const LAST_COUNT: u8 = 15;
 #[derive(Clone, Copy, Debug)]
 pub struct PosePublisher {
     node: NodeId,
+    limits: AlertLimits,
     counter: u8,
     next: Time,
 }
 
 impl PosePublisher {
-    /// A publisher at `node` that begins at `start`.
+    /// A publisher at `node` that begins at `start`, of a vehicle that can live with `limits`.
     #[must_use]
-    pub const fn new(node: NodeId, start: Time) -> Self {
-        Self { node, counter: 0, next: start }
+    pub const fn new(node: NodeId, limits: AlertLimits, start: Time) -> Self {
+        Self { node, limits, counter: 0, next: start }
     }
 
     /// When the next pose is due.
@@ -34,23 +36,24 @@ impl PosePublisher {
         self.next
     }
 
-    /// The frames of a pose, if one is due: position, heading, covariance, status. Poses that were missed are left out.
-    pub fn poll(&mut self, now: Time, pose: &PoseOutput, health: &Health) -> Option<[Frame; 4]> {
+    /// The frames of a pose, if one is due: position, heading, covariance, status, integrity. Poses that were missed are left out.
+    pub fn poll(&mut self, now: Time, pose: &PoseOutput, health: &Health) -> Option<[Frame; 5]> {
         if now < self.next {
             return None;
         }
         let following = self.next.offset(PERIOD);
         self.next = if following <= now { now.offset(PERIOD) } else { following };
-        let contents = contents(pose, health);
+        let contents = contents(pose, health, &self.limits);
         let frames = contents.map(|content| content.encode(self.node, self.counter));
         self.counter = if self.counter >= LAST_COUNT { 0 } else { self.counter + 1 };
         Some(frames)
     }
 }
 
-/// What is said of a pose: position, heading, covariance, status.
+/// What is said of a pose: position, heading, covariance, status, integrity.
 #[must_use]
-pub fn contents(pose: &PoseOutput, health: &Health) -> [Content; 4] {
+pub fn contents(pose: &PoseOutput, health: &Health, limits: &AlertLimits) -> [Content; 5] {
+    let level = ProtectionLevel::of(pose);
     let [xx, xy, yy, x_heading, y_heading, heading] = pose.covariance;
     let deviations = [xx, yy, heading].map(libm::sqrt);
     let [x, y, turn] = deviations;
@@ -81,5 +84,6 @@ pub fn contents(pose: &PoseOutput, health: &Health) -> [Content; 4] {
             last_reset: f64::from(pose.last_reset),
             overflows: pose.overflows,
         },
+        Content::Integrity { level, limit: limits.travel, alarm: limits.alarm(pose.mode, &level) },
     ]
 }

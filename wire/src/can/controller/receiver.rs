@@ -1,6 +1,7 @@
 //! A pose that is put together from its frames.
 
 use agv_core::geometry::Pose;
+use agv_core::integrity::{Alarm, AlertLimit, ProtectionLevel};
 use agv_core::state::{Mode, Reason};
 
 use super::content::{Content, Health};
@@ -38,28 +39,34 @@ pub struct PublishedPose {
     pub last_reset: f64,
     /// How often there was not room for all that was seen, modulo 4.
     pub overflows: u8,
+    /// What the errors do not exceed; infinite if it is not known or too large to be told.
+    pub level: ProtectionLevel,
+    /// What travelling can live with.
+    pub limit: AlertLimit,
+    /// What the pose must not be used for.
+    pub alarm: Alarm,
 }
 
-/// Puts the four frames of a pose together.
+/// Puts the five frames of a pose together.
 #[derive(Clone, Copy, Debug)]
 pub struct PoseReceiver {
     node: NodeId,
     counter: u8,
-    contents: [Option<Content>; 4],
+    contents: [Option<Content>; 5],
 }
 
 impl PoseReceiver {
     /// A receiver for the controller at `node` that has heard nothing.
     #[must_use]
     pub const fn new(node: NodeId) -> Self {
-        Self { node, counter: 0, contents: [None; 4] }
+        Self { node, counter: 0, contents: [None; 5] }
     }
 
     /// Takes a frame; gives the pose if the frame completes it. Of poses that miss a frame nothing is given.
     pub fn handle(&mut self, frame: &Frame) -> Option<PublishedPose> {
         let (content, counter) = Content::decode(frame, self.node).ok()?;
         if counter != self.counter {
-            self.contents = [None; 4];
+            self.contents = [None; 5];
             self.counter = counter;
         }
         let slot = match content {
@@ -67,6 +74,7 @@ impl PoseReceiver {
             Content::Heading { .. } => 1,
             Content::Covariance { .. } => 2,
             Content::Status { .. } => 3,
+            Content::Integrity { .. } => 4,
             _ => return None,
         };
         *self.contents.get_mut(slot)? = Some(content);
@@ -75,11 +83,12 @@ impl PoseReceiver {
             Some(Content::Heading { heading, time, dead_reckoning_distance }),
             Some(Content::Covariance { deviations, correlations }),
             Some(Content::Status { mode, reason, health, is_good, has_jumped, resets, last_reset, overflows, .. }),
+            Some(Content::Integrity { level, limit, alarm }),
         ] = self.contents
         else {
             return None;
         };
-        self.contents = [None; 4];
+        self.contents = [None; 5];
         let pose = Pose { x, y, theta: heading };
         Some(PublishedPose {
             counter,
@@ -96,6 +105,9 @@ impl PoseReceiver {
             resets,
             last_reset,
             overflows,
+            level,
+            limit,
+            alarm,
         })
     }
 }
