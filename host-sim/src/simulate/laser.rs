@@ -25,16 +25,17 @@ pub struct LaserTrack {
 }
 
 impl LaserTrack {
-    /// The track of a laser that is mounted at `mounting` (S in R).
+    /// The track of a laser whose mounting (S in R) depends on the time since the first state, s.
     #[must_use]
-    pub fn new(motion: &Motion, mounting: &Pose) -> Self {
+    pub fn new(motion: &Motion, mounting: impl Fn(f64) -> Pose) -> Self {
         let mut heading = 0.0;
         let mut previous = 0.0;
         let (positions, headings) = motion
             .states
             .iter()
-            .map(|state| {
-                let pose = state.pose.compose(mounting);
+            .enumerate()
+            .map(|(index, state)| {
+                let pose = state.pose.compose(&mounting(index as f64 * motion.interval));
                 heading += agv_core::geometry::difference(pose.theta, previous);
                 previous = pose.theta;
                 (pose.position(), heading)

@@ -84,7 +84,12 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
         arrivals.add(START, RecordedEvent::SetPose(start_fix(scenario, &path.start)));
     }
     report_motion(&mut arrivals, scenario, &motion, &true_tricycle, &mut odometry_random);
-    report_laser(&mut arrivals, scenario, &world, &LaserTrack::new(&motion, &true_laser));
+    report_laser(
+        &mut arrivals,
+        scenario,
+        &world,
+        &LaserTrack::new(&motion, |time| scenario.laser.moved(&true_laser, time)),
+    );
 
     let truth = motion
         .states

@@ -10,7 +10,7 @@ mod vehicle;
 mod way;
 mod world;
 
-pub use sensors::{DirtySector, LaserOptions, ReflectorOptions};
+pub use sensors::{DirtySector, Knock, LaserOptions, ReflectorOptions};
 pub use start::{PersonOptions, StartOptions};
 pub use vehicle::{BelievedVehicle, DriveOptions, MotionReport, OdometryOptions, VehicleErrors, VehicleOptions};
 pub use way::{PathKind, PathOptions, PoseOptions};

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::PoseOptions;
+use agv_core::geometry::Pose;
 
 /// The laser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,6 +39,50 @@ pub struct LaserOptions {
     pub lost_share: f64,
     /// Where the window is dirty.
     pub dirty_sectors: Vec<DirtySector>,
+    /// How the laser moves on its mounting while the vehicle drives.
+    pub knocks: Vec<Knock>,
+}
+
+impl LaserOptions {
+    /// The mounting (S in R) `time` s after the drive's first event, of a laser that was mounted at `mounting`.
+    #[must_use]
+    pub fn moved(&self, mounting: &Pose, time: f64) -> Pose {
+        self.knocks.iter().fold(*mounting, |mounting, knock| mounting.compose(&knock.at(time)))
+    }
+}
+
+/// A laser that moves on its mounting.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Knock {
+    /// When it begins, s after the drive's first event.
+    pub from: f64,
+    /// How long it takes, s; 0 for a blow.
+    #[serde(default)]
+    pub lasts: f64,
+    /// Forward, in S, m.
+    #[serde(default)]
+    pub x: f64,
+    /// To the left, in S, m.
+    #[serde(default)]
+    pub y: f64,
+    /// Counter-clockwise.
+    #[serde(default)]
+    pub heading_deg: f64,
+}
+
+impl Knock {
+    /// How far the laser has moved by then, in S.
+    fn at(&self, time: f64) -> Pose {
+        let share = if time < self.from {
+            0.0
+        } else if time >= self.from + self.lasts {
+            1.0
+        } else {
+            (time - self.from) / self.lasts
+        };
+        Pose::new(share * self.x, share * self.y, share * self.heading_deg.to_radians())
+    }
 }
 
 impl Default for LaserOptions {
@@ -58,6 +103,7 @@ impl Default for LaserOptions {
             divergence_deg: 0.25,
             lost_share: 0.0,
             dirty_sectors: Vec::new(),
+            knocks: Vec::new(),
         }
     }
 }
