@@ -11,6 +11,7 @@ mod lidar3d_places;
 mod lidar3d_sharpness;
 mod places;
 mod slam;
+mod soak;
 mod trust;
 mod warehouse;
 mod windows;
@@ -51,6 +52,7 @@ enum Experiment {
     Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
     Slam(slam::Slam),
+    Soak(soak::Soak),
     Trust(trust::Trust),
     Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
@@ -71,6 +73,7 @@ impl Evaluate {
             Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),
+            Experiment::Soak(experiment) => experiment.run(),
             Experiment::Trust(experiment) => experiment.run(),
             Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),

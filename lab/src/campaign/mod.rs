@@ -20,7 +20,7 @@ use agv_host_sim::simulate::{SimulateError, simulate};
 use fault::{Fault, window};
 use rayon::prelude::*;
 use results::Row;
-use rig::RigError;
+use rig::{RigError, RigOptions};
 use verdict::{AlertLimits, Judge, Verdict};
 
 /// A campaign as a file states it.
@@ -211,8 +211,9 @@ impl Campaign {
             fault.mislead(&mut recording, &mut random);
         }
         let mut judge = Judge::new(self.limits, window(&faults).0);
-        rig::drive(&recording, &faults, self.seconds, run.seed, |now, time, output, truth| {
-            judge.hear(now, time, output, truth);
+        let options = RigOptions { seconds: self.seconds, seed: run.seed, is_told: true };
+        rig::drive(&recording, &faults, &options, |heard| {
+            judge.hear(heard.now, heard.time, heard.output, heard.truth);
         })?;
         Ok(judge.verdict(&faults))
     }

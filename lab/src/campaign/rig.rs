@@ -9,6 +9,7 @@ use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
+use agv_wire::can::controller::{PoseReceiver, PublishedPose};
 use agv_wire::can::frame::Frame;
 use agv_wire::nav350::SensorFrame;
 
@@ -45,19 +46,43 @@ const BUS_LATENCY: f64 = 0.000_3;
 /// Largest value of the laser's clock, ms.
 const CLOCK_RANGE: f64 = 4_294_967_296.0;
 
-/// Drives a recorded drive with faults for `seconds`. `recording` has what the sensors see, faults of measurements
-/// included. `hear` is told a hundred times a second what time it is, how long the vehicle has driven, s, what the
-/// controller publishes, and where the vehicle is at any time.
+/// How a drive is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigOptions {
+    /// How long it lasts, s.
+    pub seconds: f64,
+    /// Seed of the faults of the lines.
+    pub seed: u64,
+    /// Whether the controller is told where it starts.
+    pub is_told: bool,
+}
+
+/// What is heard a hundred times a second.
+#[derive(Clone, Copy)]
+pub struct Heard<'a> {
+    /// Now.
+    pub now: Time,
+    /// How long the vehicle has driven, s.
+    pub time: f64,
+    /// What the controller would publish.
+    pub output: Option<&'a PoseOutput>,
+    /// What its bus has said last, and the time that it states.
+    pub published: Option<(&'a PublishedPose, Time)>,
+    /// Where the vehicle is at any time.
+    pub truth: &'a dyn Fn(Time) -> Option<Pose>,
+}
+
+/// Drives a recorded drive with faults. `recording` has what the sensors see, faults of measurements included.
 ///
 /// # Errors
 /// See [`RigError`].
 pub fn drive(
     recording: &Recording,
     faults: &[&Fault],
-    seconds: f64,
-    seed: u64,
-    mut hear: impl FnMut(Time, f64, Option<&PoseOutput>, &dyn Fn(Time) -> Option<Pose>),
+    options: &RigOptions,
+    mut hear: impl FnMut(&Heard),
 ) -> Result<(), RigError> {
+    let &RigOptions { seconds, seed, is_told } = options;
     let settings = Settings::of(recording.parameters);
     let node = |number| NodeId::new(number).ok_or(RigError::Pair(PairError::NoEncoders));
     let mut pair =
@@ -74,6 +99,8 @@ pub fn drive(
         Ok::<_, RigError>(Box::new(Controller::new(&settings, localizer, now)))
     };
     let mut controller = Some(new_controller(Time::default())?);
+    let mut receiver = PoseReceiver::new(node(settings.nodes.controller)?);
+    let mut published: Option<(PublishedPose, Time)> = None;
     let begin = Time::from_seconds(BEGIN);
     let steps = ((BEGIN + seconds) * 1e6) as u64 / STEP;
     for step in 1..=steps {
@@ -83,7 +110,9 @@ pub fn drive(
         if now == begin {
             pair.begin(now);
             sensor.begin(sensor_time);
-            if let (Some(controller), Some(RecordedEvent::SetPose(fix))) = (&mut controller, recording.events.first()) {
+            if let (true, Some(controller), Some(RecordedEvent::SetPose(fix))) =
+                (is_told, &mut controller, recording.events.first())
+            {
                 let mut fix = *fix;
                 fix.time = now;
                 controller.tell(fix, |_| ());
@@ -129,9 +158,13 @@ pub fn drive(
             }
             // The controller and its bus.
             while let Some(frame) = from_bus.receive(now) {
+                // What answers a frame is no pose.
                 controller.hear_bus(&frame, now, |_| (), |_| ());
             }
             let answer = |frame: &Frame| {
+                if let Some(pose) = receiver.handle(frame) {
+                    published = Some((pose, stated(&pose, now)));
+                }
                 for answer in pair.handle(frame) {
                     from_bus.send_frame(now, time, answer, faults);
                 }
@@ -155,10 +188,18 @@ pub fn drive(
         if time >= 0.0 && step % STEPS_A_POSE == 0 {
             let output = controller.as_ref().and_then(|controller| controller.output());
             let truth = |at: Time| truth_at(&recording.truth, START.offset(at.since(begin).max(0.0)));
-            hear(now, time, output.as_ref(), &truth);
+            let published = published.as_ref().map(|(pose, stated)| (pose, *stated));
+            hear(&Heard { now, time, output: output.as_ref(), published, truth: &truth });
         }
     }
     Ok(())
+}
+
+/// The time that a pose states, of which its frames carry the low 16 bits of the milliseconds.
+fn stated(pose: &PublishedPose, now: Time) -> Time {
+    let milliseconds = now.micros() / 1000;
+    let age = (milliseconds as u16).wrapping_sub(pose.time) as i16;
+    Time::from_micros(1000 * milliseconds.saturating_add_signed(-i64::from(age)))
 }
 
 /// What the controller wants of its laser, for later.

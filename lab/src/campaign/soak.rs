@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::CampaignError;
 use super::fault::{Fault, FaultKind};
-use super::rig;
+use super::rig::{self, Heard, RigOptions};
 use super::verdict::{AlertLimits, Judge};
 use agv_host_sim::accuracy::Spread;
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
@@ -59,7 +59,8 @@ pub fn soak(scenario: &Scenario, hours: u64, mut done: impl FnMut()) -> Result<V
     let limits = AlertLimits::default();
     let mut all = Vec::new();
     let (mut judge, mut errors, mut begun) = (Judge::new(limits, 0.0), Vec::new(), Instant::now());
-    rig::drive(&recording, &[&wrap], seconds, scenario.seed, |now, time, output, truth| {
+    let options = RigOptions { seconds, seed: scenario.seed, is_told: true };
+    rig::drive(&recording, &[&wrap], &options, |&Heard { now, time, output, truth, .. }| {
         judge.hear(now, time, output, truth);
         if let Some((output, truth)) = output.and_then(|output| Some((output, truth(output.time)?))) {
             errors.push(1e3 * (output.pose.position() - truth.position()).norm());

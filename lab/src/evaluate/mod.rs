@@ -1,5 +1,6 @@
 //! Experiments: how good it is, one file an experiment.
 
+pub mod arbitrary_events;
 pub mod calibration;
 pub mod carpark;
 pub mod carpark_starts;
@@ -14,7 +15,6 @@ pub mod lidar3d_sharpness;
 pub mod places;
 pub mod repeatability;
 pub mod slam;
-pub mod trust;
 pub mod warehouse;
 pub mod warehouse_disturbance;
 pub mod warehouse_page;

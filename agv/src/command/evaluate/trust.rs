@@ -2,96 +2,122 @@
 
 use std::path::PathBuf;
 
-use agv_lab::campaign::soak::{Hour, soak};
-use agv_lab::campaign::table::table;
-use agv_lab::campaign::{Campaign, Shard};
-use agv_lab::evaluate::trust::{figures, fuzz, fuzz_seeds};
-use anyhow::Context as _;
+use agv_lab::campaign::Shard;
+use agv_lab::trust::figures::{Figures, NOTHING, figures};
+use agv_lab::trust::kinds::{self, Kind};
+use agv_lab::trust::sweep::{self, run};
+use anyhow::{Context as _, ensure};
 
 use crate::command::progress;
 
-/// What happens when things go wrong: faults alone and in pairs, a drive of many hours, and arbitrary events.
+/// Whether the vehicle may be trusted: kinds of faults at every size, in halls that are drawn, judged at the bus.
 ///
-/// The chapter "Trust" of the book explains each figure. All of it takes some minutes.
+/// Each kind is driven at each of its sizes; the worst size of each kind is driven again on other seeds, and that is what is
+/// told. The chapter "Trust" of the book has the definitions.
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Trust {
-    /// The campaign.
-    #[arg(long, default_value = "host-sim/scenarios/faults.toml")]
-    campaign: PathBuf,
-    /// Seeds of each fault alone, instead of what the campaign says.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
-    runs: Option<u64>,
-    /// First seed. Thresholds were chosen on the seeds 1 to 25.
+    /// The kinds of faults.
+    #[arg(long, default_value = "host-sim/scenarios/trust.toml")]
+    kinds: PathBuf,
+    /// Only kinds with this in their names, and none beside them.
     #[arg(long)]
-    first_seed: Option<u64>,
-    /// Leave out the pairs of faults.
-    #[arg(long)]
-    without_pairs: bool,
-    /// Hours of the long drive.
-    #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=48))]
-    soak_hours: u64,
-    /// Arbitrary events that the localiser is told.
-    #[arg(long, default_value_t = 2_000_000)]
-    fuzz_events: u64,
-    /// One JSON object instead of the tables.
+    only: Option<String>,
+    /// Runs of each size of each kind.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
+    sweep_runs: u64,
+    /// Runs of the worst size of each kind.
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..))]
+    runs: u64,
+    /// Runs without a fault.
+    #[arg(long, default_value_t = 4800, value_parser = clap::value_parser!(u64).range(1..))]
+    sound_runs: u64,
+    /// First seed of the sweep; those of the worst sizes are 50000 later. Seeds below 1000 are for development.
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// One JSON object instead of the table.
     #[arg(long)]
     json: bool,
 }
 
 const HELP: &str = "\
 Examples:
-  agv evaluate trust
-  agv evaluate trust --runs 2 --without-pairs --soak-hours 1 --fuzz-events 100000 --json";
+  agv evaluate trust --sweep-runs 1 --runs 2 --sound-runs 10
+  agv evaluate trust --only 'laser shifted' --runs 20
+  agv evaluate trust --first-seed 100000 --json
+
+Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
+nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
+continuity_per_100km, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
+[95 %, worst], class_c, seeds [first, last], per_fault [kind, class, worst_size, unit, runs, failures, bound, worst_seed,
+worst_hmi_s, worst_hmi_m, error_over_pl_max, share_claimed].";
 
 impl Trust {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let (mut plan, scenario) =
-            Campaign::read(&self.campaign).with_context(|| self.campaign.display().to_string())?;
-        plan.runs = self.runs.unwrap_or(plan.runs);
-        plan.first_seed = self.first_seed.unwrap_or(plan.first_seed);
-        let alone = plan.alone();
-        let pairs = if self.without_pairs { Vec::new() } else { plan.pairs() };
-        let bar = progress::bar("runs", (alone.len() + pairs.len()) as u64);
-        let mut rows = plan.rows(&scenario, &alone, Shard::ALL, || bar.inc(1))?;
-        rows.extend(plan.rows(&scenario, &pairs, Shard::ALL, || bar.inc(1))?);
+        let all = kinds::read(&self.kinds)?;
+        let unit =
+            |name: &str| all.iter().find(|kind| kind.name == name).map_or_else(String::new, |kind| kind.unit.clone());
+        let is_wanted = |kind: &&Kind| self.only.as_ref().is_none_or(|only| kind.name.contains(only));
+        let (sound, faults): (Vec<Kind>, Vec<Kind>) =
+            all.iter().filter(is_wanted).cloned().partition(|kind| kind.name == NOTHING);
+        ensure!(!sound.is_empty() || !faults.is_empty(), "no kind has {:?} in its name", self.only.unwrap_or_default());
+        let trials = sweep::sweep(&faults, self.sweep_runs, self.first_seed);
+        let bar = progress::bar("every size", trials.len() as u64);
+        let swept = run(&trials, Shard::ALL, || bar.inc(1)).context("a run cannot be made")?;
         bar.finish_and_clear();
-        let bar = progress::bar("seeds of arbitrary events", fuzz_seeds(self.fuzz_events));
-        let fuzzed = fuzz(self.fuzz_events, || bar.inc(1));
+        let mut trials = sweep::worst(&faults, &swept, self.runs, self.first_seed);
+        trials.extend(sweep::sweep(&sound, self.sound_runs, self.first_seed + sweep::OTHER_SEEDS));
+        let bar = progress::bar("worst sizes", trials.len() as u64);
+        let rows = run(&trials, Shard::ALL, || bar.inc(1)).context("a run cannot be made")?;
         bar.finish_and_clear();
-        let bar = progress::bar("hours", self.soak_hours);
-        let hours = soak(&scenario, self.soak_hours, || bar.inc(1))?;
-        bar.finish_and_clear();
-        let trust = figures(plan.faults.len(), &rows, &hours, &fuzzed);
+        let figures = figures(&rows, unit);
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&trust)?);
-            return Ok(());
+            println!("{}", serde_json::to_string_pretty(&figures)?);
+        } else {
+            print(&figures);
         }
-        print!("{}", table(&rows));
-        print_hours(&hours);
-        println!("\n{}", serde_json::to_string_pretty(&trust)?);
         Ok(())
     }
 }
 
-fn print_hours(hours: &[Hour]) {
+fn print(figures: &Figures) {
     println!(
-        "\n{:>4} {:>26} {:>9} {:>10} {:>10} {:>11} {:>10}",
-        "hour", "mm median, 95 %, largest", "deg", "violations", "degraded s", "processor s", "memory MB"
+        "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7} {:>7} {:>8} {:>7}",
+        "kind", "worst size", "", "runs", "failures", "seed", "hmi s", "hmi m", "error/pl", "claimed"
     );
-    for hour in hours {
+    for of in &figures.per_fault {
         println!(
-            "{:>4} {:>10.2} {:>7.2} {:>7.2} {:>9.3} {:>10} {:>10.1} {:>11.2} {:>10.1}",
-            hour.hour,
-            hour.position_mm.median,
-            hour.position_mm.p95,
-            hour.position_mm.max,
-            hour.heading_deg,
-            hour.violations,
-            hour.degraded_s,
-            hour.seconds,
-            hour.memory_mb.unwrap_or(f64::NAN),
+            "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7.2} {:>7.2} {:>8.2} {:>6.1}%",
+            of.kind,
+            of.worst_size,
+            of.unit,
+            of.runs,
+            of.failures,
+            of.worst_seed,
+            of.worst_hmi_s,
+            of.worst_hmi_m,
+            of.error_over_pl_max.unwrap_or(f64::INFINITY),
+            100.0 * of.share_claimed
         );
     }
+    let share = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2} %", 100.0 * value));
+    println!(
+        "\n{} runs, seeds {} to {}: {} integrity failures, {} hazardous events, the longest {:.1} s and {:.1} m",
+        figures.runs,
+        figures.seeds[0],
+        figures.seeds[1],
+        figures.integrity_failures,
+        figures.hmi_events,
+        figures.worst_hmi_s,
+        figures.worst_hmi_m
+    );
+    println!(
+        "without faults, {:.1} h and {:.1} km: {} misleading outputs, available {} (travel) and {} (docking)",
+        figures.nominal_hours,
+        figures.nominal_km,
+        figures.nominal_mi,
+        share(figures.availability_travel),
+        share(figures.availability_docking)
+    );
 }

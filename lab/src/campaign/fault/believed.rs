@@ -21,6 +21,21 @@ impl Fault {
                     }
                 }
             }
+            FaultKind::ReflectorsMovedAlike { share, metres } => {
+                let (sine, cosine) = libm::sincos(random.between(0.0, std::f64::consts::TAU));
+                for landmark in &mut recording.landmarks {
+                    if random.happens(share) {
+                        landmark.x += metres * cosine;
+                        landmark.y += metres * sine;
+                    }
+                }
+            }
+            FaultKind::LayoutSheared { share } => {
+                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.y));
+                for landmark in &mut recording.landmarks {
+                    landmark.x += share * (landmark.y - middle);
+                }
+            }
             FaultKind::WallMoved { metres } => {
                 let low = recording.landmarks.iter().map(|landmark| landmark.y).fold(f64::INFINITY, f64::min);
                 for landmark in recording.landmarks.iter_mut().filter(|landmark| landmark.y < low + NEAR_WALL) {
@@ -41,13 +56,20 @@ impl Fault {
                 }
             }
             FaultKind::LayoutStretched { share } => {
+                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.x));
                 for landmark in &mut recording.landmarks {
-                    landmark.x *= 1.0 + share;
+                    landmark.x += share * (landmark.x - middle);
                 }
             }
-            FaultKind::MountingWrong { deg, x } => {
+            FaultKind::MountingWrong { deg, x, y } => {
                 let laser = recording.parameters.lasers.first_mut();
-                *laser = Pose::new(laser.x + x, laser.y, laser.theta + deg.to_radians());
+                *laser = Pose::new(laser.x + x, laser.y + y, laser.theta + deg.to_radians());
+            }
+            FaultKind::SteeringOffsetWrong { deg } => {
+                if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {
+                    tricycle.steering_offset_forward += deg.to_radians();
+                    tricycle.steering_offset_backward += deg.to_radians();
+                }
             }
             FaultKind::WheelbaseWrong { metres } => {
                 if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {

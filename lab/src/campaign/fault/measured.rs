@@ -5,7 +5,7 @@ use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
 use agv_core::odometry::{CounterRange, Tricycle};
 
 use super::{Fault, FaultKind};
-use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording};
 use agv_host_sim::simulate::START;
 use agv_host_sim::simulate::random::Random;
 
@@ -30,8 +30,30 @@ impl Fault {
                         self.spoil_reflectors(&mut seen.observations, time, &walkers, random);
                     }
                 }
+                RecordedEvent::Scan(scan) if self.is_active(scan.start.since(START)) => self.spoil_scan(scan, random),
                 _ => {}
             }
+        }
+    }
+
+    fn spoil_scan(&self, scan: &mut RecordedScan, random: &mut Random) {
+        let returns = |scan: &mut RecordedScan, change: &mut dyn FnMut(f64, &mut f32)| {
+            for (beam, range) in scan.ranges.iter_mut().enumerate().filter(|(_, range)| **range > 0.0) {
+                change((scan.first_bearing + beam as f64 * scan.bearing_step).to_degrees(), range);
+            }
+        };
+        match self.what {
+            FaultKind::LaserShaken { deg } => scan.first_bearing += deg.to_radians() * random.normal(),
+            FaultKind::RangesLong { metres } => returns(scan, &mut |_, range| *range += metres as f32),
+            FaultKind::RangesNoisy { metres } => {
+                returns(scan, &mut |_, range| *range = (*range + (metres * random.normal()) as f32).max(0.1));
+            }
+            FaultKind::WindowDirty { from_deg, to_deg, share } => returns(scan, &mut |bearing, range| {
+                if is_behind(bearing, from_deg, to_deg) && random.happens(share) {
+                    *range = 0.0;
+                }
+            }),
+            _ => {}
         }
     }
 
@@ -88,8 +110,7 @@ impl Fault {
             }
             FaultKind::WindowDirty { from_deg, to_deg, share } => seen.retain(|observation| {
                 let bearing = f64::from(observation.bearing).to_degrees();
-                let is_behind = (bearing - from_deg).rem_euclid(360.0) <= (to_deg - from_deg).rem_euclid(360.0);
-                !(is_behind && random.happens(share))
+                !(is_behind(bearing, from_deg, to_deg) && random.happens(share))
             }),
             FaultKind::PeopleAround { share } => seen.retain(|_| !random.happens(share)),
             FaultKind::FalseReflectors { count } => {
@@ -143,6 +164,11 @@ struct EncoderFaultState {
     was_active: bool,
     /// What the counter of the driving wheel has too much, ticks.
     drive: f64,
+}
+
+/// Whether a bearing lies in a sector of the window, all in degrees.
+fn is_behind(bearing: f64, from: f64, to: f64) -> bool {
+    (bearing - from).rem_euclid(360.0) <= (to - from).rem_euclid(360.0)
 }
 
 /// A laser sees no reflector farther away, m.

@@ -241,6 +241,13 @@ pub enum FaultKind {
         /// How far, each in its own direction.
         metres: f64,
     },
+    /// Reflectors have been moved since the survey, all of them alike.
+    ReflectorsMovedAlike {
+        /// How many.
+        share: f64,
+        /// How far.
+        metres: f64,
+    },
     /// Reflectors on one side have been moved together since the survey.
     WallMoved {
         /// How far.
@@ -255,6 +262,11 @@ pub enum FaultKind {
     LayoutMirrored,
     /// The layout that is loaded is that of another hall.
     LayoutOfAnotherHall,
+    /// The layout is sheared: its second axis leans.
+    LayoutSheared {
+        /// By which share.
+        share: f64,
+    },
     /// The layout is stretched along its first axis, as one that was measured with a wrong scale.
     LayoutStretched {
         /// By which share.
@@ -266,6 +278,14 @@ pub enum FaultKind {
         deg: f64,
         /// Forward.
         x: f64,
+        /// To the left.
+        #[serde(default)]
+        y: f64,
+    },
+    /// The steering has another offset than is believed.
+    SteeringOffsetWrong {
+        /// By how much.
+        deg: f64,
     },
     /// The wheelbase is otherwise than is believed.
     WheelbaseWrong {

@@ -1,0 +1,201 @@
+//! The figures of a campaign.
+
+use serde::Serialize;
+
+use super::outcome::Outcome;
+use super::row::{OfSize, Row, by_size, worst_size};
+use agv_host_sim::accuracy::Spread;
+
+/// What a kind of fault has shown at its worst size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfKind {
+    /// The kind.
+    pub kind: String,
+    /// A, B or C; none as long as nobody has assigned it.
+    pub class: Option<String>,
+    /// Its worst size, and what it is in.
+    pub worst_size: f64,
+    /// What sizes are in.
+    pub unit: String,
+    /// Runs at that size.
+    pub runs: usize,
+    /// Of these, runs with an integrity failure or a panic.
+    pub failures: usize,
+    /// Exact 95 % bound of the share of failures, if there were none.
+    pub bound: Option<f64>,
+    /// The worst run.
+    pub worst_seed: u64,
+    /// Longest time in hazardous outputs, s.
+    pub worst_hmi_s: f64,
+    /// Longest distance in hazardous outputs, m.
+    pub worst_hmi_m: f64,
+    /// Largest share of error over protection level; none if there was no claim.
+    pub error_over_pl_max: Option<f64>,
+    /// Share of the time in claims with a protection level within the alert limit of travelling.
+    pub share_claimed: f64,
+}
+
+/// The figures of a campaign; shares of nothing are none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// Runs.
+    pub runs: usize,
+    /// Runs that panicked.
+    pub panics: usize,
+    /// Share of the runs with a misleading output.
+    pub mi_share: f64,
+    /// Events of hazardous outputs.
+    pub hmi_events: u64,
+    /// Longest time in hazardous outputs of one event, s.
+    pub worst_hmi_s: f64,
+    /// Longest distance in hazardous outputs of one event, m.
+    pub worst_hmi_m: f64,
+    /// Events that are integrity failures.
+    pub integrity_failures: u64,
+    /// Without faults, in halls that commissioning accepts: hours, and km driven.
+    pub nominal_hours: f64,
+    /// See [`Self::nominal_hours`].
+    pub nominal_km: f64,
+    /// Misleading outputs without faults, in all halls.
+    pub nominal_mi: u64,
+    /// Hazardous events without faults, in all halls.
+    pub nominal_hmi: u64,
+    /// Share of the halls that commissioning refuses.
+    pub refused_halls: f64,
+    /// Share of the time in which the pose was available for travelling.
+    pub availability_travel: Option<f64>,
+    /// Share of the time at stations in which it was available for docking.
+    pub availability_docking: Option<f64>,
+    /// The same over all of the time.
+    pub availability_docking_of_all: Option<f64>,
+    /// Losses of availability for 100 km.
+    pub continuity_per_100km: Option<f64>,
+    /// Of the runs of which a recovery may be asked for, those that recovered.
+    pub recovered_share: Option<f64>,
+    /// The same share of all runs.
+    pub recovered_share_of_all: f64,
+    /// Protection level of the position without faults, with enough in sight, at the 95 % mark, mm.
+    pub pl_nominal_mm: Option<f64>,
+    /// The same of the heading, deg.
+    pub pl_nominal_deg: Option<f64>,
+    /// Largest share of error over protection level without faults.
+    pub error_over_pl_max: f64,
+    /// Time to the first claim without faults: 95 % mark and worst, s.
+    pub first_claim_s: [f64; 2],
+    /// Kinds that cannot be found.
+    pub class_c: Vec<String>,
+    /// First and last seed.
+    pub seeds: [u64; 2],
+    /// Each kind at its worst size, worst first.
+    pub per_fault: Vec<OfKind>,
+}
+
+/// The kind without a fault.
+pub const NOTHING: &str = "nothing";
+
+/// The figures of these rows. `units` gives the unit of a kind's size.
+#[must_use]
+pub fn figures(rows: &[Row], units: impl Fn(&str) -> String) -> Figures {
+    let all = OfSize { size: 0.0, rows: rows.iter().collect() };
+    let sound = OfSize { size: 0.0, rows: rows.iter().filter(|row| row.kind == NOTHING).collect() };
+    let accepted = OfSize { size: 0.0, rows: sound.rows.iter().copied().filter(|row| row.is_accepted).collect() };
+    let share = |part: u64, whole: u64| (whole > 0).then(|| part as f64 / whole as f64);
+    let km = accepted.sum(|outcome| outcome.driven_um) as f64 * 1e-9;
+    let recovering: Vec<&Row> = rows.iter().filter(|row| row.can_recover).collect();
+    let ends_right = |rows: &[&Row]| {
+        rows.iter().filter(|row| row.outcome.as_ref().is_some_and(|outcome| outcome.ends_right)).count() as u64
+    };
+    let first_claims = Spread::of(sound.rows.iter().filter_map(|row| {
+        let outcome = row.outcome.as_ref()?;
+        // A vehicle that never claims has waited for all of the run.
+        Some(outcome.first_claim.unwrap_or(outcome.outputs) as f64 * super::judge::STEP)
+    }));
+    let seeds = rows.iter().map(|row| row.seed);
+    Figures {
+        runs: rows.len(),
+        panics: rows.iter().filter(|row| row.outcome.is_none()).count(),
+        mi_share: rows.iter().filter(|row| row.outcome.as_ref().is_some_and(|outcome| outcome.misleading > 0)).count()
+            as f64
+            / rows.len().max(1) as f64,
+        hmi_events: all.sum(|outcome| u64::from(outcome.hazards)),
+        worst_hmi_s: all.most(|outcome| outcome.worst_hazard_s),
+        worst_hmi_m: all.most(|outcome| outcome.worst_hazard_m),
+        integrity_failures: all.sum(|outcome| u64::from(outcome.failures)),
+        nominal_hours: accepted.sum(|outcome| outcome.outputs) as f64 * super::judge::STEP / 3600.0,
+        nominal_km: km,
+        nominal_mi: sound.sum(|outcome| outcome.misleading),
+        nominal_hmi: sound.sum(|outcome| u64::from(outcome.hazards)),
+        refused_halls: 1.0 - accepted.rows.len() as f64 / sound.rows.len().max(1) as f64,
+        availability_travel: share(accepted.sum(|outcome| outcome.available), accepted.sum(|outcome| outcome.judged)),
+        availability_docking: share(
+            accepted.sum(|outcome| outcome.docking_available),
+            accepted.sum(|outcome| outcome.docking),
+        ),
+        availability_docking_of_all: share(
+            accepted.sum(|outcome| outcome.within_docking),
+            accepted.sum(|outcome| outcome.judged),
+        ),
+        continuity_per_100km: (km > 0.0).then(|| accepted.sum(|outcome| u64::from(outcome.losses)) as f64 / km * 100.0),
+        recovered_share: share(ends_right(&recovering), recovering.len() as u64),
+        recovered_share_of_all: ends_right(&all.rows) as f64 / rows.len().max(1) as f64,
+        pl_nominal_mm: mark(&accepted, |outcome| &outcome.nominal_mm),
+        pl_nominal_deg: mark(&accepted, |outcome| &outcome.nominal_cdeg).map(|hundredths| 0.01 * hundredths),
+        error_over_pl_max: sound.most(|outcome| outcome.most_over_level),
+        first_claim_s: [first_claims.p95, first_claims.max],
+        class_c: Vec::new(),
+        seeds: [seeds.clone().min().unwrap_or_default(), seeds.max().unwrap_or_default()],
+        per_fault: per_fault(rows, units),
+    }
+}
+
+/// The 95 % mark of a count of values.
+fn mark(of: &OfSize, values: fn(&Outcome) -> &std::collections::BTreeMap<u32, u64>) -> Option<f64> {
+    let mut counts = std::collections::BTreeMap::<u32, u64>::new();
+    for outcome in of.rows.iter().filter_map(|row| row.outcome.as_ref()) {
+        for (value, count) in values(outcome) {
+            *counts.entry(*value).or_default() += count;
+        }
+    }
+    let total: u64 = counts.values().sum();
+    let mut below = 0;
+    counts.into_iter().find_map(|(value, count)| {
+        below += count;
+        (total > 0 && below * 100 >= total * 95).then_some(f64::from(value))
+    })
+}
+
+fn per_fault(rows: &[Row], units: impl Fn(&str) -> String) -> Vec<OfKind> {
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !names.contains(&row.kind.as_str()) {
+            names.push(&row.kind);
+        }
+    }
+    let of_kind = |name: &str| {
+        let sizes = by_size(rows, name);
+        let worst = worst_size(&sizes)?;
+        let of = sizes.into_iter().find(|of| of.size.to_bits() == worst.to_bits())?;
+        let (runs, failures) = (of.rows.len(), of.failures());
+        let over = of.most(|outcome| outcome.most_over_level);
+        Some(OfKind {
+            kind: name.to_owned(),
+            class: None,
+            worst_size: worst,
+            unit: units(name),
+            runs,
+            failures,
+            bound: (failures == 0 && runs > 0).then(|| 1.0 - 0.05_f64.powf(1.0 / runs as f64)),
+            worst_seed: of.worst()?.seed,
+            worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
+            worst_hmi_m: of.most(|outcome| outcome.worst_hazard_m),
+            error_over_pl_max: over.is_finite().then_some(over),
+            share_claimed: of.share_claimed(),
+        })
+    };
+    let mut kinds: Vec<OfKind> = names.into_iter().filter_map(of_kind).collect();
+    kinds.sort_by(|a, b| {
+        let share = |of: &OfKind| of.failures as f64 / of.runs.max(1) as f64;
+        share(b).total_cmp(&share(a)).then(b.worst_hmi_s.total_cmp(&a.worst_hmi_s))
+    });
+    kinds
+}

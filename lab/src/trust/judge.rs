@@ -1,0 +1,201 @@
+//! Whether a controller was right, and knew how wrong it might be: what its bus says, every 10 ms, against the truth at the
+//! time that it states.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | fresh | at most 0.1 s old |
+//! | claim | fresh, and the mode is neither `not_localised` nor `lost` |
+//! | misleading (MI) | a claim whose error is above its protection level |
+//! | hazardous (HMI) | a claim whose error is above an alert limit that its protection level is within |
+//! | event | hazardous outputs less than 1 s apart |
+//! | integrity failure | an event with more than 0.3 s, or more than 0.5 m driven, in hazardous outputs |
+//! | available | a claim with a protection level within the alert limit, from the first claim on |
+//! | loss | the end of availability; losses within 10 s are one |
+//!
+//! Of position and heading, one above its bound counts as above; to be within, both must be.
+
+use agv_core::geometry::{Pose, difference};
+use agv_core::integrity::{AlertLimit, AlertLimits, ProtectionLevel};
+use agv_core::measurement::Time;
+use agv_core::state::Mode;
+use agv_wire::can::controller::PublishedPose;
+
+use super::outcome::Outcome;
+
+/// Time between two outputs that are judged, s.
+pub const STEP: f64 = 0.01;
+
+/// An output older than this, s, says nothing of the present.
+const STALE: f64 = 0.1;
+/// Hazardous outputs less than this apart, s, are one event.
+const SAME_EVENT: f64 = 1.0;
+/// Time and distance in hazardous outputs that an event may have, s and m.
+const TOLERATED: (f64, f64) = (0.3, 0.5);
+/// Losses of availability less than this apart, s, are one.
+const SAME_LOSS: f64 = 10.0;
+/// How long the end of a run must be right for the vehicle to count as recovered, s.
+const RIGHT_AT_THE_END: f64 = 5.0;
+
+/// What the bus says at one moment, and what is true.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// Now.
+    pub now: Time,
+    /// The last pose that was heard, and the time that it states.
+    pub heard: Option<(&'a PublishedPose, Time)>,
+    /// Where the vehicle was at that time.
+    pub truth: Option<Pose>,
+    /// Distance driven since the moment before, m.
+    pub driven: f64,
+    /// Whether the vehicle is near a station at which it docks, with what docking asks for in sight.
+    pub docks: bool,
+    /// Whether 90 deg were turned, and four reflectors were in sight in each of the last 16 revolutions.
+    pub is_nominal: bool,
+}
+
+/// Hazardous outputs that belong together.
+#[derive(Clone, Copy, Debug)]
+struct Event {
+    last: f64,
+    seconds: f64,
+    metres: f64,
+}
+
+/// Listens to the bus of a vehicle, and knows the truth.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    limits: AlertLimits,
+    time: f64,
+    events: [Option<Event>; 2],
+    last_loss: Option<f64>,
+    was_available: bool,
+    right_since: Option<f64>,
+    outcome: Outcome,
+}
+
+impl Judge {
+    /// A judge who has heard nothing.
+    #[must_use]
+    pub fn new(limits: AlertLimits) -> Self {
+        Self {
+            limits,
+            time: 0.0,
+            events: [None; 2],
+            last_loss: None,
+            was_available: false,
+            right_since: None,
+            outcome: Outcome::default(),
+        }
+    }
+
+    /// Hears the next moment.
+    pub fn hear(&mut self, moment: &Moment) {
+        let time = self.time;
+        self.time += STEP;
+        let outcome = &mut self.outcome;
+        outcome.outputs += 1;
+        outcome.driven_um += (1e6 * moment.driven).round() as u64;
+        let claim = moment.heard.filter(|(pose, stated)| {
+            moment.now.since(*stated) <= STALE && !matches!(pose.mode, Mode::NotLocalised | Mode::Lost)
+        });
+        let judged = claim.zip(moment.truth).map(|((pose, _), truth)| (Errors::of(&pose.pose, &truth), pose.level));
+        let is_available = judged.is_some_and(|(_, level)| self.limits.travel.holds(&level));
+        if judged.is_some() && outcome.first_claim.is_none() {
+            outcome.first_claim = Some(outcome.outputs - 1);
+        }
+        if outcome.first_claim.is_some() {
+            outcome.judged += 1;
+            outcome.available += u64::from(is_available);
+            let is_within = judged.is_some_and(|(_, level)| self.limits.docking.holds(&level));
+            outcome.within_docking += u64::from(is_within);
+            outcome.docking += u64::from(moment.docks);
+            outcome.docking_available += u64::from(moment.docks && is_within);
+        }
+        if self.was_available && !is_available {
+            outcome.losses += u32::from(self.last_loss.is_none_or(|last| time - last > SAME_LOSS));
+            self.last_loss = Some(time);
+        }
+        self.was_available = is_available;
+        let mut hazards = [false; 2];
+        let mut is_right = false;
+        if let Some((errors, level)) = judged {
+            outcome.claims += 1;
+            outcome.add_to_diagram(errors.position, level.position);
+            if moment.is_nominal {
+                outcome.add_nominal(&level);
+            }
+            let share = errors.over(&level);
+            outcome.most_over_level = outcome.most_over_level.max(share);
+            outcome.misleading += u64::from(share > 1.0);
+            hazards =
+                [self.limits.travel, self.limits.docking].map(|limit| errors.exceed(&limit) && limit.holds(&level));
+            is_right = share <= 1.0 && is_available;
+        }
+        self.right_since = if is_right { self.right_since.or(Some(time)) } else { None };
+        for (event, is_hazardous) in self.events.iter_mut().zip(hazards) {
+            follow(event, is_hazardous, time, moment.driven, &mut self.outcome);
+        }
+    }
+
+    /// What became of the run.
+    #[must_use]
+    pub fn outcome(mut self) -> Outcome {
+        for event in self.events.into_iter().flatten() {
+            close(&event, &mut self.outcome);
+        }
+        self.outcome.ends_right =
+            self.right_since.is_some_and(|since| self.time - since >= RIGHT_AT_THE_END - 0.5 * STEP);
+        self.outcome
+    }
+}
+
+/// How wrong a pose is.
+#[derive(Clone, Copy, Debug)]
+struct Errors {
+    /// m.
+    position: f64,
+    /// rad.
+    heading: f64,
+}
+
+impl Errors {
+    fn of(pose: &Pose, truth: &Pose) -> Self {
+        Self {
+            position: (pose.position() - truth.position()).norm(),
+            heading: difference(pose.theta, truth.theta).abs(),
+        }
+    }
+
+    fn exceed(&self, limit: &AlertLimit) -> bool {
+        // What is not a number is not within.
+        !(self.position <= limit.position && self.heading <= limit.heading)
+    }
+
+    /// The larger share of its bound.
+    fn over(&self, level: &ProtectionLevel) -> f64 {
+        let share = |error: f64, bound: f64| if error <= 0.0 { 0.0 } else { error / bound };
+        let (position, heading) = (share(self.position, level.position), share(self.heading, level.heading));
+        if position.is_nan() || heading.is_nan() { f64::INFINITY } else { position.max(heading) }
+    }
+}
+
+fn follow(event: &mut Option<Event>, is_hazardous: bool, time: f64, driven: f64, outcome: &mut Outcome) {
+    if let Some(ended) = event.take_if(|event| time - event.last >= SAME_EVENT) {
+        close(&ended, outcome);
+    }
+    if is_hazardous {
+        let event = event.get_or_insert(Event { last: time, seconds: 0.0, metres: 0.0 });
+        event.last = time;
+        event.seconds += STEP;
+        event.metres += driven;
+    }
+}
+
+fn close(event: &Event, outcome: &mut Outcome) {
+    outcome.hazards += 1;
+    outcome.worst_hazard_s = outcome.worst_hazard_s.max(event.seconds);
+    outcome.worst_hazard_m = outcome.worst_hazard_m.max(event.metres);
+    // Times are sums of hundredths.
+    let is_failure = event.seconds > TOLERATED.0 + 0.5 * STEP || event.metres > TOLERATED.1;
+    outcome.failures += u32::from(is_failure);
+}

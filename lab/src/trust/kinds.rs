@@ -1,0 +1,222 @@
+//! Kinds of faults, each with a size that is swept from nothing to its natural end.
+
+use std::path::{Path, PathBuf};
+
+use agv_host_sim::simulate::random::Random;
+use agv_host_sim::simulate::scenario::{Knock, toml_complaint};
+use serde::{Deserialize, Serialize};
+
+use crate::campaign::fault::{Fault, FaultKind};
+
+/// Why kinds of faults cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum KindsError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The text has no kinds.
+    #[error("these are no kinds of faults, line {line}: {problem}")]
+    Parse {
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A kind makes no fault.
+    #[error("the kind {name:?}: {problem}")]
+    Kind {
+        /// The kind.
+        name: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+/// When a fault begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Begin {
+    /// At any time of the drive.
+    #[default]
+    AnyTime,
+    /// It is there from the beginning.
+    Before,
+}
+
+/// How long a fault lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Lasts {
+    /// So many seconds.
+    Seconds(f64),
+    /// As many seconds as its size is.
+    Size(TheSize),
+}
+
+/// The word for the size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TheSize {
+    /// "size".
+    Size,
+}
+
+/// A kind of fault. In `what` or `knock`, the text "size" stands for the size, and "-size" for the same with the other sign.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Kind {
+    /// What it is called in the table.
+    pub name: String,
+    /// What the size is in.
+    pub unit: String,
+    /// Sizes, from none on; empty for what has no size.
+    #[serde(default)]
+    pub sizes: Vec<f64>,
+    /// When it begins.
+    #[serde(default)]
+    pub begins: Begin,
+    /// How long it lasts, s, or "size"; to the end if absent.
+    pub lasts: Option<Lasts>,
+    /// What it does to sensors, lines or beliefs.
+    pub what: Option<toml::Table>,
+    /// How the laser moves on its mounting.
+    pub knock: Option<toml::Table>,
+    /// Whether the start is told, as it is what is tested.
+    #[serde(default)]
+    pub tells_start: bool,
+}
+
+/// What goes wrong in one run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Drawn {
+    /// Nothing.
+    Nothing,
+    /// A fault of sensors, lines or beliefs.
+    Fault(Fault),
+    /// The laser moves.
+    Knock(Knock),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    kind: Vec<Kind>,
+}
+
+/// Fewest sizes of a kind.
+pub const FEWEST_SIZES: usize = 9;
+
+/// Reads kinds of faults.
+///
+/// # Errors
+/// See [`KindsError`].
+pub fn read(path: &Path) -> Result<Vec<Kind>, KindsError> {
+    let text = std::fs::read_to_string(path).map_err(|source| KindsError::Read { path: path.to_owned(), source })?;
+    parse(&text)
+}
+
+/// Kinds of faults from the text of a file.
+///
+/// # Errors
+/// See [`KindsError`].
+pub fn parse(text: &str) -> Result<Vec<Kind>, KindsError> {
+    let file: File = toml::from_str(text).map_err(|error| {
+        let (line, problem) = toml_complaint(text, &error);
+        KindsError::Parse { line, problem }
+    })?;
+    for (index, kind) in file.kind.iter().enumerate() {
+        kind.check().map_err(|problem| KindsError::Kind { name: kind.name.clone(), problem })?;
+        if file.kind[..index].iter().any(|known| known.name == kind.name) {
+            return Err(KindsError::Kind { name: kind.name.clone(), problem: "the name is there twice".to_owned() });
+        }
+    }
+    Ok(file.kind)
+}
+
+impl Kind {
+    fn check(&self) -> Result<(), String> {
+        if self.has_size() && self.sizes.len() < FEWEST_SIZES {
+            return Err(format!("fewer than {FEWEST_SIZES} sizes"));
+        }
+        if !self.has_size() && !self.sizes.is_empty() {
+            return Err("sizes, and nothing that they are of".to_owned());
+        }
+        if self.what.is_some() == self.knock.is_some() {
+            return Err("one of `what` and `knock` is expected".to_owned());
+        }
+        self.every_size().iter().try_for_each(|&size| self.at(size, 0.0).map(|_| ()))
+    }
+
+    /// Whether anything of it has a size.
+    fn has_size(&self) -> bool {
+        let tables = [&self.what, &self.knock].into_iter().flatten();
+        let mut values = tables.flat_map(toml::Table::values).filter_map(toml::Value::as_str);
+        matches!(self.lasts, Some(Lasts::Size(_))) || values.any(|text| text == "size" || text == "-size")
+    }
+
+    /// Its sizes; 1 for what has none.
+    #[must_use]
+    pub fn every_size(&self) -> &[f64] {
+        if self.sizes.is_empty() { &[1.0] } else { &self.sizes }
+    }
+
+    /// The fault of that size, beginning `from` s after the vehicle drives off.
+    ///
+    /// # Errors
+    /// What is wrong with the kind.
+    pub fn at(&self, size: f64, from: f64) -> Result<Drawn, String> {
+        let until = self.lasts.map(|lasts| match lasts {
+            Lasts::Seconds(seconds) => from + seconds,
+            Lasts::Size(_) => from + size,
+        });
+        if let Some(knock) = &self.knock {
+            let mut table = with_size(knock, size);
+            table.insert("from".to_owned(), toml::Value::Float(from));
+            return table.try_into().map(Drawn::Knock).map_err(|error: toml::de::Error| error.message().to_owned());
+        }
+        let what: FaultKind = with_size(self.what.as_ref().unwrap_or(&nothing()), size)
+            .try_into()
+            .map_err(|error: toml::de::Error| error.message().to_owned())?;
+        if what == FaultKind::Nothing {
+            return Ok(Drawn::Nothing);
+        }
+        Ok(Drawn::Fault(Fault { name: self.name.clone(), from, until, what, can_recover: until.is_some() }))
+    }
+
+    /// When the fault of a run begins in a drive of that many seconds, s after the vehicle drives off.
+    pub fn draw_begin(&self, seconds: f64, random: &mut Random) -> f64 {
+        let drawn = random.uniform();
+        match self.begins {
+            Begin::Before => 0.0,
+            Begin::AnyTime => drawn * seconds,
+        }
+    }
+}
+
+fn nothing() -> toml::Table {
+    toml::Table::from_iter([("kind".to_owned(), toml::Value::String("nothing".to_owned()))])
+}
+
+/// The table with numbers in the places of "size".
+fn with_size(table: &toml::Table, size: f64) -> toml::Table {
+    let mut table = table.clone();
+    for (_, value) in table.iter_mut() {
+        let size = match value.as_str() {
+            Some("size") => size,
+            Some("-size") => -size,
+            _ => continue,
+        };
+        *value = if size.fract() == 0.0 && size.abs() < 1e15 {
+            // What counts takes whole numbers, and what measures takes them, too.
+            toml::Value::Integer(size as i64)
+        } else {
+            toml::Value::Float(size)
+        };
+    }
+    table
+}

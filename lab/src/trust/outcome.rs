@@ -1,0 +1,77 @@
+//! What became of one run, in counts, so that parts of a campaign add up to the same whole in any order.
+
+use std::collections::BTreeMap;
+
+use agv_core::integrity::ProtectionLevel;
+use serde::{Deserialize, Serialize};
+
+/// Width of a cell of the diagram of error against protection level, m.
+pub const CELL: f64 = 0.01;
+/// Cells an axis; the last one holds all that is larger.
+pub const CELLS: usize = 41;
+
+/// What became of one run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// Moments that were listened to, 10 ms apart.
+    pub outputs: u64,
+    /// Number of the moment of the first claim.
+    pub first_claim: Option<u64>,
+    /// Moments from the first claim on.
+    pub judged: u64,
+    /// Of these, with a claim and a protection level within the alert limit of travelling.
+    pub available: u64,
+    /// Moments from the first claim on at which the vehicle docked with enough in sight.
+    pub docking: u64,
+    /// Of these, with a claim and a protection level within the alert limit of docking.
+    pub docking_available: u64,
+    /// Moments from the first claim on with a claim and a protection level within the alert limit of docking.
+    pub within_docking: u64,
+    /// Ends of availability.
+    pub losses: u32,
+    /// Claims.
+    pub claims: u64,
+    /// Claims with an error above the protection level.
+    pub misleading: u64,
+    /// Events of hazardous outputs, by either alert limit.
+    pub hazards: u32,
+    /// Longest time in hazardous outputs of one event, s.
+    pub worst_hazard_s: f64,
+    /// Longest distance in hazardous outputs of one event, m.
+    pub worst_hazard_m: f64,
+    /// Events that are integrity failures.
+    pub failures: u32,
+    /// Largest share of error over protection level of a claim.
+    pub most_over_level: f64,
+    /// Distance driven, um.
+    pub driven_um: u64,
+    /// Protection levels of the position, mm, rounded up, of claims with enough in sight: see [`super::judge::Moment`].
+    pub nominal_mm: BTreeMap<u32, u64>,
+    /// The same of the heading, hundredths of a degree.
+    pub nominal_cdeg: BTreeMap<u32, u64>,
+    /// Whether the last 5 s are claims with the error within the protection level, and that within the alert limit.
+    pub ends_right: bool,
+    /// Claims by position error (first) and protection level of the position, in cells; only those that are not empty.
+    pub diagram: BTreeMap<u16, u64>,
+}
+
+impl Outcome {
+    /// Counts a claim in the diagram.
+    pub(super) fn add_to_diagram(&mut self, error: f64, level: f64) {
+        let cell = |value: f64| ((value / CELL) as usize).min(CELLS - 1);
+        *self.diagram.entry((cell(error) * CELLS + cell(level)) as u16).or_default() += 1;
+    }
+
+    /// Counts a protection level with enough in sight.
+    pub(super) fn add_nominal(&mut self, level: &ProtectionLevel) {
+        let cell = |value: f64| value.ceil().clamp(0.0, f64::from(u32::MAX)) as u32;
+        *self.nominal_mm.entry(cell(1e3 * level.position - 1e-6)).or_default() += 1;
+        *self.nominal_cdeg.entry(cell(100.0 * level.heading.to_degrees() - 1e-6)).or_default() += 1;
+    }
+
+    /// Distance driven, m.
+    #[must_use]
+    pub fn driven(&self) -> f64 {
+        self.driven_um as f64 * 1e-6
+    }
+}

@@ -1,0 +1,111 @@
+//! The record of one run, as parts of a campaign exchange them.
+
+use serde::{Deserialize, Serialize};
+
+use super::outcome::Outcome;
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the kind of fault.
+    pub kind: String,
+    /// Its size.
+    pub size: f64,
+    /// The seed.
+    pub seed: u64,
+    /// Whether the commissioning check accepts the hall.
+    pub is_accepted: bool,
+    /// Whether a recovery may be asked for.
+    pub can_recover: bool,
+    /// What became of it; none if the program panicked.
+    pub outcome: Option<Outcome>,
+}
+
+impl Row {
+    /// Whether the run failed: an integrity failure, or a panic.
+    #[must_use]
+    pub fn has_failed(&self) -> bool {
+        self.outcome.as_ref().is_none_or(|outcome| outcome.failures > 0)
+    }
+
+    /// How bad it was, worst first when sorted: failures, hazards, misleading outputs.
+    fn badness(&self) -> (bool, u32, u64) {
+        let outcome = self.outcome.as_ref();
+        (
+            self.has_failed(),
+            outcome.map_or(0, |outcome| outcome.hazards),
+            outcome.map_or(0, |outcome| outcome.misleading),
+        )
+    }
+}
+
+/// The rows of one size of a kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OfSize<'a> {
+    /// The size.
+    pub size: f64,
+    /// Its runs.
+    pub rows: Vec<&'a Row>,
+}
+
+impl OfSize<'_> {
+    /// Runs that failed.
+    #[must_use]
+    pub fn failures(&self) -> usize {
+        self.rows.iter().filter(|row| row.has_failed()).count()
+    }
+
+    /// A sum over all runs that did not panic.
+    #[must_use]
+    pub fn sum(&self, value: impl Fn(&Outcome) -> u64) -> u64 {
+        self.rows.iter().filter_map(|row| row.outcome.as_ref()).map(value).sum()
+    }
+
+    /// The greatest value of a run that did not panic.
+    #[must_use]
+    pub fn most(&self, value: impl Fn(&Outcome) -> f64) -> f64 {
+        self.rows.iter().filter_map(|row| row.outcome.as_ref()).map(value).fold(0.0, f64::max)
+    }
+
+    /// The worst run.
+    #[must_use]
+    pub fn worst(&self) -> Option<&Row> {
+        self.rows.iter().copied().max_by_key(|row| row.badness())
+    }
+
+    /// Share of the time in claims with a protection level within the alert limit of travelling.
+    #[must_use]
+    pub fn share_claimed(&self) -> f64 {
+        self.sum(|outcome| outcome.available) as f64 / self.sum(|outcome| outcome.outputs).max(1) as f64
+    }
+
+    fn badness(&self) -> (usize, u64, u64) {
+        (self.failures(), self.sum(|outcome| u64::from(outcome.hazards)), self.sum(|outcome| outcome.misleading))
+    }
+}
+
+/// The rows of a kind by its sizes, in order of size.
+#[must_use]
+pub fn by_size<'a>(rows: &'a [Row], kind: &str) -> Vec<OfSize<'a>> {
+    let mut sizes: Vec<OfSize> = Vec::new();
+    for row in rows.iter().filter(|row| row.kind == kind) {
+        match sizes.iter_mut().find(|of| of.size.to_bits() == row.size.to_bits()) {
+            Some(of) => of.rows.push(row),
+            None => sizes.push(OfSize { size: row.size, rows: vec![row] }),
+        }
+    }
+    sizes.sort_by(|a, b| a.size.total_cmp(&b.size));
+    sizes
+}
+
+/// The size of a kind at which its runs are worst: most failures, then hazards, then misleading outputs; the smallest such.
+#[must_use]
+pub fn worst_size(sizes: &[OfSize]) -> Option<f64> {
+    let mut worst: Option<&OfSize> = None;
+    for of in sizes {
+        if worst.is_none_or(|worst| of.badness() > worst.badness()) {
+            worst = Some(of);
+        }
+    }
+    worst.map(|of| of.size)
+}

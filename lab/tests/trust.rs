@@ -1,0 +1,173 @@
+//! The judge, the halls that are drawn, and the kinds of faults.
+
+use std::path::Path;
+
+use agv_core::geometry::Pose;
+use agv_core::integrity::{Alarm, AlertLimit, AlertLimits, ProtectionLevel};
+use agv_core::localizer::Reason;
+use agv_core::measurement::Time;
+use agv_core::state::Mode;
+use agv_lab::campaign::Shard;
+use agv_lab::trust::figures::{NOTHING, figures};
+use agv_lab::trust::judge::{Judge, Moment, STEP};
+use agv_lab::trust::kinds::{self, Drawn};
+use agv_lab::trust::outcome::Outcome;
+use agv_lab::trust::{hall, sweep};
+use agv_wire::can::controller::{Health, PublishedPose};
+
+/// A pose in the origin with a protection level of 10 cm and 1 deg.
+fn pose() -> PublishedPose {
+    let level = ProtectionLevel { position: 0.1, heading: 1_f64.to_radians() };
+    PublishedPose {
+        counter: 0,
+        pose: Pose::default(),
+        time: 0,
+        dead_reckoning_distance: 0.0,
+        deviations: [0.0; 3],
+        correlations: [0.0; 3],
+        mode: Mode::Reflectors,
+        reason: Reason::None,
+        health: Health::default(),
+        is_good: false,
+        has_jumped: false,
+        resets: 0,
+        last_reset: 0.0,
+        overflows: 0,
+        level,
+        limit: AlertLimit { position: 0.15, heading: 0.035 },
+        alarm: Alarm::None,
+    }
+}
+
+/// Judges spans of time: so many outputs of a pose, wrong by so much in x, that were driven at 1 m/s.
+fn judge(spans: &[(usize, PublishedPose, f64)]) -> Outcome {
+    let mut judge = Judge::new(AlertLimits::default());
+    let mut now = Time::from_seconds(10.0);
+    for (count, pose, error) in spans {
+        for _ in 0..*count {
+            now = now.offset(STEP);
+            judge.hear(&Moment {
+                now,
+                heard: Some((pose, now)),
+                truth: Some(Pose::new(*error, 0.0, 0.0)),
+                driven: STEP,
+                docks: true,
+                is_nominal: true,
+            });
+        }
+    }
+    judge.outcome()
+}
+
+#[test]
+fn an_error_above_the_protection_level_misleads_and_above_the_alert_limit_is_hazardous() {
+    let sound = judge(&[(1000, pose(), 0.09)]);
+    assert_eq!((sound.misleading, sound.hazards, sound.available), (0, 0, 1000));
+    assert!((sound.most_over_level - 0.9).abs() < 1e-9 && sound.ends_right);
+    let misleading = judge(&[(1000, pose(), 0.12)]);
+    assert_eq!((misleading.misleading, misleading.hazards, misleading.failures), (1000, 0, 0));
+    assert!(!misleading.ends_right);
+    let hazardous = judge(&[(1000, pose(), 0.16)]);
+    assert_eq!((hazardous.hazards, hazardous.failures), (1, 1));
+    assert!((hazardous.worst_hazard_s - 10.0).abs() < 1e-9 && (hazardous.worst_hazard_m - 10.0).abs() < 1e-9);
+    // A protection level above the alert limit says that the pose is of no use.
+    let wide = PublishedPose { level: ProtectionLevel { position: 0.2, heading: 0.01 }, ..pose() };
+    let warned = judge(&[(1000, wide, 0.3)]);
+    assert_eq!((warned.misleading, warned.hazards, warned.available), (1000, 0, 0));
+}
+
+#[test]
+fn docking_has_limits_of_its_own_and_the_heading_counts_as_the_position_does() {
+    let narrow = ProtectionLevel { position: 0.04, heading: 0.005 };
+    let close = PublishedPose { level: narrow, ..pose() };
+    let hazardous = judge(&[(1000, close, 0.06)]);
+    assert_eq!((hazardous.hazards, hazardous.failures, hazardous.docking_available), (1, 1, 1000));
+    let turned = PublishedPose { pose: Pose::new(0.0, 0.0, 0.04), ..pose() };
+    assert_eq!(judge(&[(1000, turned, 0.0)]).failures, 1);
+    let nowhere = PublishedPose { pose: Pose { x: f64::NAN, y: 0.0, theta: 0.0 }, ..pose() };
+    let lost = judge(&[(1000, nowhere, 0.0)]);
+    assert!(lost.failures == 1 && lost.most_over_level.is_infinite());
+}
+
+#[test]
+fn hazards_less_than_a_second_apart_are_one_event_and_add_up() {
+    let short = |gap| {
+        judge(&[(500, pose(), 0.0), (20, pose(), 0.16), (gap, pose(), 0.0), (20, pose(), 0.16), (500, pose(), 0.0)])
+    };
+    let one = short(98);
+    assert_eq!((one.hazards, one.failures), (1, 1));
+    let two = short(101);
+    assert_eq!((two.hazards, two.failures), (2, 0));
+    assert!((two.worst_hazard_s - 0.2).abs() < 1e-9);
+    assert_eq!(judge(&[(500, pose(), 0.0), (30, pose(), 0.16)]).failures, 0);
+    assert_eq!(judge(&[(500, pose(), 0.0), (31, pose(), 0.16)]).failures, 1);
+}
+
+#[test]
+fn who_says_nothing_claims_nothing() {
+    for mode in [Mode::NotLocalised, Mode::Lost] {
+        let outcome = judge(&[(1000, PublishedPose { mode, ..pose() }, 5.0)]);
+        assert_eq!((outcome.claims, outcome.judged, outcome.first_claim), (0, 0, None), "{mode:?}");
+    }
+    for mode in [Mode::DeadReckoning, Mode::Degraded, Mode::WithoutOdometry] {
+        assert_eq!(judge(&[(1000, PublishedPose { mode, ..pose() }, 5.0)]).failures, 1, "{mode:?}");
+    }
+    // Silence after a claim is no availability.
+    let silent = judge(&[(1000, pose(), 0.0), (1000, PublishedPose { mode: Mode::Lost, ..pose() }, 0.0)]);
+    assert_eq!((silent.judged, silent.available, silent.losses), (2000, 1000, 1));
+    let lost = PublishedPose { mode: Mode::Lost, ..pose() };
+    let again = |gap| judge(&[(100, pose(), 0.0), (10, lost, 0.0), (gap, pose(), 0.0), (10, lost, 0.0)]).losses;
+    assert_eq!((again(500), again(1100)), (1, 2));
+    let mut judge = Judge::new(AlertLimits::default());
+    let old = pose();
+    for step in 0..1000 {
+        let now = Time::from_seconds(10.0 + f64::from(step) * STEP);
+        let stated = now.offset(-0.11);
+        let truth = Some(Pose::new(9.0, 0.0, 0.0));
+        judge.hear(&Moment { now, heard: Some((&old, stated)), truth, driven: 0.0, docks: false, is_nominal: false });
+    }
+    assert_eq!(judge.outcome().claims, 0);
+}
+
+fn scenarios(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/scenarios").join(name)
+}
+
+#[test]
+fn there_are_sixty_kinds_and_more_each_at_nine_sizes_or_more() {
+    let kinds = kinds::read(&scenarios("trust.toml")).unwrap();
+    assert!(kinds.len() >= 61, "{}", kinds.len());
+    for kind in &kinds {
+        assert!(kind.sizes.is_empty() || kind.sizes.len() >= kinds::FEWEST_SIZES, "{}", kind.name);
+        for &size in kind.every_size() {
+            let drawn = kind.at(size, 7.0).unwrap();
+            assert_eq!(drawn == Drawn::Nothing, kind.name == NOTHING, "{}", kind.name);
+        }
+    }
+    let text = |what: &str| format!("[[kind]]\nname = \"a\"\nunit = \"m\"\n{what}\n");
+    for (wrong, complaint) in [
+        ("sizes = [0, 1]\nwhat = { kind = \"wall_moved\", metres = \"size\" }", "fewer than 9 sizes"),
+        ("sizes = [0, 1, 2, 3, 4, 5, 6, 7, 8]\nwhat = { kind = \"laser_silent\" }", "nothing that they are of"),
+        ("what = { kind = \"laser_silent\" }\nknock = { x = 1.0 }", "one of `what` and `knock`"),
+        ("what = { kind = \"wall_moves\" }", "unknown variant"),
+        ("what = 3", "invalid type"),
+    ] {
+        let found = kinds::parse(&text(wrong)).unwrap_err().to_string();
+        assert!(found.contains(complaint), "{found}");
+    }
+}
+
+#[test]
+fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
+    let kinds = kinds::read(&scenarios("trust.toml")).unwrap();
+    let sound: Vec<_> = kinds.into_iter().filter(|kind| kind.name == NOTHING).collect();
+    let counts: Vec<usize> = (1..=20).map(|seed| hall::draw(seed).scenario.build_world().reflectors.len()).collect();
+    assert!(counts.iter().min() < counts.iter().max(), "{counts:?}");
+    let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, || ()).unwrap();
+    let found = figures(&rows, |_| String::new());
+    assert_eq!((found.runs, found.panics, found.seeds), (2, 0, [1, 2]));
+    assert!(found.first_claim_s[1] < 30.0 && found.nominal_mi == 0 && found.nominal_hmi == 0, "{found:?}");
+    // The same run is the same row.
+    let parts = [0, 1].map(|number| sweep::run(&sweep::sweep(&sound, 2, 1), Shard { number, of: 2 }, || ()).unwrap());
+    assert_eq!(parts.concat(), rows);
+}
