@@ -126,7 +126,7 @@ fn what_is_recorded_is_what_was_served() {
         let drive = Drive::new(&recording, SensorFrame::default()).unwrap();
         let turns = drive.turns().to_vec();
         // The clock wraps during the drive.
-        let options = Options { speed: SPEED, clock_start: u32::MAX - 8000, dialect: Some(dialect), stands: false };
+        let options = Options { speed: SPEED, clock_start: u32::MAX - 8000, dialect: Some(dialect), ..Options::default() };
         let sensor = Nav350::new(drive, options);
         let (listener, address) = listener();
         let folder = tempfile::tempdir().unwrap();
