@@ -15,8 +15,8 @@ use agv_host_sim::replay::{Comparison, compare, replay};
 use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
-use serde::Serialize;
 
+use super::drive_summary::DriveSummary;
 use super::lidar3d::relocalise::Relocalisation;
 use super::{output, pose_argument, progress};
 
@@ -101,23 +101,6 @@ fn start(text: &str) -> Result<Start, String> {
     pose_argument::pose(text).map(Start::Given).map_err(|_| problem())
 }
 
-#[derive(Serialize)]
-struct Summary<'a> {
-    /// Program that wrote the log.
-    software: &'a str,
-    #[serde(flatten)]
-    figures: &'a Figures,
-    outputs: Option<Comparison>,
-    damage: Vec<DamageEntry>,
-}
-
-#[derive(Serialize)]
-struct DamageEntry {
-    offset: u64,
-    skipped: u64,
-    reason: String,
-}
-
 impl Replay {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
@@ -144,7 +127,13 @@ impl Replay {
             ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
         }
         for path in &self.map {
-            use_map(&mut recording, map_file::read(path)?);
+            let map = map_file::read(path)?;
+            ensure!(
+                !map.is_empty(),
+                "{}: there are no landmarks in the map; --landmarks none uses none",
+                path.display()
+            );
+            use_map(&mut recording, map);
         }
         if !self.landmarks.is_empty() {
             recording.parameters.maps = self.maps()?;
@@ -172,13 +161,7 @@ impl Replay {
             page.write(&path).with_context(|| path.display().to_string())?;
         }
         if self.json {
-            let damage = damages.iter().map(|damage| DamageEntry {
-                offset: damage.offset,
-                skipped: damage.skipped,
-                reason: damage.reason.to_string(),
-            });
-            let summary =
-                Summary { software: &software, figures: &figures, outputs: comparison, damage: damage.collect() };
+            let summary = DriveSummary::new(&software, &figures, comparison, &damages);
             println!("{}", serde_json::to_string_pretty(&summary)?);
             return Ok(());
         }
@@ -193,7 +176,11 @@ impl Replay {
 
     fn maps(&self) -> anyhow::Result<MapUse> {
         let has = |wanted| self.landmarks.contains(&wanted);
-        ensure!(!has(Landmarks::None) || self.landmarks.len() == 1, "--landmarks: 'none' goes with nothing else");
+        if has(Landmarks::None) && self.landmarks.len() > 1 {
+            // The command line is wrong, as with a word that is no kind.
+            eprintln!("error: --landmarks: 'none' goes with nothing else");
+            std::process::exit(2);
+        }
         Ok(MapUse {
             reflectors: has(Landmarks::Reflectors),
             features: has(Landmarks::Features),
