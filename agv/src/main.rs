@@ -4,14 +4,15 @@ mod command;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Localisation of automated guided vehicles: replay, simulate, measure.
 ///
 /// Without a command: simulates a drive into a block storage, maps its world, localises the drive by odometry,
 /// reflectors, mapped features and both, prints the errors and writes a report with pictures.
 #[derive(Parser)]
-#[command(name = "agv", version, args_conflicts_with_subcommands = true, after_help = HELP)]
+#[command(name = "agv", version, after_help = HELP)]
 struct Agv {
     /// Print results and errors only: neither progress nor notes.
     #[arg(short, long, global = true)]
@@ -60,7 +61,13 @@ enum Command {
 
 fn main() -> ExitCode {
     command::panic_message::install();
-    let arguments = Agv::parse();
+    let matches = Agv::command().get_matches();
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(option) = matches.subcommand_name().and_then(|command| stray_option(command, &words)) {
+        let problem = format!("--{option} does not go with a command before which it stands");
+        Agv::command().error(ErrorKind::ArgumentConflict, problem).exit();
+    }
+    let arguments = Agv::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if arguments.quiet {
         command::output::be_quiet();
     }
@@ -86,18 +93,27 @@ fn main() -> ExitCode {
         Some(Command::Emulate(command)) => command.run(),
         Some(Command::Ctl(command)) => command.run(),
         Some(Command::Provision(command)) => command.run(),
-        Some(Command::Completion(command)) => {
-            command.run::<Agv>();
-            Ok(())
-        }
+        Some(Command::Completion(command)) => command.run::<Agv>(),
     };
+    finish(outcome)
+}
+
+/// The exit code of a command, and a line if it failed.
+fn finish(outcome: anyhow::Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line, whatever a library says.
-            let complaint = format!("{error:#}");
-            eprintln!("agv: {}", complaint.lines().map(str::trim).collect::<Vec<_>>().join(" "));
+            eprintln!("agv: {}", command::complaint::line(&error));
             ExitCode::FAILURE
         }
     }
+}
+
+/// An option of the demonstration that stands before a command, where it would mean nothing.
+fn stray_option(command: &str, words: &[String]) -> Option<&'static str> {
+    let before = words.iter().take_while(|word| *word != command);
+    let options = command::demonstration::OPTIONS;
+    before
+        .filter_map(|word| word.strip_prefix("--"))
+        .find_map(|word| options.into_iter().find(|option| word == *option || word.starts_with(&format!("{option}="))))
 }

@@ -10,6 +10,7 @@ mod import;
 mod import_scans;
 mod lidar3d;
 mod nav350;
+mod output;
 mod replay;
 mod support;
 

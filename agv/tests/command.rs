@@ -172,7 +172,7 @@ fn a_scenario_that_is_none_is_refused() {
         refusal(&["simulate", &scenario, "-o", &output]);
     }
     let complaint = refusal(&["simulate", &files.path("damaged.toml"), "-o", &output]);
-    assert!(complaint.contains("line 1: ") && !complaint.contains('|'), "{complaint}");
+    assert!(complaint.contains("damaged.toml:1: ") && !complaint.contains('|'), "{complaint}");
 }
 
 #[test]

@@ -229,6 +229,33 @@ fn the_asymmetric_model_uses_the_offset_of_the_direction() {
 }
 
 #[test]
+fn a_counter_that_counts_the_wrong_way_has_the_offset_of_the_same_direction() {
+    let right = Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
+    let wrong = Tricycle { drive_scale: -right.drive_scale, ..right };
+    let motions = |tricycle: Tricycle, counts: [u32; 3]| {
+        let mut odometer = VehicleOdometer::new(
+            &Vehicle::Tricycle(tricycle),
+            &OdometerParameters {
+                noise: OdometryNoise::default(),
+                integration: Integration::Arc,
+                fastest: 100.0,
+                longest_interval: 0.25,
+            },
+        );
+        let samples = counts.into_iter().zip(0_u64..);
+        let told = samples.map(|(drive, number)| EncoderSample {
+            time: Time::from_micros(100_000 * number),
+            drive,
+            steering: 0,
+        });
+        told.filter_map(|sample| odometer.encoders(&sample).ok()).map(|motion| motion.displacement).collect::<Vec<_>>()
+    };
+    let forth_and_back = [100_000_u32, 110_000, 100_000];
+    let opposite = forth_and_back.map(u32::wrapping_neg);
+    assert_eq!(motions(wrong, opposite), motions(right, forth_and_back));
+}
+
+#[test]
 fn a_drive_counter_that_wraps_goes_on() {
     let small = Tricycle { drive_range: CounterRange::new(5_000).unwrap(), ..tricycle() };
     let mut odometer = VehicleOdometer::new(

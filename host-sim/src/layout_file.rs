@@ -15,6 +15,7 @@ use agv_core::maps::{Landmark, LandmarkKind};
 use agv_wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
 
 use crate::mapping::map_file;
+use crate::output_file;
 use crate::text_file::{self, TextFileError};
 
 /// How a layout is written.
@@ -146,7 +147,7 @@ pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
 /// If the file cannot be written, or the ending of its name is of no known format.
 pub fn save(path: &Path, landmarks: &[IdentifiedLandmark]) -> Result<(), TextFileError> {
     let text = write(landmarks, Format::of(path)?);
-    std::fs::write(path, text).map_err(|source| TextFileError::of_system(path, source))
+    output_file::write(path, text).map_err(|source| TextFileError::of_system(path, source))
 }
 
 /// Standard deviation of a surveyed reflector's place along each axis, m.

@@ -18,6 +18,7 @@ pub mod link;
 pub mod live;
 pub mod log;
 pub mod mapping;
+pub mod output_file;
 pub mod places;
 pub mod provision;
 pub mod recording;

@@ -1,18 +1,19 @@
 //! Logs as files.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use agv_core::localizer::{Localizer, Parameters};
+use agv_core::localizer::{Event, Localizer, Parameters};
 use agv_core::maps::Landmark;
 use agv_core::record::{
     self, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
-    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, Output, Record, Scratch,
+    LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, MAX_PAYLOAD, Output, Record, Scratch,
 };
 
 use crate::file_kind;
+use crate::output_file::OutputFile;
 use crate::recording::{Publishing, RecordedOutput, RecordedPose, Recording, keep};
 
 /// Name and version that this program leaves in its logs.
@@ -61,7 +62,7 @@ pub enum LogError {
         found: u8,
     },
     /// The header cannot be read, so nobody knows what vehicle it was.
-    #[error("{}: the log's header is missing{}", path.display(), damage.map(|damage| format!(" ({damage})")).unwrap_or_default())]
+    #[error("{}: the log's header, which tells the vehicle, is missing{}: this is a part of a log", path.display(), damage.map(|damage| format!(" ({damage})")).unwrap_or_default())]
     Header {
         /// The file.
         path: PathBuf,
@@ -77,16 +78,31 @@ pub enum LogError {
         offset: u64,
     },
     /// A record is longer than a frame can be.
-    #[error("{}: a record is too long for a log", path.display())]
+    #[error("{}: {what} does not fit into a record, which has at most {MAX_PAYLOAD} bytes", path.display())]
     TooLong {
         /// The file.
         path: PathBuf,
+        /// What is too long.
+        what: String,
     },
 }
 
 fn io_error(path: &Path, source: io::Error) -> LogError {
     let path = path.to_owned();
     if source.kind() == io::ErrorKind::NotFound { LogError::Missing { path } } else { LogError::Io { path, source } }
+}
+
+/// A record in a few words.
+fn describe(record: &Record) -> String {
+    match record {
+        Record::Event(Event::Scan(scan)) if scan.intensities.is_empty() => {
+            format!("a scan of {} beams", scan.ranges.len())
+        }
+        Record::Event(Event::Scan(scan)) => format!("a scan of {} beams with intensities", scan.ranges.len()),
+        Record::Event(Event::Reflectors(seen)) => format!("a set of {} reflectors", seen.observations.len()),
+        Record::Note(note) => format!("a note of {} bytes", note.len()),
+        _ => "what is to be written".to_owned(),
+    }
 }
 
 /// Reads a log record by record.
@@ -220,28 +236,29 @@ impl Reader {
     }
 }
 
-/// Writes a log record by record. What was written before the last [`Writer::flush`] survives a loss of power; of what
-/// came later, every whole record that reached the disk does.
+/// Writes a log record by record. It has its name when it is finished, and an older file of that name stays until then; or
+/// from [`Writer::take_name`] on. Then, what was written before the last [`Writer::flush`] survives a loss of power; of
+/// what came later, every whole record that reached the disk does.
 pub struct Writer {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: OutputFile,
     sequence: u32,
     frame: Vec<u8>,
 }
 
 impl Writer {
-    /// Begins a log; an older file of that name is replaced.
+    /// Begins a log.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn create(path: &Path, header: &Header) -> Result<Self, LogError> {
-        let file = File::create(path).map_err(|source| io_error(path, source))?;
+        let file = OutputFile::create(path).map_err(|source| io_error(path, source))?;
         let mut writer = Self::new(path, file, 0);
         writer.write(&Record::Header(*header))?;
         Ok(writer)
     }
 
-    /// Begins the log of a vehicle with a map; an older file of that name is replaced.
+    /// Begins the log of a vehicle with a map.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -285,16 +302,20 @@ impl Writer {
             Ok(file)
         };
         let file = open().map_err(|source| io_error(path, source))?;
-        Ok((Self::new(path, file, sequence), damages))
+        Ok((Self::new(path, OutputFile::direct(file), sequence), damages))
     }
 
-    fn new(path: &Path, file: File, sequence: u32) -> Self {
-        Self {
-            path: path.to_owned(),
-            file: BufWriter::with_capacity(1 << 16, file),
-            sequence,
-            frame: vec![0; MAX_FRAME],
-        }
+    fn new(path: &Path, file: OutputFile, sequence: u32) -> Self {
+        Self { path: path.to_owned(), file, sequence, frame: vec![0; MAX_FRAME] }
+    }
+
+    /// Gives the log its name now, so that what is flushed stays whatever happens. An older file of that name is given
+    /// another one, which is returned.
+    ///
+    /// # Errors
+    /// If the operating system refuses.
+    pub fn take_name(&mut self) -> Result<Option<PathBuf>, LogError> {
+        self.file.take_name().map_err(|source| io_error(&self.path, source))
     }
 
     /// Adds a record.
@@ -303,7 +324,7 @@ impl Writer {
     /// If the record is too long, or the file cannot be written.
     pub fn write(&mut self, record: &Record) -> Result<(), LogError> {
         let length = record::encode(record, self.sequence, &mut self.frame)
-            .map_err(|_| LogError::TooLong { path: self.path.clone() })?;
+            .map_err(|_| LogError::TooLong { path: self.path.clone(), what: describe(record) })?;
         self.file.write_all(&self.frame[..length]).map_err(|source| io_error(&self.path, source))?;
         self.sequence = self.sequence.wrapping_add(1);
         Ok(())
@@ -314,7 +335,7 @@ impl Writer {
     /// # Errors
     /// If the file cannot be written.
     pub fn flush(&mut self) -> Result<(), LogError> {
-        self.file.flush().and_then(|()| self.file.get_ref().sync_data()).map_err(|source| io_error(&self.path, source))
+        self.file.sync().map_err(|source| io_error(&self.path, source))
     }
 
     /// Says that the log is complete, and brings it to the disk.
@@ -323,7 +344,9 @@ impl Writer {
     /// If the file cannot be written.
     pub fn finish(mut self) -> Result<(), LogError> {
         self.write(&Record::End)?;
-        self.flush()
+        self.flush()?;
+        let Self { path, file, .. } = self;
+        file.finish().map_err(|source| io_error(&path, source))
     }
 }
 

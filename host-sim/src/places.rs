@@ -12,6 +12,7 @@ use agv_places::{
 use serde::{Deserialize, Serialize};
 
 use crate::import::{BEAMS, KEYPOINTS, PosedScan, RANGES};
+use crate::output_file;
 use crate::recording::RecordedScan;
 use crate::text_file::{self, TextFileError};
 
@@ -88,7 +89,7 @@ pub fn choose(scans: &[PosedScan], spacing: Spacing) -> Vec<StoredPlace> {
 pub fn write(path: &Path, places: Vec<StoredPlace>) -> Result<(), TextFileError> {
     let file = File { format: FORMAT.to_owned(), places };
     let text = serde_json::to_string(&file).map_err(|error| TextFileError::of_system(path, error.into()))?;
-    std::fs::write(path, text).map_err(|source| TextFileError::of_system(path, source))
+    output_file::write(path, text).map_err(|source| TextFileError::of_system(path, source))
 }
 
 /// Reads places.

@@ -99,7 +99,13 @@ pub fn read_unpacked(path: &Path, expected: &'static str) -> Result<String, Text
     text(path, bytes, expected)
 }
 
-fn text(path: &Path, bytes: Vec<u8>, expected: &'static str) -> Result<String, TextFileError> {
+/// What programs of Windows put before a text.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+fn text(path: &Path, mut bytes: Vec<u8>, expected: &'static str) -> Result<String, TextFileError> {
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
     if bytes.trim_ascii().is_empty() {
         return Err(TextFileError::Empty { path: path.to_owned() });
     }

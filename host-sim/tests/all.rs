@@ -1,6 +1,7 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod log;
+mod output_file;
 mod published;
 mod report;
 mod simulate;

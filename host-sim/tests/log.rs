@@ -236,6 +236,7 @@ fn what_is_flushed_is_on_the_disk() {
     let path = folder.path().join("drive.agvlog");
     let header = Header { software: "test", parameters: &parameters(), capacities: Capacities::default() };
     let mut writer = Writer::create(&path, &header).unwrap();
+    writer.take_name().unwrap();
     writer.write(&Record::Note("one")).unwrap();
     writer.flush().unwrap();
     let (records, damages) = listed(&path).unwrap();
@@ -269,7 +270,7 @@ fn other_files_are_refused_in_one_clear_line() {
     let (records, _) = listed(&path).unwrap();
     bytes.drain(..records[1].0 as usize);
     std::fs::write(&path, &bytes).unwrap();
-    assert_eq!(refusal(&path), ": the log's header is missing");
+    assert_eq!(refusal(&path), ": the log's header, which tells the vehicle, is missing: this is a part of a log");
 }
 
 #[test]

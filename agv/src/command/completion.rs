@@ -1,5 +1,8 @@
 //! `agv completion`.
 
+use std::io::{ErrorKind, Write};
+
+use anyhow::Context;
 use clap::CommandFactory;
 use clap_complete::Shell;
 
@@ -19,7 +22,14 @@ pub struct Completion {
 
 impl Completion {
     /// Runs the command; `Program` is the whole command line.
-    pub fn run<Program: CommandFactory>(self) {
-        clap_complete::generate(self.shell, &mut Program::command(), "agv", &mut std::io::stdout());
+    pub fn run<Program: CommandFactory>(self) -> anyhow::Result<()> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Program::command(), "agv", &mut script);
+        let mut output = std::io::stdout().lock();
+        match output.write_all(&script).and_then(|()| output.flush()) {
+            // As with `head`.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+            outcome => outcome.context("the result cannot be written"),
+        }
     }
 }

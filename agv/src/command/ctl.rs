@@ -125,7 +125,7 @@ pub fn read_key(path: &Path) -> anyhow::Result<[u8; 32]> {
 }
 
 /// A value as it is written on a command line or in a file, for a leaf that holds `like`.
-pub fn parse_value(text: &str, like: Value) -> anyhow::Result<Value> {
+pub fn parse_value(name: &str, text: &str, like: Value) -> anyhow::Result<Value> {
     let value = match like {
         Value::Number(_) => text.parse().ok().map(Value::Number),
         Value::Whole(_) => text.parse().ok().map(Value::Whole),
@@ -138,7 +138,7 @@ pub fn parse_value(text: &str, like: Value) -> anyhow::Result<Value> {
         Value::Switch(_) => "true or false",
         Value::Address(_) => "an address such as 192.168.1.10",
     };
-    value.with_context(|| format!("{text} is not {wanted}"))
+    value.with_context(|| format!("{name} must be {wanted}, not '{text}'"))
 }
 
 fn show(value: Value) -> String {
@@ -194,7 +194,7 @@ impl Ctl {
             Action::Get { name } => show_settings(&[client.get(name)?], self.json)?,
             Action::Set { name, value } => {
                 let like = client.get(name)?.value;
-                client.set(name, parse_value(value, like)?)?;
+                client.set(name, parse_value(name, value, like)?)?;
             }
             Action::Store => client.store()?,
             Action::Map { action: MapAction::Upload { file } } => {

@@ -10,13 +10,16 @@ use serde::Serialize;
 
 use super::progress;
 
-/// One drive, localised in four ways.
+/// Names of the options below.
+pub const OPTIONS: [&str; 2] = ["report", "json"];
+
+/// One drive, localised in five ways.
 #[derive(clap::Args)]
 pub struct Demonstration {
     /// Folder for the report and the log of the drive.
     #[arg(long, value_name = "DIR", default_value = "report")]
     report: PathBuf,
-    /// Print a JSON array instead of a table: for each way to localise its name and what `agv replay --json` has.
+    /// Print a JSON array instead of a table: for each way to localise its name and the figures that `agv replay --json` has.
     #[arg(long)]
     json: bool,
 }
@@ -51,25 +54,10 @@ impl Demonstration {
             return Ok(());
         }
         let mut lines = vec![
-            "A simulated drive, 12 m into a block storage, localised in four ways:".to_owned(),
+            format!("A simulated drive, 12 m into a block storage, localised in {} ways:", demonstration::WAYS),
             String::new(),
-            format!(
-                "{:<16} {:>29}   {:>29}   {:>5}   {:>9}",
-                "", "position error, mm", "heading error, deg", "NEES", "2 cm and"
-            ),
-            format!(
-                "{:<16} {:>8} {:>6} {:>6} {:>6}   {:>8} {:>6} {:>6} {:>6}   {:>5}   {:>9}",
-                "localised by", "median", "95 %", "max", "end", "median", "95 %", "max", "end", "(3)", "0.1 deg"
-            ),
         ];
-        for (drive, row) in drives.iter().zip(demonstration::table(&drives).rows) {
-            let [_, values @ .., ok] = &row[..] else { continue };
-            let name = drive.name;
-            let [p50, p95, pmax, pend, h50, h95, hmax, hend, nees] = values else { continue };
-            lines.push(format!(
-                "{name:<16} {p50:>8} {p95:>6} {pmax:>6} {pend:>6}   {h50:>8} {h95:>6} {hmax:>6} {hend:>6}   {nees:>5}   {ok:>7} %"
-            ));
-        }
+        lines.extend(table(&drives));
         if let Some(drive) = drives.last() {
             lines.push(String::new());
             lines.push(format!("replayed {:.0} times faster than real time", drive.figures.realtime_factor));
@@ -79,4 +67,28 @@ impl Demonstration {
         println!("{}", lines.join("\n"));
         Ok(())
     }
+}
+
+/// The figures in columns.
+fn table(drives: &[LocalisedDrive]) -> Vec<String> {
+    let width = drives.iter().map(|drive| drive.name.len()).max().unwrap_or_default();
+    let mut lines = vec![
+        format!(
+            "{:<width$} {:>29}   {:>29}   {:>5}   {:>9}",
+            "", "position error, mm", "heading error, deg", "NEES", "2 cm and"
+        ),
+        format!(
+            "{:<width$} {:>8} {:>6} {:>6} {:>6}   {:>8} {:>6} {:>6} {:>6}   {:>5}   {:>9}",
+            "localised by", "median", "95 %", "max", "end", "median", "95 %", "max", "end", "(3)", "0.1 deg"
+        ),
+    ];
+    for (drive, row) in drives.iter().zip(demonstration::table(drives).rows) {
+        let [_, values @ .., ok] = &row[..] else { continue };
+        let name = drive.name;
+        let [p50, p95, pmax, pend, h50, h95, hmax, hend, nees] = values else { continue };
+        lines.push(format!(
+            "{name:<width$} {p50:>8} {p95:>6} {pmax:>6} {pend:>6}   {h50:>8} {h95:>6} {hmax:>6} {hend:>6}   {nees:>5}   {ok:>7} %"
+        ));
+    }
+    lines
 }

@@ -123,6 +123,14 @@ impl Import {
     fn import_raw(&self, progress: &ProgressBar, bytes: Vec<RawBytes>) -> anyhow::Result<()> {
         progress.set_message(format!("writing {}", self.output.display()));
         let mut drive = like::drive_like(self.like.as_deref())?;
+        if !raw::means_something(&drive, &bytes, &self.encoders.nodes()) {
+            let like = if self.like.is_none() { "state the vehicle with --like LOG, and " } else { "" };
+            bail!(
+                "{}: no position of two encoders and no revolution of a laser is in it; {like}the nodes with --drive and \
+                 --steering",
+                self.input.display()
+            );
+        }
         raw::write(&self.output, &mut drive, &bytes, &self.encoders.nodes())?;
         progress.finish_and_clear();
         Summary::of(&drive).print(self.json)

@@ -6,9 +6,11 @@
 pub mod calibrate;
 pub mod campaign;
 pub mod can;
+pub mod complaint;
 pub mod completion;
 pub mod ctl;
 pub mod demonstration;
+mod drive_summary;
 pub mod emulate;
 mod encoder_arguments;
 pub mod evaluate;

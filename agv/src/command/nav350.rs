@@ -8,6 +8,7 @@ use agv_host_sim::layout_file;
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::{Client, Happening, Link, PORT, address};
 use agv_host_sim::log;
+use agv_host_sim::recording::Recording;
 use agv_host_sim::serve::nav350::{Drive, Nav350 as Sensor, Options};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
@@ -16,7 +17,7 @@ use agv_wire::nav350::{
     Answer, Configuration, ErrorCode, IdentifiedLandmark, LANDMARKS_A_TELEGRAM, Method, MethodResult, OperatingMode,
     Request, Revolution, SensorFrame, UserLevel, Value, Variable,
 };
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::Subcommand;
 
 use super::output::{note, print_rows};
@@ -70,6 +71,10 @@ struct Serve {
     /// How much faster than real time the drive goes.
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
+    /// Time from the acknowledgement of a slow method, as a change of mode, to its result, ms; at 0 both leave in one
+    /// piece. There are clients that need the one or the other.
+    #[arg(long, value_name = "MS", default_value_t = 0.0)]
+    gap: f64,
     /// The only dialect that is understood; both if absent.
     #[arg(long)]
     dialect: Option<DialectChoice>,
@@ -153,10 +158,11 @@ impl Serve {
         if !(self.speed > 0.0 && self.speed.is_finite()) {
             bail!("the speed must be greater than zero");
         }
+        ensure!((0.0..=MOST_GAP).contains(&self.gap), "--gap must be from 0 to {MOST_GAP:.0} ms");
         let recording = match (&self.log, &self.scenario) {
             (Some(path), _) => log::read(path)?.0,
-            (None, Some(path)) => simulate(&Scenario::read(path)?)?.recording,
-            (None, None) => simulate(&Scenario::default())?.recording,
+            (None, Some(path)) => measuring_strengths(Scenario::read(path)?)?,
+            (None, None) => measuring_strengths(Scenario::default())?,
         };
         let drive = Drive::new(&recording, SensorFrame::default())?;
         let listener = TcpListener::bind(("0.0.0.0", self.port)).with_context(|| format!("port {}", self.port))?;
@@ -168,11 +174,21 @@ impl Serve {
                 speed: self.speed,
                 clock_start: self.clock,
                 dialect: self.dialect.map(Into::into),
+                gap: 1e-3 * self.gap,
                 ..Options::default()
             },
         );
         Ok(sensor.serve(&listener, &AtomicBool::new(false))?)
     }
+}
+
+/// Longest gap, ms: a client that waits longer for a result takes the sensor for silent.
+const MOST_GAP: f64 = 10_000.0;
+
+/// A simulated drive with the strengths of echoes, which the sensor always measures.
+fn measuring_strengths(mut scenario: Scenario) -> anyhow::Result<Recording> {
+    scenario.laser.intensities = true;
+    Ok(simulate(&scenario)?.recording)
 }
 
 fn probe(host: &str) -> anyhow::Result<Vec<[String; 2]>> {
@@ -266,9 +282,24 @@ fn download(client: &mut Client) -> anyhow::Result<Vec<IdentifiedLandmark>> {
             Answer::Result(MethodResult::Landmarks(ErrorCode::OK, piece)) => Ok(piece.iter().collect::<Vec<_>>()),
             other => Err(complaint(other)),
         })?;
-        landmarks.extend(piece.map_err(anyhow::Error::msg)?);
+        let piece = piece.map_err(anyhow::Error::msg)?;
+        check_ids(ids, &piece)?;
+        landmarks.extend(piece);
     }
     Ok(landmarks)
+}
+
+/// Whether these are the landmarks that were asked for.
+fn check_ids(wanted: &[u16], got: &[IdentifiedLandmark]) -> anyhow::Result<()> {
+    let mut wanted = wanted.to_vec();
+    let mut found: Vec<u16> = got.iter().map(|landmark| landmark.id).collect();
+    wanted.sort_unstable();
+    found.sort_unstable();
+    ensure!(
+        wanted == found,
+        "the sensor gives other landmarks than it was asked for: {found:?} instead of {wanted:?}; nothing is written"
+    );
+    Ok(())
 }
 
 fn upload(client: &mut Client, landmarks: &[IdentifiedLandmark]) -> anyhow::Result<()> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use agv_host_sim::provision::flash_image;
-use agv_host_sim::{layout_file, log};
+use agv_host_sim::{layout_file, log, output_file};
 use agv_settings::Settings;
 use agv_settings::leaf::{Leaf, LeafError};
 use anyhow::{Context, bail};
@@ -57,7 +57,7 @@ impl Provision {
             let (name, value) = text.split_once('=').with_context(|| format!("{text} is not NAME=VALUE"))?;
             let leaf = Leaf::named(name).with_context(|| format!("there is no setting of the name {name}"))?;
             let like = leaf.get(&settings).with_context(|| format!("the vehicle has no setting {name}"))?;
-            match leaf.set(&mut settings, parse_value(value, like)?) {
+            match leaf.set(&mut settings, parse_value(name, value, like)?) {
                 Ok(()) => {}
                 Err(LeafError::Bounds) => {
                     let (least, most) = leaf.bounds;
@@ -67,6 +67,6 @@ impl Provision {
             }
         }
         let image = flash_image(&settings, &landmarks, Some(&key))?;
-        std::fs::write(&self.output, image).with_context(|| self.output.display().to_string())
+        output_file::write(&self.output, image).with_context(|| self.output.display().to_string())
     }
 }

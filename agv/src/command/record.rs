@@ -9,21 +9,23 @@ use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::{Link, address};
-use agv_host_sim::live::{self, CanSummary, LiveError, Recorder, Summary};
+use agv_host_sim::live::{self, CanSummary, Limits, LiveError, Recorder, Summary};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{bus, log};
 use agv_wire::nav350::Configuration;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use serde::Serialize;
 
 use super::encoder_arguments::EncoderArguments;
 use super::like;
-use super::output::print_rows;
+use super::output::{note, print_rows};
 use super::progress;
 use super::stop;
 
 const HELP: &str = "\
-Ends after --duration or --scans, or with Ctrl-C. What is older than a second survives a loss of power.
+Ends after --duration or --scans, or with Ctrl-C, and after 30 s if a sensor has measured nothing by then, unless with --wait.
+What is older than a second survives a loss of power. The log is there from the first datum on; an older one of its name is
+then renamed to LOG.old.
 
 Examples:
   agv record --nav350 192.168.1.10 --can can0 --like hall.agvlog --output drive.agvlog
@@ -52,13 +54,19 @@ pub struct Record {
     /// End after at least so many scans of the NAV350.
     #[arg(long, value_name = "COUNT", requires = "nav350")]
     scans: Option<usize>,
-    /// Log to write; an older one is replaced.
+    /// Wait for the first datum for as long as it takes.
+    #[arg(long)]
+    wait: bool,
+    /// Log to write; an older one is renamed to LOG.old when the first datum has come.
     #[arg(short, long, value_name = "LOG")]
     output: PathBuf,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }
+
+/// How long the first datum may take, s.
+const PATIENCE: f64 = 30.0;
 
 #[derive(Serialize)]
 struct Recorded {
@@ -82,32 +90,47 @@ impl Record {
         let recorder = self.begin(&parameters, &landmarks)?;
         let is_stopped = stop::on_interrupt()?;
         let clock = Clock::new(1.0);
-        let until = match self.duration {
-            Some(seconds) => clock.now().offset(seconds),
-            None => Time::from_micros(u64::MAX),
+        let start = clock.now();
+        let never = Time::from_micros(u64::MAX);
+        let limits = Limits {
+            until: self.duration.map_or(never, |seconds| start.offset(seconds)),
+            first: if self.wait { never } else { start.offset(PATIENCE) },
         };
         // Shown on a terminal only.
         let progress = progress::spinner().with_message(format!("recording to {}", self.output.display()));
         progress.enable_steady_tick(Duration::from_millis(200));
         let (nav350, can) = std::thread::scope(|scope| {
             let can = scope.spawn(|| {
-                let outcome = self.record_can(&parameters, clock, until, &is_stopped, &recorder);
-                // The other sensor is not to be recorded for hours after the bus could not be opened.
-                if outcome.is_err() {
+                let outcome = self.record_can(&parameters, clock, &limits, &is_stopped, &recorder);
+                // The other sensor is not to be recorded for hours without the bus.
+                if !outcome.as_ref().is_ok_and(|can| self.can.is_none() || can.frames > 0) {
                     is_stopped.store(true, Ordering::Relaxed);
                 }
                 outcome
             });
-            let nav350 = self.record_nav350(clock, until, &is_stopped, &recorder);
-            if self.scans.is_some() || nav350.is_err() {
+            let nav350 = self.record_nav350(clock, &limits, &is_stopped, &recorder);
+            let has_laser = |laser: &Summary| self.nav350.is_none() || !laser.is_empty();
+            if self.scans.is_some() || !nav350.as_ref().is_ok_and(has_laser) {
                 is_stopped.store(true, Ordering::Relaxed);
             }
             (nav350, can.join())
         });
-        recorder.finish()?;
         progress.finish_and_clear();
+        let has_data = recorder.has_data();
+        if let Some(old) = recorder.set_aside() {
+            note(&format!("agv: the older log is now {}", old.display()));
+        }
+        // Without a datum nothing remains of the log, and an older one stays.
+        if has_data {
+            recorder.finish()?;
+        }
         let can = can.ok().context("the recording of the bus broke down")??;
         let nav350 = nav350?;
+        let seconds = clock.now().since(start);
+        self.complain(&nav350, &can, seconds, has_data)?;
+        if self.can.is_some() && can.samples == 0 {
+            note("agv: frames came, but no sample of two encoders; --drive and --steering state their nodes");
+        }
         self.print(&Recorded {
             scans: nav350.scans,
             reflector_sets: nav350.reflectors,
@@ -120,35 +143,52 @@ impl Record {
         })
     }
 
+    /// What is wrong if a sensor has measured nothing.
+    fn complain(&self, nav350: &Summary, can: &CanSummary, seconds: f64, has_data: bool) -> anyhow::Result<()> {
+        let mut silent = Vec::new();
+        if let Some(host) = &self.nav350
+            && nav350.is_empty()
+        {
+            let reason = nav350.reason.map_or_else(String::new, |reason| format!(" ({reason})"));
+            silent.push(format!("{}: nothing was measured in {seconds:.0} s{reason}", address(host)));
+        }
+        if let Some(name) = &self.can
+            && can.frames == 0
+        {
+            silent.push(format!("{name}: no frame came in {seconds:.0} s"));
+        }
+        let kept = if has_data { "what the other said is in" } else { "nothing is written to" };
+        ensure!(silent.is_empty(), "{}; {kept} {}", silent.join("; "), self.output.display());
+        Ok(())
+    }
+
     fn begin(&self, parameters: &Parameters, landmarks: &[Landmark]) -> anyhow::Result<Recorder> {
-        let mut writer = log::Writer::begin(&self.output, parameters, landmarks)?;
-        writer.flush()?;
-        Ok(Recorder::new(writer))
+        Ok(Recorder::new(log::Writer::begin(&self.output, parameters, landmarks)?))
     }
 
     fn record_nav350(
         &self,
         clock: Clock,
-        until: Time,
+        limits: &Limits,
         is_stopped: &AtomicBool,
         recorder: &Recorder,
     ) -> Result<Summary, log::LogError> {
         let Some(host) = &self.nav350 else { return Ok(Summary::default()) };
         let mut link = Link::new(&address(host), Configuration::default(), clock);
-        live::record_nav350(&mut link, until, self.scans.unwrap_or(usize::MAX), is_stopped, recorder)
+        live::record_nav350(&mut link, limits, self.scans.unwrap_or(usize::MAX), is_stopped, recorder)
     }
 
     fn record_can(
         &self,
         parameters: &Parameters,
         clock: Clock,
-        until: Time,
+        limits: &Limits,
         is_stopped: &AtomicBool,
         recorder: &Recorder,
     ) -> Result<CanSummary, LiveError> {
         let Some(name) = &self.can else { return Ok(CanSummary::default()) };
         let nodes = self.encoders.nodes();
-        live::record_can(|| bus::open(name), &nodes, parameters, clock, until, is_stopped, recorder)
+        live::record_can(|| bus::open(name), &nodes, parameters, clock, limits, is_stopped, recorder)
     }
 
     fn print(&self, recorded: &Recorded) -> anyhow::Result<()> {

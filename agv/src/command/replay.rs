@@ -11,12 +11,12 @@ use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::map_file;
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
-use agv_host_sim::replay::{Comparison, compare, compare_published, replay};
+use agv_host_sim::replay::{Comparisons, replay};
 use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
-use serde::Serialize;
 
+use super::drive_summary::DriveSummary;
 use super::lidar3d::relocalise::Relocalisation;
 use super::{output, pose_argument, progress};
 
@@ -102,30 +102,6 @@ fn start(text: &str) -> Result<Start, String> {
     pose_argument::pose(text).map(Start::Given).map_err(|_| problem())
 }
 
-#[derive(Serialize)]
-struct Summary<'a> {
-    /// Program that wrote the log.
-    software: &'a str,
-    #[serde(flatten)]
-    figures: &'a Figures,
-    outputs: Option<Comparison>,
-    published: Option<Comparison>,
-    damage: Vec<DamageEntry>,
-}
-
-/// How what the log says the controller has said compares with the replay.
-struct Said {
-    outputs: Comparison,
-    published: Comparison,
-}
-
-#[derive(Serialize)]
-struct DamageEntry {
-    offset: u64,
-    skipped: u64,
-    reason: String,
-}
-
 impl Replay {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
@@ -152,7 +128,13 @@ impl Replay {
             ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
         }
         for path in &self.map {
-            use_map(&mut recording, map_file::read(path)?);
+            let map = map_file::read(path)?;
+            ensure!(
+                !map.is_empty(),
+                "{}: there are no landmarks in the map; --landmarks none uses none",
+                path.display()
+            );
+            use_map(&mut recording, map);
         }
         if !self.landmarks.is_empty() {
             recording.parameters.maps = self.maps()?;
@@ -162,16 +144,17 @@ impl Replay {
         let replay = replay(&recording, |events| running.set_position(events as u64))
             .with_context(|| self.log.display().to_string())?;
         running.finish_and_clear();
-        let said = is_as_recorded.then(|| Said {
-            outputs: compare(&outputs, &replay),
-            published: compare_published(&recording, &publishing, &replay),
-        });
+        let comparisons = if is_as_recorded {
+            Comparisons::of(&outputs, &publishing, &recording, &replay)
+        } else {
+            Comparisons::default()
+        };
         if let Some(path) = &self.output {
             log::write_with_outputs(path, &recording, |event| replay.output(event))?;
         }
         let track = Track::new(&recording, &replay);
         let figures = Figures::new(&recording, &replay, &track);
-        let mut remarks = self.remarks(&software, said.as_ref(), &damages);
+        let mut remarks = self.remarks(&software, &comparisons, &damages);
         if figures.poses == 0 {
             remarks.push(["start".to_owned(), "no pose is given in the log; --start gives one".to_owned()]);
         }
@@ -183,20 +166,7 @@ impl Replay {
             page.write(&path).with_context(|| path.display().to_string())?;
         }
         if self.json {
-            let damage = damages.iter().map(|damage| DamageEntry {
-                offset: damage.offset,
-                skipped: damage.skipped,
-                reason: damage.reason.to_string(),
-            });
-            let compared =
-                |comparison: fn(&Said) -> Comparison| said.as_ref().map(comparison).filter(|it| it.compared > 0);
-            let summary = Summary {
-                software: &software,
-                figures: &figures,
-                outputs: compared(|said| said.outputs),
-                published: compared(|said| said.published),
-                damage: damage.collect(),
-            };
+            let summary = DriveSummary::new(&software, &figures, comparisons, &damages);
             println!("{}", serde_json::to_string_pretty(&summary)?);
             return Ok(());
         }
@@ -211,7 +181,11 @@ impl Replay {
 
     fn maps(&self) -> anyhow::Result<MapUse> {
         let has = |wanted| self.landmarks.contains(&wanted);
-        ensure!(!has(Landmarks::None) || self.landmarks.len() == 1, "--landmarks: 'none' goes with nothing else");
+        if has(Landmarks::None) && self.landmarks.len() > 1 {
+            // The command line is wrong, as with a word that is no kind.
+            eprintln!("error: --landmarks: 'none' goes with nothing else");
+            std::process::exit(2);
+        }
         Ok(MapUse {
             reflectors: has(Landmarks::Reflectors),
             features: has(Landmarks::Features),
@@ -221,7 +195,7 @@ impl Replay {
     }
 
     /// What there is to say about the log itself.
-    fn remarks(&self, software: &str, said: Option<&Said>, damages: &[Damage]) -> Vec<[String; 2]> {
+    fn remarks(&self, software: &str, comparisons: &Comparisons, damages: &[Damage]) -> Vec<[String; 2]> {
         let mut rows =
             vec![["log".to_owned(), self.log.display().to_string()], ["written by".to_owned(), software.to_owned()]];
         rows.extend(self.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
@@ -233,10 +207,7 @@ impl Replay {
         if damages.len() > LISTED_DAMAGES {
             rows.push(["damage".to_owned(), format!("in {} more places", damages.len() - LISTED_DAMAGES)]);
         }
-        if let Some(said) = said {
-            rows.extend(said.outputs.verdict().map(|verdict| ["outputs".to_owned(), verdict]));
-            rows.extend(said.published.verdict().map(|verdict| ["published".to_owned(), verdict]));
-        }
+        rows.extend(comparisons.remarks());
         rows
     }
 }

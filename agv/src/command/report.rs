@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use agv_core::record::Damage;
 use agv_host_sim::drive::{Figures, ReplayedDrive, Track, report_page};
 use agv_host_sim::log::{self, Contents};
-use agv_host_sim::replay::{compare, compare_published, replay};
+use agv_host_sim::replay::{Comparisons, replay};
 use agv_host_sim::report::write_pdf;
 use anyhow::{Context, ensure};
 use serde::Serialize;
 
+use super::drive_summary::DriveSummary;
 use super::{output, progress};
 
 const HELP: &str = "\
@@ -41,14 +43,15 @@ const MOST: usize = 7;
 struct Entry<'a> {
     name: &'a str,
     #[serde(flatten)]
-    figures: &'a Figures,
+    summary: DriveSummary<'a>,
 }
 
 impl Report {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         ensure!(self.logs.len() <= MOST, "at most {MOST} logs fit side by side");
-        let mut drives: Vec<ReplayedDrive> = self.logs.iter().map(|path| drive(path)).collect::<Result<_, _>>()?;
+        let replayed: Vec<_> = self.logs.iter().map(|path| replayed(path)).collect::<Result<_, _>>()?;
+        let (mut drives, about): (Vec<_>, Vec<_>) = replayed.into_iter().unzip();
         name_apart(&mut drives, &self.logs);
         let page = report_page(&drives)?;
         page.write(&self.output).with_context(|| self.output.display().to_string())?;
@@ -56,8 +59,7 @@ impl Report {
             write_pdf(&self.output, pdf)?;
         }
         if self.json {
-            let entries: Vec<_> =
-                drives.iter().map(|drive| Entry { name: &drive.name, figures: &drive.figures }).collect();
+            let entries: Vec<_> = drives.iter().zip(&about).map(|(drive, about)| about.entry(drive)).collect();
             println!("{}", serde_json::to_string_pretty(&entries)?);
             return Ok(());
         }
@@ -68,24 +70,36 @@ impl Report {
     }
 }
 
+/// What there is to say about a log beside its figures.
+struct About {
+    software: String,
+    comparisons: Comparisons,
+    damages: Vec<Damage>,
+}
+
+impl About {
+    fn entry<'a>(&'a self, drive: &'a ReplayedDrive) -> Entry<'a> {
+        let summary = DriveSummary::new(&self.software, &drive.figures, self.comparisons, &self.damages);
+        Entry { name: &drive.name, summary }
+    }
+}
+
 /// Replays a log.
-fn drive(path: &Path) -> anyhow::Result<ReplayedDrive> {
+fn replayed(path: &Path) -> anyhow::Result<(ReplayedDrive, About)> {
     let Contents { software, recording, outputs, publishing, damages } = log::read_contents(path, |_| ())?;
     let bar = progress::bar("replaying", recording.events.len() as u64);
     let replay =
         replay(&recording, |events| bar.set_position(events as u64)).with_context(|| path.display().to_string())?;
     bar.finish_and_clear();
-    let mut remarks = vec![["written by".to_owned(), software]];
-    for (what, comparison) in
-        [("outputs", compare(&outputs, &replay)), ("published", compare_published(&recording, &publishing, &replay))]
-    {
-        remarks.extend(comparison.verdict().map(|verdict| [what.to_owned(), verdict]));
-    }
-    remarks.push(["damage".to_owned(), format!("in {} places", damages.len())]);
+    let comparisons = Comparisons::of(&outputs, &publishing, &recording, &replay);
+    let mut remarks = vec![["written by".to_owned(), software.clone()]];
+    remarks.extend(comparisons.remarks());
+    remarks.push(["places with damage".to_owned(), damages.len().to_string()]);
     let track = Track::new(&recording, &replay);
     let figures = Figures::new(&recording, &replay, &track);
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(ReplayedDrive { name, remarks, recording, replay, track, figures })
+    let drive = ReplayedDrive { name, remarks, recording, replay, track, figures };
+    Ok((drive, About { software, comparisons, damages }))
 }
 
 /// Logs of one name in different folders are told apart by their paths.

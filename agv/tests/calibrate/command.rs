@@ -79,7 +79,7 @@ fn bad_input_is_refused_in_one_line() {
     assert!(refusal(&["calibrate", "plan", "--area", "3x3"]).contains("larger"));
     for (text, part) in [
         ("wheel_base = 1.5\n", "wheel_base"),
-        ("laser_x_m = 0.1\nwheelbase_m = -1.5\n", ":2: wheelbase_m must be positive"),
+        ("laser_x_m = 0.1\nwheelbase_m = -1.5\n", ":2: wheelbase_m must be from 0.05 to 50, and is -1.5"),
         ("laser_x_m = nan\n", "laser_x_m"),
     ] {
         let vehicle = files.write("vehicle.toml", text.as_bytes());

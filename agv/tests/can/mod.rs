@@ -5,4 +5,5 @@ mod candump;
 mod description;
 mod encoders;
 mod record;
+mod sdo_server;
 mod slcan;

@@ -14,7 +14,7 @@ use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::export;
 use agv_host_sim::import::{candump, raw};
 use agv_host_sim::link::clock::Clock;
-use agv_host_sim::live::{self, CanSummary, Recorder};
+use agv_host_sim::live::{self, CanSummary, Limits, Recorder};
 use agv_host_sim::log::{self, Reader, Writer};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::simulate::scenario::Scenario;
@@ -92,7 +92,8 @@ fn record(path: &Path, recording: &Recording, is_synchronous: bool, frames_a_bus
             };
             let until = clock.now().offset(until);
             let parameters = &recording.parameters;
-            live::record_can(open, &nodes(is_synchronous), parameters, clock, until, &never, &recorder).unwrap()
+            live::record_can(open, &nodes(is_synchronous), parameters, clock, &Limits::until(until), &never, &recorder)
+                .unwrap()
         };
         let timer = scope.spawn(|| {
             let end = Instant::now() + Duration::from_secs_f64(0.5 * seconds);

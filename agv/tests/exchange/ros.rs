@@ -175,8 +175,47 @@ fn the_recording_of_another_vehicle_is_imported() {
             }
         }
         let complaint = refusal(&["import", "rosbag2", &bag, "--scan-topic", "/rear/scan", "-o", &back]);
-        assert!(complaint.contains("/front/scan"), "{complaint}");
+        assert!(complaint.contains("no topic /rear/scan") && complaint.contains("can be /front/scan"), "{complaint}");
     }
+}
+
+#[test]
+fn a_laser_that_hangs_upside_down_shows_the_world_the_right_way_round() {
+    let test = "a_laser_that_hangs_upside_down_shows_the_world_the_right_way_round";
+    let Some(_) = python(test, "rosbags, numpy") else { return };
+    let files = Files::new();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/exchange/vehicle_bag.py");
+    let imported = |roll: &str, options: &[&str]| {
+        let [bag, back] = [format!("bag{roll}"), format!("{roll}.agvlog")].map(|name| files.path(&name));
+        if !Path::new(&bag).exists() {
+            let output =
+                python(test, "rosbags, numpy").unwrap().arg(&script).args([&bag, "mcap", roll]).output().unwrap();
+            assert!(output.status.success(), "{}", text(&output.stderr));
+        }
+        (bag.clone(), agv(&[&["import", "rosbag2", &bag, "-o", &back], options].concat()), back)
+    };
+    for options in [&[][..], &["--laser", "1.2,0.5,90"]] {
+        // A degree of tilt is that of any bracket.
+        for (roll, sign) in [("0", 1.0), ("1", 1.0), ("180", -1.0), ("-179", -1.0)] {
+            let (_, output, back) = imported(roll, options);
+            assert!(output.status.success(), "{roll}: {}", text(&output.stderr));
+            let (recording, _) = log::read(Path::new(&back)).unwrap();
+            let laser = *recording.parameters.lasers.first();
+            assert!((laser.x - 1.2).abs() < 1e-3 && (laser.y - 0.5).abs() < 1e-9);
+            assert!((laser.theta - std::f64::consts::FRAC_PI_2).abs() < 1e-3);
+            let scan = recording.events.iter().find_map(|event| match event {
+                RecordedEvent::Scan(scan) => Some(scan),
+                _ => None,
+            });
+            let scan = scan.unwrap();
+            // The first beam looks to the right of the laser's first axis, or to the left of it if it hangs.
+            assert!((scan.first_bearing + sign * std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{roll}");
+            assert!((scan.bearing_step - sign * 0.017_453).abs() < 1e-6, "{roll}");
+        }
+    }
+    let (bag, output, _) = imported("30", &[]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains(&bag) && text(&output.stderr).contains("tilted by 30 deg"));
 }
 
 #[test]

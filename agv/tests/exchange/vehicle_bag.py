@@ -1,4 +1,7 @@
-"""Writes the recording of another vehicle: argument 1 is the folder, argument 2 the storage, mcap or sqlite3."""
+"""Writes the recording of another vehicle: argument 1 is the folder, argument 2 the storage, mcap or sqlite3.
+
+Argument 3 is the roll of the laser in degrees: at 180 it hangs upside down, and measures the same things in the other order.
+"""
 
 import math
 import sys
@@ -32,6 +35,14 @@ def transform(parent, child, x, y, heading):
     return new("geometry_msgs/msg/TransformStamped", header(1.7e9, parent), child, new("geometry_msgs/msg/Transform", moved, turned))
 
 
+def rolled(stamped, roll):
+    """The same transform, turned about its own first axis before."""
+    z, w = stamped.transform.rotation.z, stamped.transform.rotation.w
+    sine, cosine = math.sin(roll / 2), math.cos(roll / 2)
+    stamped.transform.rotation = new("geometry_msgs/msg/Quaternion", w * sine, z * sine, z * cosine, w * cosine)
+    return stamped
+
+
 def odometry(time, x, y, heading):
     nothing = np.zeros(36)
     still = new("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)
@@ -48,6 +59,7 @@ def scan(time, number):
     return new("sensor_msgs/msg/LaserScan", header(time, "front_laser"), *angles, 0.0002, 0.1, 0.1, 30.0, ranges, strengths)
 
 
+roll = math.radians(float(sys.argv[3])) if len(sys.argv) > 3 else 0.0
 storage = StoragePlugin.MCAP if sys.argv[2] == "mcap" else StoragePlugin.SQLITE3
 with Writer(Path(sys.argv[1]), version=9, storage_plugin=storage) as writer:
     def channel(topic, kind):
@@ -61,7 +73,7 @@ with Writer(Path(sys.argv[1]), version=9, storage_plugin=storage) as writer:
     scans = channel("/front/scan", "sensor_msgs/msg/LaserScan")
     others = channel("/chatter", "std_msgs/msg/String")
     # The laser stands on a mast, which stands on the vehicle.
-    chain = [transform("mast", "front_laser", 0.2, 0.0, math.pi / 2), transform("base_link", "mast", 1.0, 0.5, 0.0)]
+    chain = [rolled(transform("mast", "front_laser", 0.2, 0.0, math.pi / 2), roll), transform("base_link", "mast", 1.0, 0.5, 0.0)]
     write(statics, 1.7e9, new("tf2_msgs/msg/TFMessage", chain))
     write(others, 1.7e9, new("std_msgs/msg/String", "nothing of interest"))
     for step in range(20):

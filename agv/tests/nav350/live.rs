@@ -15,7 +15,7 @@ use agv_core::record::{Item, RawSource, Record};
 use agv_host_sim::import::raw::{self, Bus, EventMaker};
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::Link;
-use agv_host_sim::live::{self, Recorder, Summary};
+use agv_host_sim::live::{self, Limits, Recorder, Summary};
 use agv_host_sim::log::{self, Reader, Writer};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options, Turn};
@@ -76,7 +76,7 @@ fn record(address: SocketAddr, recording: &Recording, seconds: f64, first: Diale
     let mut link = Link::new(&address.to_string(), configuration, clock);
     let is_stopped = AtomicBool::new(false);
     let until = clock.now().offset(seconds);
-    let summary = live::record_nav350(&mut link, until, usize::MAX, &is_stopped, &recorder).unwrap();
+    let summary = live::record_nav350(&mut link, &Limits::until(until), usize::MAX, &is_stopped, &recorder).unwrap();
     recorder.finish().unwrap();
     summary
 }
@@ -126,7 +126,8 @@ fn what_is_recorded_is_what_was_served() {
         let drive = Drive::new(&recording, SensorFrame::default()).unwrap();
         let turns = drive.turns().to_vec();
         // The clock wraps during the drive.
-        let options = Options { speed: SPEED, clock_start: u32::MAX - 8000, dialect: Some(dialect), stands: false };
+        let options =
+            Options { speed: SPEED, clock_start: u32::MAX - 8000, dialect: Some(dialect), ..Options::default() };
         let sensor = Nav350::new(drive, options);
         let (listener, address) = listener();
         let folder = tempfile::tempdir().unwrap();

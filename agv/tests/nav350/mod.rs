@@ -1,9 +1,10 @@
 //! The NAV350: recorded telegrams, the emulated sensor, and what is recorded from it.
 
 mod capture;
-mod commands;
+pub mod commands;
 mod layout;
 mod live;
 mod minute;
 mod recorded;
+mod third_party;
 mod turns;

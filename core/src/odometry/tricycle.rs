@@ -39,7 +39,8 @@ impl Kinematics for Tricycle {
 
     fn step(&self, from: &EncoderSample, to: &EncoderSample, duration: f64, believed: &Believed) -> Step {
         let ticks = self.drive_range.step(from.drive, to.drive);
-        let is_backward = if ticks == 0 { believed.was_backward } else { ticks < 0 };
+        // A counter that counts the wrong way has a negative scale.
+        let is_backward = if ticks == 0 { believed.was_backward } else { (ticks < 0) != (self.drive_scale < 0.0) };
         let offset = if is_backward { self.steering_offset_backward } else { self.steering_offset_forward };
         let angle = |reading: u32| self.steering_scale * self.steering_range.signed(reading) as f64 + offset;
         let control = Control {

@@ -45,7 +45,7 @@ pub enum Refusal {
         all: usize,
     },
     /// There are too few segments.
-    #[error("there are {found} segments with motion, and {needed} are needed")]
+    #[error("{needed} segments with motion are needed; found: {found}")]
     TooFewSegments {
         /// What there is.
         found: usize,

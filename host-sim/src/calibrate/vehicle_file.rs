@@ -16,10 +16,11 @@
 use std::path::Path;
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::Parameters;
+use agv_core::localizer::{Parameters, bounds};
 use agv_core::odometry::{Tricycle, Vehicle};
 use serde::{Deserialize, Serialize};
 
+use crate::output_file;
 use crate::text_file::{self, TextFileError};
 
 /// Parameters of a tricycle and its laser.
@@ -42,6 +43,14 @@ pub struct VehicleFile {
     pub laser_y_m: Option<f64>,
     /// The same.
     pub laser_theta_rad: Option<f64>,
+}
+
+/// One line of the file.
+struct Entry {
+    name: &'static str,
+    /// What the firmware's settings call it.
+    setting: &'static str,
+    value: Option<f64>,
 }
 
 impl VehicleFile {
@@ -79,20 +88,31 @@ impl VehicleFile {
         }
     }
 
-    fn problem(&self) -> Option<(&'static str, &'static str)> {
-        let positive = [("wheelbase_m", self.wheelbase_m), ("drive_scale_m_per_tick", self.drive_scale_m_per_tick)];
-        let finite = [
-            ("steering_scale_rad_per_tick", self.steering_scale_rad_per_tick),
-            ("steer_offset_forward_rad", self.steer_offset_forward_rad),
-            ("steer_offset_backward_rad", self.steer_offset_backward_rad),
-            ("laser_x_m", self.laser_x_m),
-            ("laser_y_m", self.laser_y_m),
-            ("laser_theta_rad", self.laser_theta_rad),
-        ];
-        let is_bad = |value: Option<f64>| value.is_some_and(|value| !(value.is_finite() && value.abs() < 1000.0));
-        let not_positive = |value: Option<f64>| is_bad(value) || value.is_some_and(|value| value <= 0.0);
-        let first = positive.iter().find(|(_, value)| not_positive(*value)).map(|(name, _)| (*name, "positive"));
-        first.or_else(|| finite.iter().find(|(_, value)| is_bad(*value)).map(|(name, _)| (*name, "a finite number")))
+    /// The first entry that no vehicle has, and what it must be.
+    fn problem(&self) -> Option<(&'static str, String)> {
+        self.entries().into_iter().find_map(|Entry { name, setting, value }| {
+            let (value, (least, most)) = (value?, bounds(setting)?);
+            let is_scale = name.ends_with("_per_tick");
+            if is_scale && value == 0.0 {
+                return Some((name, "anything but 0".to_owned()));
+            }
+            // Not a number is within no bounds.
+            (!(least <= value && value <= most)).then(|| (name, format!("from {least} to {most}, and is {value}")))
+        })
+    }
+
+    fn entries(&self) -> [Entry; 8] {
+        let entry = |name, setting, value| Entry { name, setting, value };
+        [
+            entry("wheelbase_m", "vehicle.wheelbase", self.wheelbase_m),
+            entry("drive_scale_m_per_tick", "vehicle.drive_scale", self.drive_scale_m_per_tick),
+            entry("steering_scale_rad_per_tick", "vehicle.steering_scale", self.steering_scale_rad_per_tick),
+            entry("steer_offset_forward_rad", "vehicle.steering_offset_forward", self.steer_offset_forward_rad),
+            entry("steer_offset_backward_rad", "vehicle.steering_offset_backward", self.steer_offset_backward_rad),
+            entry("laser_x_m", "laser.x", self.laser_x_m),
+            entry("laser_y_m", "laser.y", self.laser_y_m),
+            entry("laser_theta_rad", "laser.theta", self.laser_theta_rad),
+        ]
     }
 
     /// Writes the file.
@@ -102,22 +122,12 @@ impl VehicleFile {
     pub fn write(&self, path: &Path) -> Result<(), TextFileError> {
         let io = |source| TextFileError::of_system(path, source);
         let text = toml::to_string(self).map_err(|error| io(std::io::Error::other(error)))?;
-        std::fs::write(path, text).map_err(io)
+        output_file::write(path, text).map_err(io)
     }
 
     /// The same parameters as the firmware's settings call them: names of leaves, and values in their units.
     pub fn settings(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        let named = [
-            ("vehicle.wheelbase", self.wheelbase_m),
-            ("vehicle.drive_scale", self.drive_scale_m_per_tick),
-            ("vehicle.steering_scale", self.steering_scale_rad_per_tick),
-            ("vehicle.steering_offset_forward", self.steer_offset_forward_rad),
-            ("vehicle.steering_offset_backward", self.steer_offset_backward_rad),
-            ("laser.x", self.laser_x_m),
-            ("laser.y", self.laser_y_m),
-            ("laser.theta", self.laser_theta_rad),
-        ];
-        named.into_iter().filter_map(|(name, value)| Some((name, value?)))
+        self.entries().into_iter().filter_map(|entry| Some((entry.setting, entry.value?)))
     }
 
     /// Puts the parameters in place of those of a log. False if the log is not of a tricycle.

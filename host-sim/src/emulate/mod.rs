@@ -2,6 +2,8 @@
 
 pub mod board;
 pub mod encoder;
+mod encoder_objects;
 pub mod encoder_pair;
 pub mod foreign_traffic;
+mod sdo_server;
 pub mod vehicle;

@@ -3,18 +3,18 @@
 //! `scans.txt`: one scan a line, count, first bearing (rad), step (rad), ranges (m). `poses.txt`: one laser pose a line, x
 //! (m), y (m), heading (rad). `keypoints.csv`: one keypoint a line, in the frame of the laser, with a header.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use agv_core::sensing::{Keypoint, KeypointKind};
 
 use crate::import::PosedScan;
+use crate::output_file::OutputFile;
 
 /// Writes the three files into `folder`, which is made if it is not there.
 pub fn write<'a>(folder: &Path, scans: impl IntoIterator<Item = (&'a PosedScan, Vec<Keypoint>)>) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
-    let create = |name: &str| File::create(folder.join(name)).map(BufWriter::new);
+    let create = |name: &str| OutputFile::create(&folder.join(name));
     let (mut scan_file, mut pose_file) = (create("scans.txt")?, create("poses.txt")?);
     let mut keypoint_file = create("keypoints.csv")?;
     writeln!(
@@ -47,7 +47,7 @@ pub fn write<'a>(folder: &Path, scans: impl IntoIterator<Item = (&'a PosedScan, 
             )?;
         }
     }
-    scan_file.flush()?;
-    pose_file.flush()?;
-    keypoint_file.flush()
+    scan_file.finish()?;
+    pose_file.finish()?;
+    keypoint_file.finish()
 }

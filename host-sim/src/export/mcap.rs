@@ -3,8 +3,6 @@
 //! Frames: `map` is W, `base_link` is R, `laser` is S; `odom` is where the odometry began.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
@@ -18,6 +16,7 @@ use serde::Serialize;
 
 use crate::drive::{KINDS, kind_name, mode_name, reason_name};
 use crate::log::SOFTWARE;
+use crate::output_file::OutputFile;
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::replay::Replay;
 use crate::ros::messages::{
@@ -198,17 +197,17 @@ pub fn write(
 /// The file.
 struct Writer {
     path: PathBuf,
-    container: mcap::Writer<BufWriter<File>>,
+    container: mcap::Writer<OutputFile>,
     channels: BTreeMap<Topic, u16>,
     counts: BTreeMap<Topic, u64>,
 }
 
 impl Writer {
     fn create(path: &Path) -> Result<Self, McapExportError> {
-        let file = File::create(path).map_err(|source| McapExportError::Io { path: path.to_owned(), source })?;
+        let file = OutputFile::create(path).map_err(|source| McapExportError::Io { path: path.to_owned(), source })?;
         let wrap = |source| McapExportError::Container { path: path.to_owned(), source };
         let options = WriteOptions::new().profile("ros2").library(SOFTWARE).compression(Some(Compression::Zstd));
-        let mut container = options.create(BufWriter::new(file)).map_err(wrap)?;
+        let mut container = options.create(file).map_err(wrap)?;
         let mut channels = BTreeMap::new();
         for topic in Topic::ALL {
             let kind = topic.kind();
@@ -262,7 +261,9 @@ impl Writer {
 
     fn finish(mut self) -> Result<McapSummary, McapExportError> {
         let path = self.path;
-        self.container.finish().map_err(|source| McapExportError::Container { path, source })?;
+        let container = self.container.finish();
+        container.map_err(|source| McapExportError::Container { path: path.clone(), source })?;
+        self.container.into_inner().finish().map_err(|source| McapExportError::Io { path, source })?;
         let messages = self.counts.into_iter().map(|(topic, count)| (topic.name(), count)).collect();
         Ok(McapSummary { messages })
     }

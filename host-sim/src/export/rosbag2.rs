@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::mcap::{self, McapExportError, McapSummary};
+use crate::output_file;
 use crate::recording::{RecordedEvent, Recording};
 use crate::replay::Replay;
 
@@ -21,7 +22,7 @@ pub fn write(
     let name = format!("{}_0.mcap", folder.file_name().unwrap_or_default().to_string_lossy());
     let summary = mcap::write(&folder.join(&name), recording, answers, progress)?;
     let path = folder.join("metadata.yaml");
-    std::fs::write(&path, description(&name, recording, &summary)).map_err(io(path.clone()))?;
+    output_file::write(&path, description(&name, recording, &summary)).map_err(io(path.clone()))?;
     Ok(summary)
 }
 

@@ -1,13 +1,14 @@
 //! Packets of a multi-beam lidar as a network capture.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use agv_core::measurement::Time;
 use agv_lidar3d::packet::{LENGTH, PORT};
 use etherparse::PacketBuilder;
 use pcap_parser::{LegacyPcapBlock, Linktype, PcapHeader, ToVec};
+
+use crate::output_file::OutputFile;
 
 /// Addresses that the sensors have when they leave the factory.
 const SENSOR: [u8; 4] = [192, 168, 3, 43];
@@ -16,16 +17,16 @@ const SENSOR_PORT: u16 = 443;
 
 /// A capture that is written.
 pub struct CaptureWriter {
-    file: BufWriter<File>,
+    file: OutputFile,
 }
 
 impl CaptureWriter {
-    /// Creates a capture; an older one is replaced.
+    /// Creates a capture; an older one is replaced when this one is finished.
     ///
     /// # Errors
     /// What the operating system says.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let mut file = BufWriter::new(File::create(path)?);
+        let mut file = OutputFile::create(path)?;
         let mut header = PcapHeader::new();
         header.network = Linktype::ETHERNET;
         header.snaplen = u32::from(u16::MAX);
@@ -59,7 +60,7 @@ impl CaptureWriter {
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn finish(mut self) -> io::Result<()> {
-        self.file.flush()
+    pub fn finish(self) -> io::Result<()> {
+        self.file.finish()
     }
 }

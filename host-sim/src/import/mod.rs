@@ -5,6 +5,8 @@ pub mod capture;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;
+#[cfg(feature = "bags")]
+mod mounting;
 pub mod packets;
 mod posed_scan;
 pub mod poses;

@@ -84,6 +84,14 @@ pub fn write(path: &Path, drive: &mut Recording, raw: &[RawBytes], nodes: &Encod
     writer.finish()
 }
 
+/// Whether raw bytes say anything that a sensor of that vehicle has measured.
+#[must_use]
+pub fn means_something(drive: &Recording, raw: &[RawBytes], nodes: &EncoderNodes) -> bool {
+    let mut maker = EventMaker::new(nodes, &drive.parameters, Bus::Overheard);
+    let is_measured = |event: &RecordedEvent| !matches!(event, RecordedEvent::EncoderFaults(_));
+    raw.iter().any(|one| maker.events(one).iter().any(is_measured))
+}
+
 /// Pieces that fit a record; one without bytes if there are none.
 pub fn pieces(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let nothing = bytes.is_empty().then_some(bytes);

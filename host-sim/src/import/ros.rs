@@ -8,6 +8,7 @@ use agv_core::localizer::Parameters;
 use agv_core::measurement::{LaserId, PoseFix, PoseIncrement, Time};
 use agv_core::odometry::Vehicle;
 
+use super::mounting::{self, Mounting, MountingError, plain};
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::ros::messages::{LaserScan, Odometry, PoseWithCovarianceStamped, Stamp, Transforms};
 use crate::ros::{Bag, BagError, BagMessage, Kind, MessageError, decode};
@@ -19,7 +20,7 @@ pub struct Choice {
     pub scan: Option<String>,
     /// Topic of the odometry; the only one of its kind if None.
     pub odometry: Option<String>,
-    /// Pose of the laser on the vehicle; what the recording states if None.
+    /// Pose of the laser on the vehicle; what the recording states if None. Whether it hangs upside down, the recording says.
     pub laser: Option<Pose>,
 }
 
@@ -29,6 +30,20 @@ pub enum RosImportError {
     /// It cannot be read.
     #[error(transparent)]
     Bag(#[from] BagError),
+    /// There is no topic of that name and kind.
+    #[error("{}: there is no topic {name} of {kind} in the recording; {option} can be {}", path.display(), found.join(", "))]
+    OtherTopics {
+        /// The recording.
+        path: PathBuf,
+        /// The kind.
+        kind: &'static str,
+        /// What was asked for.
+        name: String,
+        /// How to choose.
+        option: &'static str,
+        /// What there is of that kind.
+        found: Vec<String>,
+    },
     /// There is no topic of that kind.
     #[error("{}: there is no topic of {kind} in the recording{}", path.display(), listed(found))]
     NoTopic {
@@ -62,6 +77,16 @@ pub enum RosImportError {
         number: usize,
         /// What is wrong with it.
         source: MessageError,
+    },
+    /// The laser does not look along the ground.
+    #[error("{}: the laser {laser} is tilted by {degrees:.0} deg; only lasers that look along the ground can be used", path.display())]
+    Tilted {
+        /// The recording.
+        path: PathBuf,
+        /// Frame of the laser.
+        laser: String,
+        /// Angle between its plane and the ground.
+        degrees: f64,
     },
     /// Nobody says where the laser is.
     #[error("{}: no transform leads from {base} to {laser}; state where the laser is with --laser X,Y,HEADING", path.display())]
@@ -111,13 +136,10 @@ pub fn read(path: &Path, choice: &Choice) -> Result<Recording, RosImportError> {
     heard.sort_by_key(|(time, _)| *time);
     let first = heard.iter().map(|(_, message)| message.stamp().nanoseconds()).min().unwrap_or_default();
     let clock = |stamp: Stamp| Time::from_micros(((stamp.nanoseconds() - first).max(0).unsigned_abs() + 500) / 1000);
-    let laser = match choice.laser {
-        Some(stated) => stated,
-        None => laser_pose(path, &heard, &transforms)?,
-    };
+    let laser = mounting(path, &heard, &transforms, choice.laser)?;
     let mut before: Option<Pose> = None;
     let events = heard.iter().map(|(_, message)| match message {
-        Heard::Scan(message) => RecordedEvent::Scan(scan(clock(message.header.stamp), message)),
+        Heard::Scan(message) => RecordedEvent::Scan(scan(clock(message.header.stamp), message, laser.is_upside_down)),
         Heard::Odometry(message) => {
             let pose = message.pose.pose.planar();
             let displacement = before.replace(pose).map_or(Pose::default(), |before| before.between(&pose));
@@ -127,7 +149,7 @@ pub fn read(path: &Path, choice: &Choice) -> Result<Recording, RosImportError> {
     });
     Ok(Recording {
         events: events.collect(),
-        parameters: Parameters::new(Vehicle::Increments, laser),
+        parameters: Parameters::new(Vehicle::Increments, laser.pose),
         landmarks: Vec::new(),
         truth: Vec::new(),
         references: Vec::new(),
@@ -150,6 +172,13 @@ fn topics(path: &Path, bag: &Bag, choice: &Choice) -> Result<(String, String), R
             of_kind.iter().filter(|name| stated.as_ref().is_none_or(|stated| *name == stated)).collect();
         match wanted[..] {
             [name] => Ok(name.clone()),
+            [] if !of_kind.is_empty() => Err(RosImportError::OtherTopics {
+                path: path.to_owned(),
+                kind,
+                name: stated.clone().unwrap_or_default(),
+                option,
+                found: of_kind,
+            }),
             [] => {
                 let found = all.iter().map(|(name, kind)| format!("{name} ({kind})")).collect();
                 Err(RosImportError::NoTopic { path: path.to_owned(), kind, found })
@@ -192,34 +221,36 @@ fn messages(path: &Path, bag: &Bag, scan: &str, odometry: &str) -> Result<(Messa
     problem.map_or(Ok((heard, transforms)), Err)
 }
 
-/// Longest chain of transforms that is followed.
-const CHAIN: usize = 32;
-
-/// Where the laser is on the vehicle, by the transforms that never change.
-fn laser_pose(path: &Path, heard: &Messages, transforms: &Transforms) -> Result<Pose, RosImportError> {
-    let plain = |frame: &str| frame.trim_start_matches('/').to_owned();
+/// Where the laser is on the vehicle: as stated, and turned over if the transforms that never change say so.
+fn mounting(
+    path: &Path,
+    heard: &Messages,
+    transforms: &Transforms,
+    stated: Option<Pose>,
+) -> Result<Mounting, RosImportError> {
     let laser = heard.iter().find_map(|(_, message)| match message {
-        Heard::Scan(scan) => Some(plain(&scan.header.frame_id)),
+        Heard::Scan(scan) => Some(plain(&scan.header.frame_id).to_owned()),
         _ => None,
     });
     let base = heard.iter().find_map(|(_, message)| match message {
-        Heard::Odometry(odometry) => Some(plain(&odometry.child_frame_id)),
+        Heard::Odometry(odometry) => Some(plain(&odometry.child_frame_id).to_owned()),
         _ => None,
     });
     let (laser, base) = (laser.unwrap_or_default(), base.unwrap_or_default());
-    let (mut pose, mut frame) = (Pose::default(), laser.clone());
-    for _ in 0..CHAIN {
-        if frame == base {
-            return Ok(pose);
+    match (mounting::find(transforms, &base, &laser), stated) {
+        (Ok(found), Some(pose)) => Ok(Mounting { pose, ..found }),
+        (Err(_), Some(pose)) => Ok(Mounting { pose, is_upside_down: false }),
+        (Ok(found), None) => Ok(found),
+        (Err(MountingError::Unknown), None) => Err(RosImportError::NoLaserPose { path: path.to_owned(), base, laser }),
+        (Err(MountingError::Tilted(tilt)), None) => {
+            Err(RosImportError::Tilted { path: path.to_owned(), laser, degrees: tilt.to_degrees() })
         }
-        let Some(step) = transforms.transforms.iter().find(|step| plain(&step.child_frame_id) == frame) else { break };
-        pose = step.transform.planar().compose(&pose);
-        frame = plain(&step.header.frame_id);
     }
-    Err(RosImportError::NoLaserPose { path: path.to_owned(), base, laser })
 }
 
-fn scan(start: Time, message: &LaserScan) -> RecordedScan {
+fn scan(start: Time, message: &LaserScan, is_upside_down: bool) -> RecordedScan {
+    // Seen from above, the bearings of what hangs upside down grow the other way.
+    let sign = if is_upside_down { -1.0 } else { 1.0 };
     let limits = message.range_min..=message.range_max;
     let strength = |value: &f32| value.round().clamp(0.0, f32::from(u16::MAX)) as u16;
     // A list of another length belongs to other beams.
@@ -228,8 +259,8 @@ fn scan(start: Time, message: &LaserScan) -> RecordedScan {
         laser: LaserId::FIRST,
         start,
         beam_interval: f64::from(message.time_increment.max(0.0)),
-        first_bearing: message.angle_min.into(),
-        bearing_step: message.angle_increment.into(),
+        first_bearing: sign * f64::from(message.angle_min),
+        bearing_step: sign * f64::from(message.angle_increment),
         ranges: message.ranges.iter().map(|range| if limits.contains(range) { *range } else { 0.0 }).collect(),
         intensities: if has_strengths { message.intensities.iter().map(strength).collect() } else { Vec::new() },
     }

@@ -6,6 +6,7 @@ use agv_lidar3d::place::{BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Hi
 use serde::{Deserialize, Serialize};
 
 use super::signatures::{Method, Signatures};
+use crate::output_file;
 use crate::text_file::TextFileError;
 
 /// Places so far apart are different ones, m.
@@ -149,7 +150,7 @@ pub fn write(path: &Path, map: &PlaceMap) -> Result<(), TextFileError> {
     let file = File { sensor_height: map.sensor_height, places: places.collect() };
     let failed = |reason: String| TextFileError::of_system(path, std::io::Error::other(reason));
     let bytes = postcard::to_extend(&file, MAGIC.to_vec()).map_err(|error| failed(error.to_string()))?;
-    std::fs::write(path, bytes).map_err(|source| TextFileError::of_system(path, source))
+    output_file::write(path, bytes).map_err(|source| TextFileError::of_system(path, source))
 }
 
 /// Reads places.

@@ -5,7 +5,7 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
 use agv_core::measurement::Time;
-use agv_wire::cola::{Deframed, Deframer, Dialect};
+use agv_wire::cola::{CommandWord, Deframed, Deframer, Dialect, ReadError, Telegram};
 use agv_wire::nav350::{Answer, Configuration, LostReason, Report, Request, Revolution, SensorSpeed, Session, Step};
 
 use super::clock::Clock;
@@ -210,6 +210,16 @@ pub enum ClientError {
         /// What was asked.
         question: String,
     },
+    /// An answer came that cannot be read.
+    #[error("{address}: the answer to {question} cannot be read: {problem:?}")]
+    Undecodable {
+        /// The sensor.
+        address: String,
+        /// What was asked.
+        question: String,
+        /// What is wrong with it.
+        problem: ReadError,
+    },
     /// The request cannot be written.
     #[error("{question} does not fit into a telegram")]
     Request {
@@ -298,7 +308,17 @@ impl Client {
                 bytes = &bytes[taken..];
                 while let Some(found) = self.deframer.next() {
                     let Deframed::Telegram { dialect, payload, .. } = found else { continue };
-                    let Ok(answer) = Answer::decode(dialect, payload) else { continue };
+                    let is_asked = Telegram::parse(dialect, payload)
+                        .is_ok_and(|telegram| telegram.name == name(request) || telegram.command == CommandWord::Fault);
+                    // What answers an older question comes late, and is none to this one.
+                    if !is_asked {
+                        continue;
+                    }
+                    let answer = Answer::decode(dialect, payload).map_err(|problem| ClientError::Undecodable {
+                        address: self.address.clone(),
+                        question: name(request),
+                        problem,
+                    })?;
                     self.dialect = dialect;
                     if take(&answer) {
                         return Ok(());

@@ -10,7 +10,7 @@ use agv_core::record::{RawSource, Record};
 use agv_wire::can::frame::{AnyFrame, Frame};
 use agv_wire::can::slcan::Message;
 
-use super::{LiveError, Recorder};
+use super::{Limits, LiveError, Recorder};
 use crate::bus::{Bus, BusError};
 use crate::link::clock::Clock;
 use crate::log::LogError;
@@ -40,7 +40,7 @@ struct Recording<'a> {
     faults: [Option<EncoderFault>; 2],
 }
 
-/// Records what is said on a CAN bus until `until` or `is_stopped`, and is the master of the encoders there: the frames
+/// Records what is said on a CAN bus until `limits` or `is_stopped`, and is the master of the encoders there: the frames
 /// of both directions, what they mean, and a note of everything that happened to the bus and the encoders. `open` opens
 /// the bus, again and again if it is lost.
 ///
@@ -51,7 +51,7 @@ pub fn record_can(
     nodes: &EncoderNodes,
     parameters: &Parameters,
     clock: Clock,
-    until: Time,
+    limits: &Limits,
     is_stopped: &AtomicBool,
     recorder: &Recorder,
 ) -> Result<CanSummary, LiveError> {
@@ -61,8 +61,8 @@ pub fn record_can(
     let encoders = Encoders::new(nodes, parameters, start);
     let mut recording = Recording { recorder, encoders, summary: CanSummary::default(), faults: [None; 2] };
     let mut tried = Instant::now();
-    while !is_stopped.load(Ordering::Relaxed) && clock.now() < until {
-        let deadline = Instant::now() + LOOK.min(clock.until(until));
+    while !is_stopped.load(Ordering::Relaxed) && !limits.is_over(clock.now(), recording.summary.frames == 0) {
+        let deadline = Instant::now() + LOOK.min(clock.until(limits.until));
         let outcome = match &mut bus {
             Some(bus) => recording.look(&mut **bus, clock, deadline),
             None => {

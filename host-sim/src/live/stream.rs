@@ -86,14 +86,21 @@ impl Connection {
 pub struct LogCopy {
     path: PathBuf,
     writer: Option<Writer>,
+    set_aside: Option<PathBuf>,
     summary: StreamSummary,
 }
 
 impl LogCopy {
-    /// A log that begins with the first header.
+    /// A log that begins with the first header; an older file of that name then gets another one.
     #[must_use]
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_owned(), writer: None, summary: StreamSummary::default() }
+        Self { path: path.to_owned(), writer: None, set_aside: None, summary: StreamSummary::default() }
+    }
+
+    /// The new name of an older file.
+    #[must_use]
+    pub fn set_aside(&self) -> Option<&Path> {
+        self.set_aside.as_deref()
     }
 
     /// Adds what came.
@@ -103,7 +110,10 @@ impl LogCopy {
     pub fn take(&mut self, item: &Item) -> Result<(), LogError> {
         match (item, &mut self.writer) {
             (Item::Record { record: Record::Header(header), .. }, writer @ None) => {
-                *writer = Some(Writer::create(&self.path, header)?);
+                let mut begun = Writer::create(&self.path, header)?;
+                // What comes is kept, whatever happens later.
+                self.set_aside = begun.take_name()?;
+                *writer = Some(begun);
                 Ok(())
             }
             (Item::Record { record, .. }, Some(writer)) => {

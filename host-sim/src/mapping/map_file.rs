@@ -14,6 +14,7 @@ use std::path::Path;
 
 use agv_core::maps::{Landmark, LandmarkKind};
 
+use crate::output_file;
 use crate::text_file::{self, TextFileError};
 
 /// First line of every map.
@@ -89,5 +90,5 @@ pub fn write(path: &Path, landmarks: &[Landmark]) -> Result<(), TextFileError> {
         };
         let _ = writeln!(text, "{id},{kind},{x:.6},{y:.6},{deviation:.6}");
     }
-    std::fs::write(path, text).map_err(|source| TextFileError::Io { path: path.to_owned(), source })
+    output_file::write(path, text).map_err(|source| TextFileError::Io { path: path.to_owned(), source })
 }

@@ -3,8 +3,8 @@
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
 use serde::Serialize;
 
-use super::Replay;
-use crate::recording::RecordedOutput;
+use super::{Replay, compare_published};
+use crate::recording::{Publishing, RecordedOutput, Recording};
 
 /// How recorded outputs compare with those of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -16,19 +16,49 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// The comparison as a sentence; None if nothing was compared.
-    #[must_use]
-    pub fn verdict(&self) -> Option<String> {
-        (self.compared > 0).then(|| match self.first_difference {
+    /// The comparison as a sentence.
+    fn verdict(&self) -> String {
+        match self.first_difference {
             None => format!("equal to the {} recorded ones, bit for bit", self.compared),
             Some(event) => format!("differ from the recorded ones, first at event {event}"),
-        })
+        }
     }
 
     /// Whether something was compared, and all of it is equal.
     #[must_use]
     pub fn is_equal(&self) -> bool {
         self.compared > 0 && self.first_difference.is_none()
+    }
+}
+
+/// How all that a log says the controller has said compares with a replay. None of what the log holds nothing of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Comparisons {
+    /// What the localiser answered.
+    pub outputs: Option<Comparison>,
+    /// What the vehicle was given.
+    pub published: Option<Comparison>,
+}
+
+impl Comparisons {
+    /// Compares all of it.
+    #[must_use]
+    pub fn of(outputs: &[RecordedOutput], publishing: &Publishing, recording: &Recording, replay: &Replay) -> Self {
+        let some = |comparison: Comparison| (comparison.compared > 0).then_some(comparison);
+        Self {
+            outputs: some(compare(outputs, replay)),
+            published: some(compare_published(recording, publishing, replay)),
+        }
+    }
+
+    /// What there is to say of it: what was compared, and how.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<[String; 2]> {
+        let named = [("outputs", self.outputs), ("published", self.published)];
+        named
+            .into_iter()
+            .filter_map(|(what, comparison)| Some([what.to_owned(), comparison?.verdict()]))
+            .collect()
     }
 }
 

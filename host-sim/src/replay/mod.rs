@@ -4,7 +4,7 @@ mod comparison;
 mod publishing;
 mod start_search;
 
-pub use comparison::{Comparison, compare};
+pub use comparison::{Comparison, Comparisons, compare};
 pub use publishing::compare_published;
 pub use start_search::{StartSearchError, find_start};
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use plotters::style::RGBColor;
 
 use super::figure::{Figure, Mark, Shape};
+use crate::output_file;
 
 const STYLE: &str = "\
 :root{color-scheme:light}\
@@ -127,7 +128,7 @@ impl Page {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder)?;
         }
-        std::fs::write(path, self.html())
+        output_file::write(path, self.html())
     }
 }
 

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::output_file::OutputFile;
+
 /// Names under which Chromium is installed.
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
@@ -46,18 +48,17 @@ pub fn write_pdf(html: &Path, pdf: &Path) -> Result<(), PdfError> {
         move |source| PdfError::Io { path, source }
     };
     let html = html.canonicalize().map_err(io(html))?;
-    // What was there before must not pass for what is written now.
-    if pdf.exists() {
-        std::fs::remove_file(pdf).map_err(io(pdf))?;
-    }
+    let file = OutputFile::create(pdf).map_err(io(pdf))?;
+    let aside = file.aside().unwrap_or(pdf).to_owned();
     let mut target = std::ffi::OsString::from("--print-to-pdf=");
-    target.push(std::path::absolute(pdf).map_err(io(pdf))?);
+    target.push(std::path::absolute(&aside).map_err(io(pdf))?);
     let mut command = Command::new(browser);
     // The page is this program's own, without scripts, so that no sandbox is needed; as root there is none.
     command.args(["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]).arg(target).arg(html);
     let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    if status.is_ok_and(|status| status.success()) && pdf.exists() {
-        Ok(())
+    let is_written = || aside.metadata().is_ok_and(|written| written.len() > 0);
+    if status.is_ok_and(|status| status.success()) && is_written() {
+        file.finish().map_err(io(pdf))
     } else {
         Err(PdfError::Nothing { path: pdf.to_owned() })
     }

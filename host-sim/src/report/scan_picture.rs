@@ -1,8 +1,9 @@
 //! A revolution of a multi-beam lidar as a PNG: its ranges, and the view from above.
 
-use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io;
 use std::path::Path;
+
+use crate::output_file::OutputFile;
 
 /// Width of the picture, pixels.
 const WIDTH: usize = 900;
@@ -41,11 +42,14 @@ pub fn write(path: &Path, cloud: &[Option<[f32; 3]>], rings: usize, reach: f32) 
             pixels[(above + down as usize) * WIDTH + across as usize] = of_height(z);
         }
     }
-    let mut encoder = png::Encoder::new(BufWriter::new(File::create(path)?), WIDTH as u32, (above + WIDTH) as u32);
+    let mut file = OutputFile::create(path)?;
+    let mut encoder = png::Encoder::new(&mut file, WIDTH as u32, (above + WIDTH) as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.write_header()?.write_image_data(pixels.as_flattened())?;
-    Ok(())
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels.as_flattened())?;
+    writer.finish()?;
+    file.finish()
 }
 
 /// From blue through green to red.

@@ -198,7 +198,8 @@ fn report_motion(
     match scenario.vehicle.reports {
         MotionReport::Encoders => {
             for sample in odometer::encoders(motion, tricycle, options, START, random) {
-                arrivals.add(sample.time, RecordedEvent::Encoders(sample));
+                let told = odometer::with_mistakes(sample, tricycle, &scenario.vehicle.truth);
+                arrivals.add(sample.time, RecordedEvent::Encoders(told));
             }
         }
         MotionReport::Speed => {

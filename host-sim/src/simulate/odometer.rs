@@ -6,7 +6,7 @@ use agv_core::odometry::{Ackermann, CounterRange, Tricycle};
 
 use super::path::Direction;
 use super::random::Random;
-use super::scenario::OdometryOptions;
+use super::scenario::{OdometryOptions, VehicleErrors};
 use super::vehicle::Motion;
 
 /// Counters of a tricycle with the true parameters `tricycle`, one sample a state of `motion`; `start` is the time of the
@@ -43,6 +43,23 @@ pub fn encoders(
         });
     }
     samples
+}
+
+/// The counters as a vehicle tells them whose encoders are fitted wrongly.
+#[must_use]
+pub fn with_mistakes(sample: EncoderSample, tricycle: &Tricycle, truth: &VehicleErrors) -> EncoderSample {
+    let turned = |count: u32, range: CounterRange| counter(-f64::from(count), range);
+    let mut told = sample;
+    if truth.drive_reversed {
+        told.drive = turned(told.drive, tricycle.drive_range);
+    }
+    if truth.steering_reversed {
+        told.steering = turned(told.steering, tricycle.steering_range);
+    }
+    if truth.encoders_swapped {
+        (told.drive, told.steering) = (told.steering, told.drive);
+    }
+    told
 }
 
 /// Errors that last for a leg.

@@ -6,5 +6,6 @@ mod odometry;
 mod ray_casting;
 mod reflectors;
 mod scenario;
+mod scenario_reference;
 mod support;
 mod world;

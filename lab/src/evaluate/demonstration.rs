@@ -29,6 +29,11 @@ const METHODS: [(&str, MapUse); 5] = [
     ("mixed", MapUse { reflectors: true, features: true, dynamic: false, slam: false }),
 ];
 
+/// How many ways there are to localise the drive, in a word.
+pub const WAYS: &str = "five";
+
+const _: () = assert!(METHODS.len() == 5);
+
 /// The drive, localised in one way.
 #[derive(Clone, Debug)]
 pub struct LocalisedDrive {
@@ -58,7 +63,7 @@ pub enum DemonstrationError {
     Replay(#[from] ReplayError),
 }
 
-/// Simulates the drive, maps its world, and localises the drive in four ways, with everything in the last.
+/// Simulates the drive, maps its world, and localises the drive in each way, with everything in the last.
 /// `begin` is called with what is done next.
 ///
 /// # Errors
@@ -98,7 +103,7 @@ pub fn table(drives: &[LocalisedDrive]) -> Table {
         let one = |value: f64| format!("{value:.1}");
         let three = |value: f64| format!("{value:.3}");
         vec![
-            unbroken(drive.name),
+            drive.name.to_owned(),
             one(position.median),
             one(position.p95),
             one(position.max),
@@ -130,7 +135,7 @@ pub fn page(drives: &[LocalisedDrive]) -> Result<Page, FigureError> {
          are slightly miscalibrated, the laser has noise. Natural features were mapped by another \
          drive, for which some reflectors stood in the lane.",
     );
-    page.section("Localised in four ways").table(&table(drives));
+    page.section(&format!("Localised in {WAYS} ways")).table(&table(drives));
     page.paragraph(
         "Distance from the true position and difference from the true heading over the whole way, and at its end. NEES is \
          the mean normalised error squared: 3 is expected, less is cautious. Ok is the share of the poses within 2 cm and 0.1 deg.",

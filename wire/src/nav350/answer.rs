@@ -8,8 +8,10 @@ use super::{
 };
 use crate::cola::{CommandWord, Dialect, Fault, Raw, ReadError, Reader, Sequence, Telegram, Text, WriteError, Writer};
 
-/// Channels of 32 bits that one answer can hold.
+/// Channels of 32 bits that are kept of an answer.
 const CHANNELS: usize = 2;
+/// Channels of 32 bits that an answer can have.
+const MOST_CHANNELS: usize = 4;
 
 /// The pose with reflectors and scan.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +28,7 @@ pub struct NavigationData<'a> {
     pub pose: Option<PoseReport>,
     /// The reflectors.
     pub reflectors: Option<ReflectorList<'a>>,
-    /// Distances and directions.
+    /// Distances and directions: the first two channels, if there are more.
     pub channels: Vec<Channel<'a, u32>, CHANNELS>,
     /// Strength of echoes.
     pub remission: Option<Channel<'a, u16>>,
@@ -45,7 +47,7 @@ pub struct LandmarkData<'a> {
     pub dataset: u8,
     /// The reflectors.
     pub reflectors: Option<ReflectorList<'a>>,
-    /// Distances and directions.
+    /// Distances and directions: the first two channels, if there are more.
     pub channels: Vec<Channel<'a, u32>, CHANNELS>,
     /// Strength of echoes.
     pub remission: Option<Channel<'a, u16>>,
@@ -350,12 +352,13 @@ fn write_pose(pose: Option<&PoseReport>, writer: &mut Writer) -> Result<(), Writ
 
 fn read_channels<'a>(reader: &mut Reader<'a>) -> Result<Vec<Channel<'a, u32>, CHANNELS>, ReadError> {
     let count = usize::from(reader.u16()?);
-    if count > CHANNELS {
+    if count > MOST_CHANNELS {
         return Err(ReadError::Capacity);
     }
     let mut channels = Vec::new();
     for _ in 0..count {
-        channels.push(Channel::read(reader)?).map_err(|_| ReadError::Capacity)?;
+        // The maker's own client goes on with the first two, too.
+        let _ = channels.push(Channel::read(reader)?);
     }
     Ok(channels)
 }

@@ -18,6 +18,8 @@ pub enum RevolutionError {
     Clock,
     /// More beams than there is room for.
     Beams,
+    /// The distances have no scale, or the beams no angle between them.
+    Channel,
 }
 
 /// The pose that the sensor itself has found.
@@ -175,6 +177,10 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> 
         clock: &SensorClock,
         frame: &SensorFrame,
     ) -> Result<ScanHead, RevolutionError> {
+        let is_scaled = distances.scale.is_finite() && distances.scale > 0.0 && distances.offset.is_finite();
+        if !is_scaled || distances.resolution == 0 {
+            return Err(RevolutionError::Channel);
+        }
         let step = f64::from(distances.resolution) * 1e-3 * (core::f64::consts::PI / 180.0);
         let intensities = match remission {
             // Strengths belong to beams only if there is one for each.

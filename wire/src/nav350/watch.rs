@@ -35,9 +35,11 @@ impl SensorWatch {
     pub fn lost(&mut self, reason: LostReason) {
         self.trouble = Some(match reason {
             LostReason::NotConnected | LostReason::Closed | LostReason::NoAnswer(_) => LaserHealth::Silent,
-            LostReason::AccessDenied | LostReason::Refused(..) | LostReason::Failed(..) | LostReason::Overflow => {
-                LaserHealth::Faulty
-            }
+            LostReason::AccessDenied
+            | LostReason::Refused(..)
+            | LostReason::Failed(..)
+            | LostReason::Overflow
+            | LostReason::Babble => LaserHealth::Faulty,
         });
     }
 

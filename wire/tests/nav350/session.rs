@@ -303,3 +303,34 @@ proptest! {
         prop_assert!(scene.is_running() && scene.now - last < 300_000);
     }
 }
+
+#[test]
+fn a_line_that_babbles_is_given_up_after_a_mebibyte() {
+    use agv_wire::nav350::{Revolution, Session, Step};
+    let mut foreign = [0; 256];
+    let word = agv_wire::nav350::Answer::Written(Variable::CurrentLayer);
+    let length = word.encode(Dialect::Binary, &mut foreign).unwrap();
+    // Bytes of no meaning, and telegrams that answer nothing.
+    for piece in [vec![0xAA; 4096], foreign[..length].repeat(100)] {
+        let mut session = Box::new(Session::<65_536>::new(Configuration::default()));
+        let mut revolution = Box::new(Revolution::<4>::new());
+        let (mut said, mut lost) = (0_usize, None);
+        'line: for round in 0..10_000_u64 {
+            let now = Time::from_micros(round);
+            loop {
+                match session.poll(now, &mut revolution) {
+                    Step::Connect => session.connected(now),
+                    Step::Disconnect(reason) => {
+                        lost = Some(reason);
+                        break 'line;
+                    }
+                    Step::Wait(_) => break,
+                    Step::Send(_) | Step::Report(_) | Step::Revolution => {}
+                }
+            }
+            said += session.receive(&piece, now);
+        }
+        assert_eq!(lost, Some(LostReason::Babble));
+        assert!((1 << 20..(1 << 20) + 2 * piece.len()).contains(&said), "{said}");
+    }
+}

@@ -23,7 +23,12 @@ fn a_sensor_that_measures_is_sound_until_it_is_silent() {
 #[test]
 fn a_sensor_that_answers_with_errors_is_faulty_and_one_that_does_not_answer_is_silent() {
     let error = ErrorCode::WRONG_MODE;
-    let faulty = [LostReason::AccessDenied, LostReason::Failed(MethodName::ChangeState, error), LostReason::Overflow];
+    let faulty = [
+        LostReason::AccessDenied,
+        LostReason::Failed(MethodName::ChangeState, error),
+        LostReason::Overflow,
+        LostReason::Babble,
+    ];
     let silent = [LostReason::NotConnected, LostReason::Closed, LostReason::NoAnswer(State::Running)];
     let expected = faulty.map(|reason| (reason, LaserHealth::Faulty));
     for (reason, health) in expected.into_iter().chain(silent.map(|reason| (reason, LaserHealth::Silent))) {

@@ -7,6 +7,7 @@ use agv_core::odometry::Tricycle;
 use agv_host_sim::calibrate::model::VehicleModel;
 use agv_host_sim::calibrate::plan::{Means, Plan as Planned, plan};
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_host_sim::output_file;
 use agv_host_sim::simulate::believed_parameters;
 use agv_host_sim::simulate::path::Direction;
 use agv_host_sim::simulate::scenario::Scenario;
@@ -118,7 +119,7 @@ impl Plan {
         let planned = plan(&means)?;
         if let Some(path) = &self.scenario {
             let text = toml::to_string(&planned.scenario(&means, &tricycle))?;
-            std::fs::write(path, text).with_context(|| path.display().to_string())?;
+            output_file::write(path, text).with_context(|| path.display().to_string())?;
         }
         let summary = summary(&planned, &means);
         if self.json {

@@ -7,13 +7,12 @@ mod messages;
 mod messages;
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use agv_host_sim::drive::Track;
 use agv_host_sim::export::{answered, candump, csv, tum};
 use agv_host_sim::left_out;
+use agv_host_sim::output_file::OutputFile;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::Replay;
 use anyhow::{Context, bail, ensure};
@@ -103,8 +102,8 @@ impl Export {
     }
 }
 
-fn create(path: &Path) -> anyhow::Result<BufWriter<File>> {
-    Ok(BufWriter::new(File::create(path).with_context(|| path.display().to_string())?))
+fn create(path: &Path) -> anyhow::Result<OutputFile> {
+    OutputFile::create(path).with_context(|| path.display().to_string())
 }
 
 /// Prints how many of what were written.
@@ -142,7 +141,10 @@ impl Drive {
     fn run_csv(self) -> anyhow::Result<()> {
         let (recording, answers) = self.read()?;
         let track = Track::new(&recording, &answers);
-        csv::write(&recording, &track, create(&self.output)?).with_context(|| self.output.display().to_string())?;
+        let name = || self.output.display().to_string();
+        let mut file = create(&self.output)?;
+        csv::write(&recording, &track, &mut file).with_context(name)?;
+        file.finish().with_context(name)?;
         print_counts(&BTreeMap::from([("poses", track.points.len() as u64)]), self.json)
     }
 }
@@ -159,12 +161,12 @@ impl Tum {
         let track = Track::new(&recording, &answers);
         let mut file = create(&drive.output)?;
         tum::write(tum::estimated(&track), &mut file)
-            .and_then(|()| file.flush())
+            .and_then(|()| file.finish())
             .with_context(|| drive.output.display().to_string())?;
         if let Some(path) = truth {
             let mut file = create(&path)?;
             tum::write(tum::truth(&recording, &track), &mut file)
-                .and_then(|()| file.flush())
+                .and_then(|()| file.finish())
                 .with_context(|| path.display().to_string())?;
         }
         print_counts(&BTreeMap::from([("poses", track.points.len() as u64)]), drive.json)
@@ -173,10 +175,12 @@ impl Tum {
 
 impl Candump {
     fn run(self) -> anyhow::Result<()> {
-        let frames = candump::write(&self.log, &self.interface, &mut create(&self.output)?)?;
+        let mut file = create(&self.output)?;
+        let frames = candump::write(&self.log, &self.interface, &mut file)?;
         if frames == 0 {
             bail!("{}: there are no frames of a bus in the log", self.log.display());
         }
+        file.finish().with_context(|| self.output.display().to_string())?;
         print_counts(&BTreeMap::from([("frames", frames as u64)]), self.json)
     }
 }

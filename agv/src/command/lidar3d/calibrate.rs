@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use agv_host_sim::lidar3d::kind::Kind;
 use agv_host_sim::lidar3d::{Source, setup, stand};
+use agv_host_sim::output_file;
 use agv_host_sim::report::{Page, PointSet, Table, scatter_chart};
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::Offsets;
@@ -117,7 +118,7 @@ impl Calibrate {
             None => None,
         };
         let calibration = Calibration { distance_resolution: resolution, lasers: found.lasers.clone() };
-        std::fs::write(&self.output, write(&calibration)).with_context(|| self.output.display().to_string())?;
+        output_file::write(&self.output, write(&calibration)).with_context(|| self.output.display().to_string())?;
         let walls = walls(&names, &targets, options.offsets, (&start, &found));
         let points_known = held::point_deviations(&found, options.offsets);
         if let Some(folder) = &self.report {

@@ -8,6 +8,7 @@ use agv_host_sim::export::velodyne::CaptureWriter;
 use agv_host_sim::file_kind;
 use agv_host_sim::import::range_image::RangeImages;
 use agv_host_sim::lidar3d::{SetupOptions, Source, setup};
+use agv_host_sim::output_file;
 use agv_lidar3d::calibration::Calibration;
 use anyhow::{Context, bail};
 use serde_json::json;
@@ -74,7 +75,7 @@ impl Convert {
     }
 
     fn write(&self, calibration: Calibration, text: impl Fn(&Calibration) -> String) -> anyhow::Result<()> {
-        std::fs::write(&self.output, text(&calibration)).with_context(|| self.output.display().to_string())?;
+        output_file::write(&self.output, text(&calibration)).with_context(|| self.output.display().to_string())?;
         let lasers = calibration.lasers.len();
         if self.json {
             println!("{}", json!({ "lasers": lasers }));

@@ -1,12 +1,13 @@
 //! The formats of point clouds.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
 use agv_lidar3d::packet::Point;
 use pcd_rs::{DataKind, PcdSerialize, Schema, ValueKind, WriterInit};
 use ply_rs_bw::ply::{Addable, ElementDef, Encoding, Ply, PropertyAccess, PropertyDef, PropertyType, ScalarType};
+
+use crate::output_file::OutputFile;
 
 /// Length of a count of a coordinate in LAS, m.
 const LAS_RESOLUTION: f64 = 1e-4;
@@ -62,11 +63,13 @@ pub(super) fn write_pcd(
         schema: None,
         version: None,
     };
-    let mut writer = init.create(path).map_err(|error| error.to_string())?;
+    let mut file = OutputFile::create(path).map_err(|error| error.to_string())?;
+    let mut writer = init.build_from_writer(&mut file).map_err(|error| error.to_string())?;
     for point in points {
         writer.push(&PcdPoint(point)).map_err(|error| error.to_string())?;
     }
-    writer.finish().map_err(|error| error.to_string())
+    writer.finish().map_err(|error| error.to_string())?;
+    file.finish().map_err(|error| error.to_string())
 }
 
 /// A point as the writer of PLY asks for it.
@@ -113,9 +116,9 @@ fn try_ply(path: &Path, points: &[Point]) -> io::Result<()> {
     ply.header.encoding = Encoding::BinaryLittleEndian;
     ply.header.elements.add(element);
     ply.payload.insert("vertex".to_owned(), points.iter().map(|point| PlyPoint(*point)).collect());
-    let mut file = BufWriter::new(File::create(path)?);
+    let mut file = OutputFile::create(path)?;
     ply_rs_bw::writer::Writer::new().write_ply(&mut file, &mut ply)?;
-    file.flush()
+    file.finish()
 }
 
 /// Writes points as LAS.
@@ -128,11 +131,11 @@ fn try_las(path: &Path, points: &[Point]) -> las::Result<()> {
     let transform = las::Transform { scale: LAS_RESOLUTION, offset: 0.0 };
     builder.transforms = las::Vector { x: transform, y: transform, z: transform };
     builder.generating_software = concat!("agv ", env!("CARGO_PKG_VERSION")).to_owned();
-    let mut writer = las::Writer::from_path(path, builder.into_header()?)?;
+    let mut writer = las::Writer::new(OutputFile::create(path)?, builder.into_header()?)?;
     for point in points {
         let [x, y, z] = point.position.map(f64::from);
         let intensity = point.intensity;
         writer.write_point(las::Point { x, y, z, intensity, user_data: point.ring, ..las::Point::default() })?;
     }
-    writer.close()
+    Ok(writer.into_inner()?.finish()?)
 }

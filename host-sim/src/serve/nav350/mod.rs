@@ -5,7 +5,11 @@
 //! until then the first revolution is repeated, and the last one when it is over.
 
 mod drive;
+mod factory;
+mod mapping;
+mod pending;
 mod promise;
+mod seen;
 mod sensor;
 
 use std::io::{self, Read, Write};
@@ -31,11 +35,13 @@ pub struct Options {
     pub dialect: Option<Dialect>,
     /// Whether the vehicle stands until [`Nav350::begin`].
     pub stands: bool,
+    /// Time from the acknowledgement of a slow method to its result, s; at zero both leave in one piece.
+    pub gap: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { speed: 1.0, clock_start: 0, dialect: None, stands: false }
+        Self { speed: 1.0, clock_start: 0, dialect: None, stands: false, gap: 0.0 }
     }
 }
 
@@ -51,7 +57,8 @@ impl Nav350 {
     #[must_use]
     pub fn new(drive: Drive, options: Options) -> Self {
         let clock = SensorClockOptions { start: options.clock_start, ..SensorClockOptions::default() };
-        let sensor = Mutex::new(Sensor::new(drive, clock, options.dialect, options.stands));
+        let sensor = Sensor::new(drive, clock, options.dialect, options.stands).with_gap(options.gap);
+        let sensor = Mutex::new(sensor);
         Self { speed: options.speed, started: Instant::now(), sensor }
     }
 

@@ -3,13 +3,14 @@
 
 use agv_wire::cola::{CommandWord, Deframed, Deframer, Dialect, Fault, Raw, Sequence, Telegram, Text};
 use agv_wire::nav350::{
-    Answer, Coordinate, CoordinateFormat, DeviceTime, ErrorCode, IdentifiedLandmark, LandmarkDataFormat,
-    MapConfiguration, Method, MethodName, MethodResult, Milliangle, OperatingMode, PoseDataFormat, ReflectorType,
-    Request, ScanDataFormat, Setting, Size, SpeedReport, UserLevel, Value, Variable,
+    Answer, DeviceTime, ErrorCode, IdentifiedLandmark, Method, MethodName, MethodResult, OperatingMode, Request,
+    Setting, Size, SpeedReport, UserLevel, Value, Variable,
 };
 
 use super::drive::Drive;
-use super::promise::{Promise, PromisedMethod};
+use super::factory;
+use super::pending::Pending;
+use super::promise::PromisedMethod;
 
 /// A sensor. Times are seconds since it was started, by a right clock.
 pub struct Sensor {
@@ -24,6 +25,10 @@ pub struct Sensor {
     speed: Option<SpeedReport>,
     /// When the drive began.
     pub(super) drive_start: Option<f64>,
+    /// Time from an acknowledgement to the result, s.
+    pub(super) gap: f64,
+    /// Directions in which nothing is to be seen, as they were written, and how.
+    muted: (Dialect, Vec<u8>),
 }
 
 /// What the sensor's own clock shows.
@@ -49,7 +54,7 @@ impl SensorClockOptions {
 #[derive(Default)]
 pub struct Connection {
     deframer: Box<Deframer<65_536>>,
-    promise: Option<Promise>,
+    pending: Pending,
 }
 
 impl Connection {
@@ -63,7 +68,7 @@ impl Connection {
             while let Some(found) = self.deframer.next() {
                 let Deframed::Telegram { dialect, payload, .. } = found else { continue };
                 if sensor.dialect.is_none_or(|only| only == dialect) {
-                    answers.extend(sensor.answer(dialect, payload, now, &mut self.promise));
+                    answers.extend(sensor.answer(dialect, payload, now, &mut self.pending));
                 }
             }
         }
@@ -73,13 +78,12 @@ impl Connection {
     /// When the sensor will have something to say by itself.
     #[must_use]
     pub fn due(&self) -> Option<f64> {
-        self.promise.map(|promise| promise.due)
+        self.pending.due()
     }
 
     /// What the sensor says by itself.
     pub fn poll(&mut self, sensor: &Sensor, now: f64) -> Option<Vec<u8>> {
-        let promise = self.promise.take_if(|promise| promise.due <= now)?;
-        Some(sensor.keep(&promise))
+        self.pending.poll(sensor, now)
     }
 }
 
@@ -87,27 +91,6 @@ impl Sensor {
     /// A sensor that was just started.
     #[must_use]
     pub fn new(drive: Drive, clock: SensorClockOptions, dialect: Option<Dialect>, stands: bool) -> Self {
-        let settings = vec![
-            Setting::CurrentLayer(0),
-            Setting::PoseDataFormat(PoseDataFormat { is_extrapolated: false, has_details: false }),
-            Setting::LandmarkDataFormat(LandmarkDataFormat {
-                coordinates: CoordinateFormat::Cartesian,
-                has_details: false,
-                filter: 0,
-            }),
-            Setting::ScanDataFormat(ScanDataFormat { channels: 1, has_remission: false }),
-            Setting::SlidingMean(4),
-            Setting::MapConfiguration(MapConfiguration {
-                mean: 10,
-                only_unknown: false,
-                x: Coordinate(0),
-                y: Coordinate(0),
-                heading: Milliangle(0),
-            }),
-            Setting::ReflectorSize(Size(80)),
-            Setting::ReflectorType(ReflectorType::Cylindrical),
-            Setting::NearestReflectors(0),
-        ];
         let layout = drive.layout().to_vec();
         Self {
             drive,
@@ -117,16 +100,30 @@ impl Sensor {
             mode: OperatingMode::PowerDown,
             level: 0,
             layout,
-            settings,
+            settings: factory::settings(),
             speed: None,
             drive_start: None,
+            gap: 0.0,
+            muted: (Dialect::Ascii, b"0".to_vec()),
         }
+    }
+
+    /// The same sensor, whose results follow their acknowledgements by so many seconds.
+    #[must_use]
+    pub fn with_gap(self, gap: f64) -> Self {
+        Self { gap, ..self }
     }
 
     /// The speed that the sensor was told last.
     #[must_use]
     pub fn speed(&self) -> Option<SpeedReport> {
         self.speed
+    }
+
+    /// What the sensor sees.
+    #[must_use]
+    pub fn drive(&self) -> &Drive {
+        &self.drive
     }
 
     /// The layout as it is now.
@@ -145,15 +142,15 @@ impl Sensor {
     }
 
     /// The bytes that answer a payload at once.
-    fn answer(&mut self, dialect: Dialect, payload: &[u8], now: f64, promise: &mut Option<Promise>) -> Vec<u8> {
+    fn answer(&mut self, dialect: Dialect, payload: &[u8], now: f64, pending: &mut Pending) -> Vec<u8> {
         match Request::decode(dialect, payload) {
             Ok(Request::Read(variable)) => self.read(dialect, variable),
-            Ok(Request::ReadOther(name)) => {
-                let zero: &[u8] = if dialect == Dialect::Ascii { b"0" } else { b"\0" };
-                encode(dialect, &Answer::Value(Value::Other(name, Raw { dialect, bytes: zero })))
+            Ok(Request::ReadOther(name)) if MethodName::find(name).is_some() => {
+                refuse(dialect, Fault::UNKNOWN_VARIABLE)
             }
+            Ok(Request::ReadOther(name)) => zero(dialect, name),
             Ok(Request::Write(setting)) => self.write(dialect, &setting),
-            Ok(Request::Call(method)) => self.call(dialect, &method, now, promise),
+            Ok(Request::Call(method)) => self.call(dialect, &method, now, pending),
             Err(_) => refuse(dialect, why(dialect, payload)),
         }
     }
@@ -164,6 +161,11 @@ impl Sensor {
             Variable::DeviceIdent => Value::DeviceIdent(text("NAV350"), text("emulated")),
             Variable::SerialNumber => Value::SerialNumber(text("00000000")),
             Variable::FirmwareVersion => Value::FirmwareVersion(text("emulated")),
+            Variable::DeviceInfo => return zero(dialect, variable.name()),
+            Variable::MutedSectors if self.muted.1 == b"0" => return zero(dialect, variable.name()),
+            // What the list means is not known, so it cannot be said in the other dialect.
+            Variable::MutedSectors if self.muted.0 != dialect => return refuse(dialect, Fault::LOCAL_CONDITION),
+            Variable::MutedSectors => Value::Setting(Setting::MutedSectors(Raw { dialect, bytes: &self.muted.1 })),
             _ => match self.settings.iter().find(|setting| setting.variable() == variable) {
                 Some(setting) => Value::Setting(*setting),
                 None => return refuse(dialect, Fault::UNKNOWN_VARIABLE),
@@ -180,6 +182,10 @@ impl Sensor {
         if self.level < UserLevel::AuthorisedClient.number() {
             return refuse(dialect, Fault::ACCESS_DENIED);
         }
+        if let Setting::MutedSectors(sectors) = setting {
+            self.muted = (sectors.dialect, sectors.bytes.to_vec());
+            return encode(dialect, &Answer::Written(variable));
+        }
         let Some(owned) = owned(setting) else { return refuse(dialect, Fault::INVALID_DATA) };
         match owned {
             Setting::ReflectorSize(Size(size)) if !(1..=150).contains(&size) => {
@@ -195,11 +201,13 @@ impl Sensor {
         encode(dialect, &Answer::Written(variable))
     }
 
-    fn call(&mut self, dialect: Dialect, method: &Method, now: f64, promise: &mut Option<Promise>) -> Vec<u8> {
+    fn call(&mut self, dialect: Dialect, method: &Method, now: f64, pending: &mut Pending) -> Vec<u8> {
         let name = method.name();
         let needs_level = !matches!(
             name,
             MethodName::SetAccessMode
+                | MethodName::ChangeState
+                | MethodName::DoMapping
                 | MethodName::GetTimestamp
                 | MethodName::GetData
                 | MethodName::GetPose
@@ -295,28 +303,48 @@ impl Sensor {
             }
             Method::GetData { wait, mask } => {
                 let promised = PromisedMethod::Data { wait: *wait, mask: *mask as u8 };
-                return self.promise(dialect, name, promised, *wait, now, promise);
+                return self.promise(dialect, name, promised, *wait, now, pending);
             }
             Method::GetPose { wait } => {
                 let promised = PromisedMethod::Pose { wait: *wait };
-                return self.promise(dialect, name, promised, *wait, now, promise);
+                return self.promise(dialect, name, promised, *wait, now, pending);
             }
             Method::GetLandmarkData { wait, dataset } => {
                 let promised = PromisedMethod::Landmarks { wait: *wait, dataset: *dataset };
-                return self.promise(dialect, name, promised, *wait, now, promise);
+                return self.promise(dialect, name, promised, *wait, now, pending);
             }
             Method::DoMapping => {
-                return self.promise(dialect, name, PromisedMethod::Mapping, true, now, promise);
+                return self.promise(dialect, name, PromisedMethod::Mapping, true, now, pending);
             }
             _ => MethodResult::Plain(name, Some(ErrorCode::OK)),
         };
-        let mut bytes = Vec::new();
-        if name.is_slow() {
-            bytes = encode(dialect, &Answer::Accepted(name));
+        let result = encode(dialect, &Answer::Result(result));
+        if name.is_slow() { self.accept(dialect, name, result, now, pending) } else { result }
+    }
+
+    /// An acknowledgement, and the result now or after the gap.
+    pub(super) fn accept(
+        &self,
+        dialect: Dialect,
+        name: MethodName,
+        result: Vec<u8>,
+        now: f64,
+        pending: &mut Pending,
+    ) -> Vec<u8> {
+        let mut bytes = encode(dialect, &Answer::Accepted(name));
+        if self.gap > 0.0 {
+            pending.delay(now + self.gap, result);
+        } else {
+            bytes.extend(result);
         }
-        bytes.extend(encode(dialect, &Answer::Result(result)));
         bytes
     }
+}
+
+/// The value of a variable that nobody knows more of.
+fn zero(dialect: Dialect, name: &str) -> Vec<u8> {
+    let zero: &[u8] = if dialect == Dialect::Ascii { b"0" } else { b"\0" };
+    encode(dialect, &Answer::Value(Value::Other(name, Raw { dialect, bytes: zero })))
 }
 
 pub(super) fn encode(dialect: Dialect, answer: &Answer) -> Vec<u8> {

@@ -4,6 +4,8 @@
 //! the value of the project's standard block storage, which is also what `Scenario::default` is.
 
 mod check;
+pub mod keys;
+mod line;
 mod sensors;
 mod start;
 mod vehicle;
@@ -32,7 +34,7 @@ use super::world::World;
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
     /// The file cannot be read.
-    #[error("the scenario {path} cannot be read")]
+    #[error("{}: the scenario cannot be read: {source}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -40,7 +42,7 @@ pub enum ScenarioError {
         source: std::io::Error,
     },
     /// The file is empty.
-    #[error("the scenario {path} is empty")]
+    #[error("{}: the scenario is empty", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -57,10 +59,34 @@ pub enum ScenarioError {
     #[error("the scenario's {key} must be {demand}")]
     Value {
         /// Where it stands.
-        key: &'static str,
+        key: String,
+        /// What it is, if it is a number.
+        value: Option<f64>,
         /// What it must be.
-        demand: &'static str,
+        demand: String,
     },
+    /// A line of a file cannot be used.
+    #[error("{}:{line}: {problem}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl ScenarioError {
+    /// The same with the file and the line that it comes from.
+    fn of_file(self, path: &FilePath, text: &str) -> Self {
+        let (line, problem) = match &self {
+            Self::Parse { line, problem } => (Some(*line), format!("this is not a scenario: {problem}")),
+            Self::Value { key, value, .. } => (line::of_key(text, key, *value), self.to_string()),
+            _ => return self,
+        };
+        Self::Line { path: path.to_owned(), line: line.unwrap_or(1), problem }
+    }
 }
 
 /// A drive to simulate.
@@ -121,7 +147,7 @@ impl Scenario {
         if text.trim().is_empty() {
             return Err(ScenarioError::Empty { path: path.to_path_buf() });
         }
-        Self::parse(&text)
+        Self::parse(&text).map_err(|error| error.of_file(path, &text))
     }
 
     /// Reads a scenario from the text of a file.

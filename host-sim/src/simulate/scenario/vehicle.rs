@@ -113,6 +113,12 @@ pub struct VehicleErrors {
     pub random_signs: bool,
     /// True wheelbase minus the believed one, m.
     pub wheelbase_error: f64,
+    /// A mistake: the driving wheel's encoder counts the wrong way.
+    pub drive_reversed: bool,
+    /// A mistake: the steering's encoder counts the wrong way.
+    pub steering_reversed: bool,
+    /// A mistake: each encoder is taken for the other.
+    pub encoders_swapped: bool,
     /// True mounting of the laser (S in R) minus the believed one, component by component.
     pub laser_error: PoseOptions,
 }
@@ -125,6 +131,9 @@ impl Default for VehicleErrors {
             steering_offset_backward_error_deg: 0.0,
             random_signs: true,
             wheelbase_error: 0.0,
+            drive_reversed: false,
+            steering_reversed: false,
+            encoders_swapped: false,
             laser_error: PoseOptions::default(),
         }
     }

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
+use agv_host_sim::output_file::OutputFile;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -22,14 +23,14 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), ResultsError> {
         problem: problem.to_string(),
     };
     let schema = rows.schema().map_err(format)?;
-    let file = File::create(path).map_err(|source| ResultsError::Io { path: path.to_path_buf(), source })?;
+    let io = |source| ResultsError::Io { path: path.to_path_buf(), source };
+    let file = OutputFile::create(path).map_err(io)?;
     let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).map_err(format)?;
     let mut group = writer.next_row_group().map_err(format)?;
     rows.write_to_row_group(&mut group).map_err(format)?;
     group.close().map_err(format)?;
-    writer.close().map_err(format)?;
-    Ok(())
+    writer.into_inner().map_err(format)?.finish().map_err(io)
 }
 
 /// Reads rows.

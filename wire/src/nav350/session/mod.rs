@@ -41,9 +41,14 @@ pub enum Step<'a> {
 pub struct Session<const N: usize = BUFFER> {
     deframer: Deframer<N>,
     received: Time,
+    /// Bytes since the last telegram that answered something.
+    unanswering: usize,
     request: [u8; REQUEST],
     conversation: Conversation,
 }
+
+/// So many bytes without an answer, and the other side is no sensor, or out of its mind. The longest answer has 35 kB.
+const LONGEST_BABBLE: usize = 1 << 20;
 
 impl<const N: usize> Session<N> {
     /// A session that has not begun. It asks for a connection at once.
@@ -52,6 +57,7 @@ impl<const N: usize> Session<N> {
         Self {
             deframer: Deframer::new(),
             received: Time::default(),
+            unanswering: 0,
             request: [0; REQUEST],
             conversation: Conversation::new(configuration),
         }
@@ -81,6 +87,7 @@ impl<const N: usize> Session<N> {
             self.deframer.clear();
             self.conversation.begin();
             self.received = now;
+            self.unanswering = 0;
         }
     }
 
@@ -105,6 +112,10 @@ impl<const N: usize> Session<N> {
             return bytes.len();
         }
         self.received = now;
+        self.unanswering = self.unanswering.saturating_add(count);
+        if self.unanswering > LONGEST_BABBLE {
+            self.conversation.lose(LostReason::Babble);
+        }
         count
     }
 
@@ -119,7 +130,7 @@ impl<const N: usize> Session<N> {
         now: Time,
         revolution: &mut Revolution<BEAMS, REFLECTORS>,
     ) -> Step<'_> {
-        let Self { deframer, received, request, conversation } = self;
+        let Self { deframer, received, unanswering, request, conversation } = self;
         if let Some(report) = conversation.reports.pop_front() {
             return Step::Report(report);
         }
@@ -134,7 +145,11 @@ impl<const N: usize> Session<N> {
             match found {
                 Deframed::Rubbish(count) => return Step::Report(Report::Rubbish(count)),
                 Deframed::Telegram { dialect, payload, .. } => {
-                    match conversation.take(dialect, payload, *received, revolution) {
+                    let taken = conversation.take(dialect, payload, *received, revolution);
+                    if !matches!(taken, Taken::Report(Report::Undecodable(_) | Report::Unexpected)) {
+                        *unanswering = 0;
+                    }
+                    match taken {
                         Taken::Nothing => {}
                         Taken::Revolution => return Step::Revolution,
                         Taken::Report(report) => return Step::Report(report),

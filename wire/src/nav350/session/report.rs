@@ -43,6 +43,8 @@ pub enum LostReason {
     Failed(MethodName, ErrorCode),
     /// More bytes came than a telegram can have.
     Overflow,
+    /// A mebibyte came, and no answer in it.
+    Babble,
 }
 
 impl fmt::Display for State {
@@ -70,6 +72,7 @@ impl fmt::Display for LostReason {
             Self::Refused(state, fault) => write!(formatter, "refused while {state}: {fault}"),
             Self::Failed(method, error) => write!(formatter, "{} failed: {error}", method.name()),
             Self::Overflow => write!(formatter, "a telegram was too long"),
+            Self::Babble => write!(formatter, "1 MiB came without an answer in it"),
         }
     }
 }
