@@ -5,6 +5,7 @@ pub mod capture;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;
+mod line_times;
 pub mod packets;
 mod posed_scan;
 pub mod poses;
