@@ -75,6 +75,7 @@
 #![forbid(unsafe_code)]
 
 pub mod calibration;
+pub mod contours;
 pub mod filter;
 pub mod geometry;
 pub mod integrity;
