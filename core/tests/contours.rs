@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::ContourMatcher;
+use agv_core::contours::{ContourMatcher, Prediction};
 use agv_core::geometry::{Pose, difference};
 use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::PointScan;
@@ -93,7 +93,7 @@ fn drive(walls: &Walls, path: &[Pose], laser: Laser, seed: u64) -> Drift {
             let step = path[number - 1].between(truth);
             let way = step.position().norm();
             let odometry = Pose::new(1.02 * step.x, 1.02 * step.y, step.theta + way * 0.2_f64.to_radians());
-            let aligned = matcher.align(&found.compose(&odometry)).unwrap();
+            let aligned = matcher.align(&Prediction::by_odometry(&found, &odometry)).unwrap();
             (found, free) = (aligned.pose, free + usize::from(aligned.free_axis.is_some()));
         }
         matcher.keep(&found);

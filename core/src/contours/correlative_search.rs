@@ -6,6 +6,7 @@ use core::f32::consts::PI;
 
 use heapless::Vec;
 
+use super::likelihood_grid::CELL;
 use super::{LikelihoodGrid, SurfacePoint};
 use crate::geometry::{Pose, Transform, wrap};
 use crate::order::Evenly;
@@ -34,6 +35,12 @@ impl SearchWindow {
 
     /// Where the usual window holds nothing that fits: 2 m and one radian.
     pub const WIDE: Self = Self { shifts: 10, shift: 2, turns: 10, turn: 6.0 * PI / 180.0, distance: 1.2 };
+
+    /// Length of a step, m.
+    #[must_use]
+    pub fn step(&self) -> f32 {
+        f32::from(self.shift) * CELL
+    }
 }
 
 /// Turn from the prediction at which a pose has lost a fifth of its weight, rad.
@@ -69,10 +76,7 @@ pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, 
             for column in shifts.clone() {
                 let sum: u32 =
                     cells.iter().map(|(x, y)| u32::from(grid.value(x + column * step, y + row * step))).sum();
-                let (x, y) = (
-                    (column * step) as f32 * super::likelihood_grid::CELL,
-                    (row * step) as f32 * super::likelihood_grid::CELL,
-                );
+                let (x, y) = ((column * step) as f32 * CELL, (row * step) as f32 * CELL);
                 let by_shift = (1.0 - 0.2 * (x * x + y * y) / (window.distance * window.distance)).max(0.5);
                 let weighted = sum as f32 * by_turn * by_shift;
                 if weighted > best_weighted {

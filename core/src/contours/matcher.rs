@@ -3,7 +3,7 @@
 use heapless::Vec;
 use nalgebra::Matrix3;
 
-use super::{KeyRing, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
+use super::{KeyRing, Prediction, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
 use crate::geometry::{Pose, ScanPoint};
 use crate::sensing::PointScan;
 
@@ -67,7 +67,7 @@ impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> ContourMatcher<P
 
     /// Where the scan was taken, if the prediction is not too far off. None if it says nothing.
     #[must_use]
-    pub fn align(&self, predicted: &Pose) -> Option<ContourMatch> {
+    pub fn align(&self, predicted: &Prediction) -> Option<ContourMatch> {
         align(&self.points, &self.submap, predicted)
     }
 
@@ -93,14 +93,18 @@ impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> Default for Cont
 
 /// The pose of points in any submap: search, refinement, and a free axis that stays where the prediction has it.
 #[must_use]
-pub fn align<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, predicted: &Pose) -> Option<ContourMatch> {
-    let inside = map.origin().between(predicted);
+pub fn align<const ROOM: usize>(
+    points: &[SurfacePoint],
+    map: &Submap<ROOM>,
+    predicted: &Prediction,
+) -> Option<ContourMatch> {
+    let inside = map.origin().between(&predicted.pose);
     let share = |inliers: u32| inliers as f32 / points.len().max(1) as f32;
     let look = |window: &SearchWindow| {
         let start = search(points, map.grid(), &inside, window).pose;
         refine(points, map, &start)
     };
-    let usual = look(&SearchWindow::USUAL);
+    let usual = look(&predicted.window());
     let is_poor = usual.is_none_or(|found| share(found.inliers) < POOR_SHARE);
     let wide = if is_poor { look(&SearchWindow::WIDE) } else { None };
     let found = match (usual, wide) {
