@@ -14,6 +14,12 @@ use crate::order::Evenly;
 /// Points that are looked up.
 const POINTS: usize = 90;
 
+/// So many even for many poses.
+const FEWEST_POINTS: usize = 30;
+
+/// Values that are looked up, where poses are no more than for that number of points.
+const LOOK_UPS: usize = 120_000;
+
 /// What is searched around a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchWindow {
@@ -34,7 +40,13 @@ impl SearchWindow {
     pub const USUAL: Self = Self { shifts: 2, shift: 2, turns: 9, turn: 3.0 * PI / 180.0, distance: 0.3 };
 
     /// Where the usual window holds nothing that fits: 2 m and one radian.
-    pub const WIDE: Self = Self { shifts: 10, shift: 2, turns: 10, turn: 6.0 * PI / 180.0, distance: 1.2 };
+    pub const WIDE: Self = Self { shifts: 5, shift: 4, turns: 10, turn: 6.0 * PI / 180.0, distance: 1.2 };
+
+    /// Number of poses; at least one.
+    fn poses(&self) -> usize {
+        let sides = |steps: u8| 2 * usize::from(steps) + 1;
+        sides(self.shifts) * sides(self.shifts) * sides(self.turns)
+    }
 
     /// Length of a step, m.
     #[must_use]
@@ -58,8 +70,9 @@ pub struct SearchResult {
 /// Looks around `predicted`, a pose in the frame of the grid. Without points the prediction is the answer.
 #[must_use]
 pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, window: &SearchWindow) -> SearchResult {
-    let mut evenly = Evenly::new(POINTS, points.len());
-    let chosen: Vec<&SurfacePoint, POINTS> = points.iter().filter(|_| evenly.takes()).take(POINTS).collect();
+    let room = (LOOK_UPS / window.poses()).clamp(FEWEST_POINTS, POINTS);
+    let mut evenly = Evenly::new(room, points.len());
+    let chosen: Vec<&SurfacePoint, POINTS> = points.iter().filter(|_| evenly.takes()).take(room).collect();
     let mut best = SearchResult { pose: *predicted, score: 0.0 };
     let mut best_weighted = 0.0;
     let step = i32::from(window.shift);

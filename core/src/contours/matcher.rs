@@ -28,7 +28,7 @@ pub struct ContourMatch {
 
 /// Surfaces of the last `KEYS` key scans of at most `POINTS` points, and of the present one, in a submap with room for `ROOM`.
 #[derive(Clone, Debug)]
-pub struct ContourMatcher<const POINTS: usize = 400, const KEYS: usize = 20, const ROOM: usize = 3072> {
+pub struct ContourMatcher<const POINTS: usize = 400, const KEYS: usize = 20, const ROOM: usize = 4096> {
     points: Vec<SurfacePoint, POINTS>,
     ring: KeyRing<KEYS, POINTS>,
     submap: Submap<ROOM>,

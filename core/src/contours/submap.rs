@@ -18,9 +18,6 @@ const SIDE: usize = 54;
 /// Points nearer than this are one if they face the same way, m.
 const SAME: f32 = 0.025;
 
-/// Cosine of the angle up to which normals are alike: 32 deg.
-const ALIKE: f32 = 0.848;
-
 /// No point.
 const NONE: u16 = u16::MAX;
 
@@ -127,9 +124,10 @@ impl<const ROOM: usize> Submap<ROOM> {
     /// The nearest point of the same kind that faces the same way, if it is within `reach` (m, at most [`LARGEST_REACH`]).
     #[must_use]
     pub fn nearest(&self, point: &SurfacePoint, reach: f32) -> Option<SurfacePoint> {
-        let is_corner = point.is_corner();
+        let sought = PackedPoint::of(point)?;
+        let reach_in_counts = reach * 1000.0;
+        let mut nearest = (reach_in_counts * reach_in_counts) as u32;
         let mut best = None;
-        let mut nearest = reach * reach;
         let (low, high) = (Self::column(point.position.x - reach), Self::column(point.position.x + reach));
         let (bottom, top) = (Self::column(point.position.y - reach), Self::column(point.position.y + reach));
         for row in self.first.get(bottom..=top)? {
@@ -139,16 +137,14 @@ impl<const ROOM: usize> Submap<ROOM> {
                 for _ in 0..ROOM {
                     let Some(entry) = self.entries.get(usize::from(number)) else { break };
                     number = entry.next;
-                    let other = entry.point.unpacked();
-                    let square = (other.position - point.position).norm_squared();
-                    let is_alike = if is_corner { other.is_corner() } else { other.normal.dot(&point.normal) > ALIKE };
-                    if square < nearest && is_alike {
-                        (nearest, best) = (square, Some(other));
+                    let square = entry.point.square(&sought);
+                    if square < nearest && entry.point.is_like(&sought) {
+                        (nearest, best) = (square, Some(entry.point));
                     }
                 }
             }
         }
-        best
+        best.map(|point| point.unpacked())
     }
 
     /// The column, or row, of a coordinate, the nearest one if it is outside.

@@ -31,6 +31,9 @@ const COUNTS: f32 = 1000.0;
 /// Counts for the length of a normal.
 const UNIT: f32 = 127.0;
 
+/// Scalar product of two normals, in counts, of which the angle between them is 32 deg.
+const ALIKE: i32 = 13_677;
+
 /// A point in 6 bytes: millimetres, and a normal to half a degree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PackedPoint {
@@ -53,6 +56,24 @@ impl PackedPoint {
             y: count(point.position.y)?,
             normal: [normal(point.normal.x), normal(point.normal.y)],
         })
+    }
+
+    /// Square of the distance from another, mm^2; large if it is large.
+    #[must_use]
+    #[inline]
+    pub(super) fn square(&self, other: &Self) -> u32 {
+        let (x, y) = (i32::from(self.x) - i32::from(other.x), i32::from(self.y) - i32::from(other.y));
+        // Each is below 2^16.
+        x.unsigned_abs().pow(2).saturating_add(y.unsigned_abs().pow(2))
+    }
+
+    /// Whether both are corners, or face the same way within 32 deg.
+    #[must_use]
+    #[inline]
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let [x, y] = self.normal.map(i32::from);
+        let [other_x, other_y] = other.normal.map(i32::from);
+        x * other_x + y * other_y > ALIKE || (self.normal == [0; 2] && other.normal == [0; 2])
     }
 
     /// The point as it is computed with.

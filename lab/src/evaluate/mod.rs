@@ -3,6 +3,8 @@
 pub mod calibration;
 pub mod carpark;
 pub mod carpark_starts;
+pub mod contour_map;
+mod contours;
 pub mod demonstration;
 pub mod falko;
 pub mod features;
