@@ -2,8 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::{ContourMatcher, Prediction};
-use agv_core::geometry::{Pose, difference};
+use agv_core::contours::{
+    ContourMatcher, KeptMap, KeptMapError, KeptPoint, Prediction, SurfacePoint, Surroundings, TILE, Tile,
+};
+use agv_core::geometry::{Pose, ScanPoint, difference};
 use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::PointScan;
 
@@ -69,26 +71,30 @@ struct Drift {
     free: usize,
 }
 
+fn see(matcher: &mut ContourMatcher, walls: &Walls, pose: &Pose, laser: Laser, noise: &mut Noise) {
+    let ranges = ranges(walls, pose, laser, noise);
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: Time::default(),
+        beam_interval: 0.0,
+        first_bearing: -0.5 * laser.span,
+        bearing_step: laser.span / laser.beams as f64,
+        ranges: &ranges,
+        intensities: &[],
+    };
+    let mut points: Box<PointScan<1440>> = Box::default();
+    points.set(&scan, 0.02, 80.0);
+    matcher.see(&points);
+}
+
 /// Drives through walls. The odometry has the way 2 % too long, and turns by 0.2 deg too much for a metre.
 fn drive(walls: &Walls, path: &[Pose], laser: Laser, seed: u64) -> Drift {
     let mut noise = Noise(seed);
     let mut matcher: Box<ContourMatcher> = Box::default();
-    let mut points: Box<PointScan<1440>> = Box::default();
     let mut found = path[0];
     let mut free = 0;
     for (number, truth) in path.iter().enumerate() {
-        let ranges = ranges(walls, truth, laser, &mut noise);
-        let scan = Scan {
-            laser: LaserId::FIRST,
-            start: Time::default(),
-            beam_interval: 0.0,
-            first_bearing: -0.5 * laser.span,
-            bearing_step: laser.span / laser.beams as f64,
-            ranges: &ranges,
-            intensities: &[],
-        };
-        points.set(&scan, 0.02, 80.0);
-        matcher.see(&points);
+        see(&mut matcher, walls, truth, laser, &mut noise);
         if number > 0 {
             let step = path[number - 1].between(truth);
             let way = step.position().norm();
@@ -151,4 +157,110 @@ fn niches_of_a_corridor_say_how_far_the_vehicle_has_come() {
             assert!(drift.across.abs() < 0.03, "{what}: {} m across", drift.across);
         }
     }
+}
+
+/// A room of 12 m x 9 m with a nook and a cupboard.
+fn room() -> Walls {
+    vec![
+        [-2.0, -3.0, 10.0, -3.0],
+        [10.0, -3.0, 10.0, 6.0],
+        [10.0, 6.0, 3.0, 6.0],
+        [3.0, 6.0, 3.0, 5.0],
+        [3.0, 5.0, -2.0, 5.0],
+        [-2.0, 5.0, -2.0, -3.0],
+        [7.0, -3.0, 7.0, -2.2],
+        [7.0, -2.2, 8.2, -2.2],
+        [8.2, -2.2, 8.2, -3.0],
+    ]
+}
+
+#[test]
+fn a_room_holds_the_pose_to_millimetres() {
+    for laser in LASERS {
+        for seed in 1..=4 {
+            let drift = drive(&room(), &straight(5.0), laser, seed);
+            let what = format!("{} beams, seed {seed}", laser.beams);
+            assert!(drift.along.hypot(drift.across) < 0.02, "{what}: {} m, {} m", drift.along, drift.across);
+            assert!(drift.heading.abs() < 0.25_f64.to_radians(), "{what}: {} deg", drift.heading.to_degrees());
+            assert_eq!(drift.free, 0, "{what}");
+        }
+    }
+}
+
+/// Wheels slip, or a log has a gap: the step is wrong by more than the usual search looks for.
+#[test]
+fn a_step_of_the_wheels_beyond_the_usual_search_is_found() {
+    for laser in LASERS {
+        for (seed, wrong) in
+            [(1, Pose::new(1.3, 0.2, 0.1)), (2, Pose::new(-1.0, 0.9, -0.4)), (3, Pose::new(0.3, 0.0, 0.75))]
+        {
+            let mut noise = Noise(seed);
+            let mut matcher: Box<ContourMatcher> = Box::default();
+            for pose in straight(2.0) {
+                see(&mut matcher, &room(), &pose, laser, &mut noise);
+                matcher.keep(&pose);
+            }
+            let truth = Pose::new(2.2, 0.15, 0.1);
+            see(&mut matcher, &room(), &truth, laser, &mut noise);
+            let step = straight(2.0)[20].between(&truth.compose(&wrong));
+            let found = matcher.align(&Prediction::by_odometry(&straight(2.0)[20], &step)).unwrap();
+            let error = truth.between(&found.pose);
+            let what = format!("{} beams, {wrong:?}: {error:?}, share {}", laser.beams, found.share);
+            assert!(error.position().norm() < 0.05 && error.theta.abs() < 0.02, "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_turn_widens_what_is_searched_and_nonsense_does_not() {
+    let window = |step: Pose| Prediction::by_odometry(&Pose::default(), &step).window();
+    let usual = window(Pose::new(0.1, 0.0, 0.0));
+    assert!(window(Pose::new(0.0, 0.0, 1.5)).turns > usual.turns, "a turn on the spot is wrong by a share of it");
+    assert_eq!(window(Pose::new(0.0, 0.0, 1.5)).shifts, usual.shifts);
+    assert!(window(Pose::new(4.0, 0.0, 0.0)).shifts > usual.shifts);
+    assert_eq!(window(Pose { x: f64::NAN, y: 0.0, theta: f64::NAN }), usual);
+}
+
+#[test]
+fn kept_points_are_true_to_a_millimetre_and_half_a_degree() {
+    let mut noise = Noise(5);
+    for _ in 0..1000 {
+        let position = ScanPoint::new(4.0 * noise.uniform() as f32, 4.0 * noise.uniform() as f32);
+        let angle = TAU * noise.uniform();
+        let normal = ScanPoint::new(angle.cos() as f32, angle.sin() as f32);
+        let kept = KeptPoint::of(&SurfacePoint { position, normal }).unpacked();
+        assert!((kept.position - position).norm() < 0.8e-3);
+        let turn = f64::from(kept.normal.y).atan2(f64::from(kept.normal.x));
+        assert!(difference(turn, angle).abs() < 0.5_f64.to_radians());
+    }
+    let corner = SurfacePoint { position: ScanPoint::new(1.0, 2.0), normal: ScanPoint::zeros() };
+    assert!(KeptPoint::of(&corner).unpacked().is_corner());
+}
+
+#[test]
+fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
+    let point = KeptPoint::of(&SurfacePoint { position: ScanPoint::new(1.0, 3.0), normal: ScanPoint::new(0.0, 1.0) });
+    let points = [point; 3];
+    let tile = |row, column, first| Tile { place: (row, column), first, count: 1 };
+    let tiles = [tile(-2, 5, 0), tile(0, 0, 1), tile(0, 7, 2)];
+    assert!(matches!(KeptMap::new(&[tiles[1], tiles[0]], &points), Err(KeptMapError::Order)));
+    assert!(matches!(KeptMap::new(&[tiles[0], tiles[0]], &points), Err(KeptMapError::Order)));
+    assert!(matches!(KeptMap::new(&[tile(0, 0, 3)], &points), Err(KeptMapError::Points)));
+    assert!(matches!(KeptMap::new(&[tile(0, 0, u32::MAX)], &points), Err(KeptMapError::Points)));
+
+    let map = KeptMap::new(&tiles, &points).unwrap();
+    let mut surroundings: Box<Surroundings> = Box::default();
+    // The three points are at (1, 3), (29, 3) and (21, -5).
+    assert_eq!(surroundings.around(&map, &Pose::new(2.0, 2.0, 0.3)).len(), 1);
+    assert_eq!(surroundings.around(&map, &Pose::new(25.0, 2.0, 0.3)).len(), 2);
+    let around = surroundings.around(&map, &Pose::new(14.0, 2.0, 0.3));
+    assert_eq!(around.len(), 3);
+    let at = |x: f64, y: f64| {
+        let position = ScanPoint::new((x - around.origin().x) as f32, (y - around.origin().y) as f32);
+        let sought = SurfacePoint { position, normal: ScanPoint::new(0.0, 1.0) };
+        around.nearest(&sought, 0.01).is_some_and(|found| (found.position - position).norm() < 2e-3)
+    };
+    assert!(at(1.0, 3.0) && at(29.0, 3.0) && at(21.0, -5.0) && !at(21.0, -4.9));
+    assert_eq!(surroundings.around(&map, &Pose::new(1e9, f64::NAN, 0.3)).len(), 3, "nowhere is no other place");
+    assert!((TILE - 4.0).abs() < 1e-12);
 }

@@ -13,6 +13,9 @@ const LEAST_SHARE: f32 = 0.03;
 /// If fewer of the points lie on surfaces, the pose is looked for further away.
 const POOR_SHARE: f32 = 0.5;
 
+/// What is found further away is believed if so many do, and twice as many as nearby.
+const SURE_SHARE: f32 = 0.7;
+
 /// What the surfaces say of the pose of the laser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourMatch {
@@ -108,7 +111,7 @@ pub fn align<const ROOM: usize>(
     let is_poor = usual.is_none_or(|found| share(found.inliers) < POOR_SHARE);
     let wide = if is_poor { look(&SearchWindow::WIDE) } else { None };
     let found = match (usual, wide) {
-        (Some(usual), Some(wide)) if share(wide.inliers) > POOR_SHARE && wide.inliers > 2 * usual.inliers => wide,
+        (Some(usual), Some(wide)) if share(wide.inliers) > SURE_SHARE && wide.inliers > 2 * usual.inliers => wide,
         (usual, wide) => usual.or(wide)?,
     };
     let free_axis = weak_axis(found.directions);
