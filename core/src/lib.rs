@@ -62,7 +62,7 @@
 //! | 7 | [`record`] |
 //! | 6 | [`localizer`] |
 //! | 5 | [`integrity`] |
-//! | 4 | [`calibration`], [`filter`], [`relocalization`], [`state`] |
+//! | 4 | [`calibration`], [`contours`], [`filter`], [`relocalization`], [`state`] |
 //! | 3 | [`maps`], [`odometry`], [`sensing`] |
 //! | 2 | [`measurement`] |
 //! | 1 | [`geometry`], [`order`] |
@@ -75,6 +75,7 @@
 #![forbid(unsafe_code)]
 
 pub mod calibration;
+pub mod contours;
 pub mod filter;
 pub mod geometry;
 pub mod integrity;

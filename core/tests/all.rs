@@ -1,6 +1,7 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod calibration;
+mod contours;
 mod covariance_repair;
 mod examples;
 mod falko;

@@ -37,7 +37,7 @@ const HOUSES: [House; 7] = [
             &["geometry", "order"],
             &["measurement"],
             &["maps", "odometry", "sensing"],
-            &["calibration", "filter", "relocalization", "state"],
+            &["calibration", "contours", "filter", "relocalization", "state"],
             &["sources"],
             &["integrity"],
             &["localizer"],

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod carpark;
+mod contour_map;
 mod falko;
 mod features;
 mod halting_points;
@@ -9,9 +10,11 @@ mod kidnapping;
 mod lidar3d_calibration;
 mod lidar3d_places;
 mod lidar3d_sharpness;
+mod office_drive;
 mod places;
 mod slam;
 mod soak;
+mod trajectory;
 mod trust;
 mod warehouse;
 mod windows;
@@ -46,6 +49,7 @@ pub struct Evaluate {
 enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
+    ContourMap(contour_map::ContourMap),
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
     Features(features::Features),
@@ -67,6 +71,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
+            Experiment::ContourMap(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
             Experiment::Features(experiment) => experiment.run(),

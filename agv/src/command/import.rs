@@ -107,7 +107,7 @@ impl Import {
             Format::Mcap | Format::Rosbag2 => self.ros_drive()?,
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
-            Format::Carmen => drive(&self.input, "CARMEN", &carmen::read(&self.input)?.front)?,
+            Format::Carmen => self.carmen_drive()?,
             Format::Graph => drive(&self.input, "pose-graph", &graph_log::read(&self.input)?.log)?,
             Format::Auto => unreachable!("the format has been found above"),
         };
@@ -162,6 +162,14 @@ impl Import {
             note(&format!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets));
         }
         Ok(found.raw)
+    }
+
+    fn carmen_drive(&self) -> anyhow::Result<Recording> {
+        let log = carmen::read(&self.input)?;
+        if !log.defects.is_none() {
+            note(&format!("agv: {}: {}", self.input.display(), log.defects));
+        }
+        drive(&self.input, "CARMEN", &log.front)
     }
 
     fn raw_drive(&self) -> anyhow::Result<Recording> {

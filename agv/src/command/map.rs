@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_host_sim::log;
 use agv_host_sim::mapping::{
-    Clustering, map_features, map_features_at, map_file, map_reflectors_at, reflector_clustering, slam::SlamParameters,
-    slam_poses,
+    Clustering, contour_file, contour_map, map_features, map_features_at, map_file, map_reflectors_at,
+    reflector_clustering, slam::SlamParameters, slam_poses,
 };
+use agv_host_sim::recording::{Recording, Truth};
 use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
@@ -20,9 +21,12 @@ Examples:
   agv map drive.agvlog --output features.csv --poses truth
   agv map drive.agvlog --output reflectors.csv --kind reflectors
   agv map drive.agvlog --output features.csv --slam
+  agv map drive.agvlog --output contours.csv --kind contours --poses references
 
-A map is a text file whose first line is 'id,kind,x_m,y_m,deviation_m', with one landmark a line.
-Keys of --json: reflectors, corners, end_points, largest_deviation_mm; with --slam also key_scans, loops.";
+A map of contours has the first line 'x_m,y_m,facing_deg', with one point of a surface a line.
+A map of landmarks has the first line 'id,kind,x_m,y_m,deviation_m', with one landmark a line.
+Keys of --json: reflectors, corners, end_points, largest_deviation_mm; of contours points, bytes; with --slam also
+key_scans, loops.";
 
 /// Build a map from a log with known poses.
 #[derive(clap::Args)]
@@ -42,6 +46,9 @@ pub struct Map {
     /// Find the poses too, from odometry, scans and the loops that are recognised; nothing is known of the hall.
     #[arg(long, conflicts_with = "poses")]
     slam: bool,
+    /// Size of the cells of a map of contours, m; 0.1 if absent.
+    #[arg(long)]
+    cell: Option<f64>,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
@@ -53,6 +60,8 @@ enum Kind {
     Features,
     /// Reflectors.
     Reflectors,
+    /// Contours: points of all surfaces.
+    Contours,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -80,6 +89,8 @@ struct Summary {
 impl Map {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        ensure!(self.cell.is_none() || self.kind == Kind::Contours, "--cell: only a map of contours has cells");
+        ensure!(self.cell.is_none_or(|cell| (0.02..=1.0).contains(&cell)), "--cell must be from 0.02 to 1 m");
         let size = std::fs::metadata(&self.log).map_or(0, |metadata| metadata.len());
         let reading = progress::bar("reading", size);
         let (recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
@@ -90,6 +101,8 @@ impl Map {
             Kind::Features => Poses::Localiser,
             Kind::Reflectors if recording.truth.is_empty() => Poses::References,
             Kind::Reflectors => Poses::Truth,
+            Kind::Contours if recording.truth.is_empty() => Poses::References,
+            Kind::Contours => Poses::Truth,
         };
         let poses = match self.poses.unwrap_or(default) {
             _ if self.slam => {
@@ -108,6 +121,15 @@ impl Map {
         if let Some((poses, name)) = &poses {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());
         }
+        if self.kind == Kind::Contours {
+            let Some((poses, _)) = &poses else {
+                bail!("contours are mapped from known poses; choose --poses truth or references, or --slam")
+            };
+            for damage in &damages {
+                output::note(&format!("{}: {damage}", self.log.display()));
+            }
+            return self.map_contours(&recording, poses, slam);
+        }
         let looking = progress::spinner().with_message("looking for landmarks");
         looking.tick();
         let landmarks = match (self.kind, &poses) {
@@ -115,6 +137,7 @@ impl Map {
                 bail!("reflectors cannot be mapped from poses that rest on them; choose --poses truth or references")
             }
             (Kind::Reflectors, Some((poses, _))) => map_reflectors_at(&recording, poses, &reflector_clustering()),
+            (Kind::Contours, _) => bail!("contours are no landmarks"),
             (Kind::Features, None) => map_features(&recording, &Clustering::default()),
             (Kind::Features, Some((poses, _))) => map_features_at(&recording, poses, &Clustering::default()),
         }
@@ -144,6 +167,47 @@ impl Map {
         output::print_rows(&rows);
         Ok(())
     }
+}
+
+impl Map {
+    fn map_contours(&self, recording: &Recording, poses: &[Truth], slam: Option<(usize, usize)>) -> anyhow::Result<()> {
+        let mapping = progress::spinner().with_message("mapping contours");
+        mapping.tick();
+        let map = contour_map::map_contours_at(recording, poses, self.cell.unwrap_or(contour_map::CELL));
+        mapping.finish_and_clear();
+        ensure!(!map.is_empty(), "{}: no surface was seen from known poses", self.log.display());
+        contour_file::write(&self.output, &map)?;
+        let summary = ContourSummary {
+            points: map.len(),
+            bytes: map.bytes(),
+            key_scans: slam.map(|slam| slam.0),
+            loops: slam.map(|slam| slam.1),
+        };
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&summary)?);
+            return Ok(());
+        }
+        let mut rows = vec![
+            ["points".to_owned(), summary.points.to_string()],
+            ["size in the vehicle".to_owned(), format!("{} bytes", summary.bytes)],
+        ];
+        if let Some((keys, loops)) = slam {
+            rows.push(["key scans".to_owned(), keys.to_string()]);
+            rows.push(["loops".to_owned(), loops.to_string()]);
+        }
+        output::print_rows(&rows);
+        Ok(())
+    }
+}
+
+#[derive(Serialize)]
+struct ContourSummary {
+    points: usize,
+    bytes: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    key_scans: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loops: Option<usize>,
 }
 
 impl Summary {

@@ -9,7 +9,7 @@ use agv_core::record::Damage;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::log::{self, Contents};
-use agv_host_sim::mapping::map_file;
+use agv_host_sim::mapping::{contour_file, contour_replay, map_file};
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
 use agv_host_sim::replay::{Comparisons, replay};
 use agv_host_sim::report::Page;
@@ -53,7 +53,8 @@ pub struct Replay {
     /// Write a log with the same events and the outputs of this replay.
     #[arg(long, value_name = "LOG2")]
     output: Option<PathBuf>,
-    /// Map to use; its reflectors replace those of the log, its features the log's features.
+    /// Map to use; its reflectors replace those of the log, its features the log's features. A map of contours is used
+    /// beside them, with the noise of the odometry that the scans of the log say.
     #[arg(long, value_name = "MAP")]
     map: Vec<PathBuf>,
     /// Parameters of the vehicle, instead of those of the log; as `agv calibrate --apply` writes them.
@@ -127,7 +128,12 @@ impl Replay {
             let is_tricycle = VehicleFile::read(path)?.apply(&mut recording.parameters);
             ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
         }
+        let mut contours = None;
         for path in &self.map {
+            if contour_file::is_contour_map(path) {
+                contours = Some(contour_file::read(path)?);
+                continue;
+            }
             let map = map_file::read(path)?;
             ensure!(
                 !map.is_empty(),
@@ -140,9 +146,16 @@ impl Replay {
             recording.parameters.maps = self.maps()?;
         }
 
+        if contours.is_some() {
+            contour_replay::prepare(&mut recording).with_context(|| self.log.display().to_string())?;
+        }
         let running = progress::bar("replaying", recording.events.len() as u64);
-        let replay = replay(&recording, |events| running.set_position(events as u64))
-            .with_context(|| self.log.display().to_string())?;
+        let done = |events: usize| running.set_position(events as u64);
+        let replay = match &contours {
+            Some(map) => contour_replay::replay_in(&recording, map, done).map_err(anyhow::Error::from),
+            None => replay(&recording, done).map_err(anyhow::Error::from),
+        }
+        .with_context(|| self.log.display().to_string())?;
         running.finish_and_clear();
         let comparisons = if is_as_recorded {
             Comparisons::of(&outputs, &publishing, &recording, &replay)

@@ -62,6 +62,9 @@ struct Outage {
 /// An odometry that says so often in a row what is not later than before has a clock that stands.
 const MOST_REPEATED: u8 = 10;
 
+/// An aid with so many numbers says all of the pose: the vehicle rests on it as on features.
+const WHOLE_POSE: usize = 3;
+
 /// A pose that was given for a time further ahead of the odometry than this, s, is of another clock.
 const LONGEST_LEAD: f64 = 0.5;
 
@@ -264,6 +267,9 @@ impl<
         if outcome.verdict == Verdict::Accepted {
             // The state of that time was there just now.
             let _ = timeline.set_state(time, state);
+            if SIZE >= WHOLE_POSE {
+                self.distance.feature = 0.0;
+            }
         }
         let status = &mut self.outputs.sources.aids;
         status.begin(time);

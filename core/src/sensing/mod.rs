@@ -11,6 +11,7 @@ mod surface_alignment;
 mod surface_scan;
 
 pub use keypoint::{Keypoint, KeypointKind};
+pub(crate) use line::Moments;
 pub use motion_correction::SensorPath;
 pub use neighbourhood::visit_around;
 pub use point_scan::PointScan;

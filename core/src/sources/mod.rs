@@ -6,6 +6,7 @@
 
 mod aid;
 mod association;
+mod contours;
 mod correction;
 mod features;
 mod key_scans;
@@ -18,6 +19,7 @@ mod status;
 
 pub use aid::{Aid, AidOutcome};
 pub use association::{AssociationParameters, MapUse};
+pub use contours::ContourFix;
 pub use features::FeatureParameters;
 pub use key_scans::KeyScanParameters;
 pub use reflectors::ReflectorParameters;

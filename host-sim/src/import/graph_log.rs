@@ -69,6 +69,7 @@ fn parse_edge<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Edge> {
 
 /// A scan whose laser stands on the corrected robot as the log says.
 fn parse_scan<'a>(mut words: impl Iterator<Item = &'a str>, robot: Pose, clock: &mut Clock) -> Option<PosedScan> {
-    let logged = robot_laser(&mut words, clock)?;
+    let (mut logged, seconds) = robot_laser(&mut words)?;
+    logged.scan.start = clock.at(seconds);
     Some(PosedScan { laser: robot.compose(&logged.robot.between(&logged.laser)), robot, ..logged })
 }

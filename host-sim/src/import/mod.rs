@@ -5,6 +5,7 @@ pub mod capture;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;
+mod line_times;
 #[cfg(feature = "bags")]
 mod mounting;
 pub mod packets;

@@ -35,10 +35,11 @@ pub(super) fn ranges<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<Ve
     (0..count(words)?).map(|_| number(words).map(|range| range as f32)).collect()
 }
 
-pub(super) fn scan(start: Time, first_bearing: f64, bearing_step: f64, ranges: Vec<f32>) -> RecordedScan {
+/// A scan whose time is not known yet.
+pub(super) fn scan(first_bearing: f64, bearing_step: f64, ranges: Vec<f32>) -> RecordedScan {
     RecordedScan {
         laser: LaserId::FIRST,
-        start,
+        start: Time::default(),
         beam_interval: 0.0,
         first_bearing,
         bearing_step,
@@ -48,8 +49,9 @@ pub(super) fn scan(start: Time, first_bearing: f64, bearing_step: f64, ranges: V
 }
 
 /// A `ROBOTLASER1` or `ROBOTLASER2` record behind its name. Fields: type, start angle, field of view, step, largest range, accuracy, remission mode, n, n ranges, m, m
-/// remissions, laser pose, robot pose, five values of the base, time, host, time of logging.
-pub(super) fn robot_laser<'a>(words: &mut impl Iterator<Item = &'a str>, clock: &mut Clock) -> Option<PosedScan> {
+/// remissions, laser pose, robot pose, five values of the base, time, host, time of logging. Returns the scan, without its time, and that
+/// time, s.
+pub(super) fn robot_laser<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<(PosedScan, f64)> {
     number(words)?;
     let first_bearing = number(words)?;
     number(words)?;
@@ -65,6 +67,6 @@ pub(super) fn robot_laser<'a>(words: &mut impl Iterator<Item = &'a str>, clock: 
     for _ in 0..5 {
         number(words)?;
     }
-    let time = clock.at(number(words)?);
-    Some(PosedScan { scan: scan(time, first_bearing, bearing_step, ranges), laser, robot })
+    let seconds = number(words)?;
+    Some((PosedScan { scan: scan(first_bearing, bearing_step, ranges), laser, robot }, seconds))
 }

@@ -1,6 +1,9 @@
 //! Maps from drives whose poses are known, or found by the way.
 
 mod clustering;
+pub mod contour_file;
+pub mod contour_map;
+pub mod contour_replay;
 mod known_poses;
 pub mod map_file;
 pub mod pose_graph;

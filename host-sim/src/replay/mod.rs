@@ -16,7 +16,7 @@ use agv_core::odometry::OdometryBias;
 use agv_core::record::Output;
 use thiserror::Error;
 
-use crate::recording::Recording;
+use crate::recording::{RecordedEvent, Recording};
 
 /// What the localiser said of a whole recording.
 #[derive(Clone, Debug, Default)]
@@ -60,7 +60,20 @@ pub enum ReplayError {
 ///
 /// # Errors
 /// [`ReplayError`] if the recording's map cannot be used.
-pub fn replay(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<Replay, ReplayError> {
+pub fn replay(recording: &Recording, progress: impl FnMut(usize)) -> Result<Replay, ReplayError> {
+    replay_aided(recording, progress, |_, _, _| {})
+}
+
+/// The same, with aids that are given to the localiser behind each event. `aid` gets the localiser, the event, and the poses
+/// after those before.
+///
+/// # Errors
+/// [`ReplayError`] if the recording's map cannot be used.
+pub fn replay_aided(
+    recording: &Recording,
+    mut progress: impl FnMut(usize),
+    mut aid: impl FnMut(&mut Localizer, &RecordedEvent, &[PoseOutput]),
+) -> Result<Replay, ReplayError> {
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
     localizer.add_landmarks(&recording.landmarks).map_err(|error| match error {
         MapError::Full => ReplayError::MapTooLarge,
@@ -70,9 +83,10 @@ pub fn replay(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<
     let start = Instant::now();
     for (index, event) in recording.events.iter().enumerate() {
         let outputs = localizer.handle(&event.view());
-        replay.poses.push(outputs.pose);
         replay.uses.extend_from_slice(&outputs.uses);
         replay.use_ends.push(replay.uses.len());
+        aid(&mut localizer, event, &replay.poses);
+        replay.poses.push(localizer.outputs().pose);
         replay.biases.push(localizer.odometry_bias());
         if index % 1024 == 0 {
             progress(index);

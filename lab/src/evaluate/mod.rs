@@ -4,6 +4,8 @@ pub mod arbitrary_events;
 pub mod calibration;
 pub mod carpark;
 pub mod carpark_starts;
+pub mod contour_map;
+mod contours;
 pub mod demonstration;
 pub mod falko;
 pub mod features;

@@ -8,6 +8,7 @@ use agv_core::geometry::{Point, Pose, difference};
 use agv_core::measurement::Time;
 use serde::Serialize;
 
+use agv_host_sim::import::carmen::TimeDefects;
 use agv_host_sim::import::{ScanLog, carmen, graph_log};
 use agv_host_sim::mapping::pose_graph::{Edge, PoseGraphError};
 use agv_host_sim::mapping::slam::{SlamMap, SlamParameters, map};
@@ -76,6 +77,8 @@ pub struct OfficeDrive {
     pub odometry: Vec<Pose>,
     /// Corrected pose of the laser at each scan.
     pub truth: Vec<Pose>,
+    /// What was wrong with the times of the log.
+    pub defects: TimeDefects,
     /// Number of the scan by its own time in the log, ns; empty if the log has no relations.
     by_time: BTreeMap<i64, usize>,
 }
@@ -87,7 +90,7 @@ impl OfficeDrive {
     /// If the log cannot be read.
     pub fn of_carmen(log: &Path) -> Result<Self, TextFileError> {
         let path = log;
-        let log = carmen::read(path)?.front;
+        let carmen::CarmenLog { front: log, defects, .. } = carmen::read(path)?;
         if log.increments.is_empty() {
             return Err(TextFileError::of_line(path, 1, "this log has scans but no raw odometry (ODOM)"));
         }
@@ -99,6 +102,7 @@ impl OfficeDrive {
             odometry: odometry.collect(),
             truth: log.scans.iter().map(|scan| scan.laser).collect(),
             scans: log.scans.into_iter().map(|scan| scan.scan).collect(),
+            defects,
             by_time: BTreeMap::new(),
         })
     }
@@ -118,6 +122,7 @@ impl OfficeDrive {
             odometry: odometry.collect(),
             truth: scans.iter().map(|scan| scan.laser).collect(),
             scans: scans.into_iter().map(|scan| scan.scan).collect(),
+            defects: TimeDefects::default(),
             by_time: logged.iter().enumerate().map(|(number, (own, _))| (nano(*own), number)).collect(),
         })
     }

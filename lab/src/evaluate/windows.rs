@@ -3,6 +3,8 @@
 //! Each window begins at a corrected pose and is driven by odometry, and by features and scans alone. What is drifted is
 //! the distance from the corrected pose at the end. The corrected poses are those of others, made from the whole drive.
 
+use std::fmt;
+
 use agv_core::filter::{BiasDeviations, BiasWalk};
 use agv_core::geometry::{Pose, difference};
 use agv_core::localizer::{KeyScanParameters, MapUse, Mode, Parameters, PoseFix};
@@ -14,6 +16,7 @@ use agv_core::sources::Switches;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::contours::{Followed, follow};
 use super::slam::OfficeDrive;
 use agv_host_sim::accuracy::Spread;
 use agv_host_sim::recording::{RecordedEvent, Recording};
@@ -115,6 +118,12 @@ impl Worsening {
         Self { name: "raw", scale: 0.0, yaw: 0.0 },
         Self { name: "worse", scale: 0.02, yaw: std::f64::consts::PI / 180.0 },
     ];
+
+    /// Whether the odometry is left as it was.
+    #[must_use]
+    pub fn is_raw(&self) -> bool {
+        self.scale == 0.0 && self.yaw == 0.0
+    }
 }
 
 /// Drift of one candidate.
@@ -134,12 +143,18 @@ pub struct Drift {
     pub heading_deg: Spread,
 }
 
-/// Windows of `length` (m) that begin every half of it: first and last scan.
-fn windows(drive: &OfficeDrive, length: f64) -> Vec<(usize, usize)> {
+/// The way up to each scan, m.
+pub(super) fn ways(drive: &OfficeDrive) -> Vec<f64> {
     let mut ways = vec![0.0];
     for pair in drive.truth.windows(2) {
         ways.push(ways[ways.len() - 1] + pair[0].between(&pair[1]).position().norm());
     }
+    ways
+}
+
+/// Windows of `length` (m) that begin every half of it: first and last scan.
+pub(super) fn windows(drive: &OfficeDrive, length: f64) -> Vec<(usize, usize)> {
+    let ways = ways(drive);
     let mut windows = Vec::new();
     let mut begin = 0.0;
     loop {
@@ -162,6 +177,33 @@ struct End {
     is_lost: bool,
 }
 
+impl End {
+    fn of(found: &Pose, truth: &Pose, is_lost: bool) -> Self {
+        Self {
+            position: (found.position() - truth.position()).norm(),
+            heading: difference(found.theta, truth.theta),
+            is_lost,
+        }
+    }
+}
+
+/// The steps of the worsened odometry from each scan of a window to the next.
+fn steps(drive: &OfficeDrive, (first, last): (usize, usize), worsening: &Worsening) -> Vec<Pose> {
+    let mut random = Random::new(first as u64, Stream::Odometry);
+    // The first scan draws a number too: its step is none.
+    let _ = random.normal();
+    let step = |scan: usize| {
+        let moved = drive.odometry[scan - 1].between(&drive.odometry[scan]);
+        let way = moved.position().norm();
+        Pose::new(
+            moved.x * (1.0 + worsening.scale),
+            moved.y * (1.0 + worsening.scale),
+            moved.theta + worsening.yaw * way.sqrt() * random.normal(),
+        )
+    };
+    (first + 1..=last).map(step).collect()
+}
+
 /// One candidate in one window.
 fn run(
     drive: &OfficeDrive,
@@ -169,20 +211,12 @@ fn run(
     candidate: &Candidate,
     worsening: &Worsening,
 ) -> Result<End, ReplayError> {
-    let mut random = Random::new(first as u64, Stream::Odometry);
     let start = &drive.scans[first];
     let fix =
         PoseFix { time: start.start, pose: drive.truth[first], position_deviation: 1e-3, heading_deviation: 1e-3 };
     let mut events = vec![RecordedEvent::SetPose(fix)];
-    for scan in first..=last {
-        let moved =
-            if scan > first { drive.odometry[scan - 1].between(&drive.odometry[scan]) } else { Pose::default() };
-        let way = moved.position().norm();
-        let displacement = Pose::new(
-            moved.x * (1.0 + worsening.scale),
-            moved.y * (1.0 + worsening.scale),
-            moved.theta + worsening.yaw * way.sqrt() * random.normal(),
-        );
+    let steps = steps(drive, (first, last), worsening);
+    for (scan, displacement) in (first..=last).zip(std::iter::once(Pose::default()).chain(steps)) {
         events.push(RecordedEvent::Increment(PoseIncrement { time: drive.scans[scan].start, displacement }));
         events.push(RecordedEvent::Scan(drive.scans[scan].clone()));
     }
@@ -194,13 +228,9 @@ fn run(
         references: Vec::new(),
     };
     let replay = replay(&recording, |_| {})?;
-    let truth = drive.truth[last];
     let found = replay.poses.last().map_or(Pose::default(), |pose| pose.pose);
-    Ok(End {
-        position: (found.position() - truth.position()).norm(),
-        heading: difference(found.theta, truth.theta),
-        is_lost: replay.poses.last().is_some_and(|pose| pose.mode == Mode::Lost),
-    })
+    let is_lost = replay.poses.last().is_some_and(|pose| pose.mode == Mode::Lost);
+    Ok(End::of(&found, &drive.truth[last], is_lost))
 }
 
 /// Drift of a candidate over all windows of `length` (m).
@@ -217,12 +247,59 @@ pub fn drift(
         .into_par_iter()
         .map(|window| run(drive, window, candidate, worsening))
         .collect::<Result<_, _>>()?;
-    Ok(Drift {
-        candidate: candidate.name,
-        odometry: worsening.name,
-        windows: ends.len(),
-        lost_share: ends.iter().filter(|end| end.is_lost).count() as f64 / ends.len() as f64,
-        position_m: Spread::of(ends.iter().map(|end| end.position)),
-        heading_deg: Spread::of(ends.iter().map(|end| end.heading.abs().to_degrees())),
-    })
+    Ok(Drift::of(candidate.name, worsening, &ends))
+}
+
+/// Name of the candidate that matches scans to the contours of the way behind.
+pub const CONTOURS: &str = "contours";
+
+/// Drift by contours: the matcher of the core alone, without filter and without parameters.
+#[must_use]
+pub fn contour_drift(drive: &OfficeDrive, length: f64, worsening: &Worsening) -> (Drift, Vec<WindowPose>) {
+    let windows = windows(drive, length);
+    let followed: Vec<Followed> =
+        windows.par_iter().map(|window| follow(drive, *window, &steps(drive, *window, worsening))).collect();
+    let mut poses = Vec::new();
+    let mut ends = Vec::new();
+    for (number, (followed, (first, last))) in followed.iter().zip(&windows).enumerate() {
+        let numbered = followed.poses.iter().zip(*first..);
+        poses.extend(numbered.map(|(pose, scan)| WindowPose { window: number, scan, pose: *pose }));
+        ends.extend(followed.poses.last().map(|found| End::of(found, &drive.truth[*last], followed.is_lost)));
+    }
+    (Drift::of(CONTOURS, worsening, &ends), poses)
+}
+
+impl Drift {
+    fn of(candidate: &'static str, worsening: &Worsening, ends: &[End]) -> Self {
+        Self {
+            candidate,
+            odometry: worsening.name,
+            windows: ends.len(),
+            lost_share: ends.iter().filter(|end| end.is_lost).count() as f64 / ends.len() as f64,
+            position_m: Spread::of(ends.iter().map(|end| end.position)),
+            heading_deg: Spread::of(ends.iter().map(|end| end.heading.abs().to_degrees())),
+        }
+    }
+}
+
+/// Where a candidate has the laser at a scan of a window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WindowPose {
+    /// Number of the window.
+    pub window: usize,
+    /// Number of the scan in the log.
+    pub scan: usize,
+    /// Pose of the laser.
+    pub pose: Pose,
+}
+
+/// First line of a file of such poses.
+pub const TRAJECTORY_HEADER: &str = "window,scan,x,y,theta";
+
+impl fmt::Display for WindowPose {
+    /// A line of a file of poses.
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        let Self { window, scan, pose } = self;
+        write!(formatter, "{window},{scan},{:.6},{:.6},{:.6}", pose.x, pose.y, pose.theta)
+    }
 }

@@ -2,26 +2,30 @@
 
 use std::path::PathBuf;
 
-use agv_host_sim::data;
-use agv_lab::evaluate::slam::OfficeDrive;
-use agv_lab::evaluate::windows::{Candidate, Worsening, drift};
-use anyhow::Context;
+use agv_lab::evaluate::windows::{Candidate, Worsening, contour_drift, drift};
 
+use super::office_drive::DriveChoice;
+use super::trajectory;
 use crate::command::progress;
 
 const HELP: &str = "\
 Examples:
   agv evaluate windows
   agv evaluate windows --length 7 --json
-  agv evaluate windows --log intel-lab.log";
+  agv evaluate windows --set aces
+  agv evaluate windows --log drive.log --trajectory poses.csv
+
+The file of --trajectory has the lines window,scan,x,y,theta: the poses by contours with the raw odometry.";
 
 /// Drift on windows of a real drive through an unknown office: features and scans alone.
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Windows {
-    /// CARMEN log with raw odometry and corrected poses; that of fr079 if absent.
-    #[arg(long)]
-    log: Option<PathBuf>,
+    #[command(flatten)]
+    drive: DriveChoice,
+    /// Write the poses by contours to a file; an older one is replaced.
+    #[arg(long, value_name = "CSV")]
+    trajectory: Option<PathBuf>,
     /// Length of a window, m.
     #[arg(long, default_value_t = 12.0)]
     length: f64,
@@ -34,19 +38,19 @@ impl Windows {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         anyhow::ensure!(self.length > 0.0, "--length must be more than 0 m");
-        let drive = match self.log {
-            Some(log) => OfficeDrive::of_carmen(&log)?,
-            None => {
-                let folder = data::folder().context("set AGV_DATA to the folder of recordings")?.join("scans2d");
-                OfficeDrive::of_graph(&folder.join("fr079.log"), &folder.join("freiburg-079-corrected.log.gz"))?
-            }
-        };
-        let bar = progress::bar("driving", (Candidate::ALL.len() * Worsening::ALL.len()) as u64);
+        let drive = self.drive.read()?;
+        let bar = progress::bar("driving", ((Candidate::ALL.len() + 1) * Worsening::ALL.len()) as u64);
         let mut drifts = Vec::new();
         for worsening in &Worsening::ALL {
             for candidate in &Candidate::ALL {
                 drifts.push(drift(&drive, self.length, candidate, worsening)?);
                 bar.inc(1);
+            }
+            let (by_contours, poses) = contour_drift(&drive, self.length, worsening);
+            drifts.push(by_contours);
+            bar.inc(1);
+            if let Some(path) = self.trajectory.as_ref().filter(|_| worsening.is_raw()) {
+                trajectory::write(path, &poses)?;
             }
         }
         bar.finish_and_clear();

@@ -1,0 +1,170 @@
+//! A map of contours that is kept: points of surfaces in square tiles, of which those around the vehicle are loaded.
+
+use super::{LARGEST_REACH, Submap, SurfacePoint};
+use crate::geometry::{Pose, ScanPoint};
+
+/// Side of a tile, m.
+pub const TILE: f64 = 4.0;
+
+/// Tiles to each side that are loaded: they reach as far as a submap does.
+const AROUND: i32 = 4;
+
+/// Counts of a coordinate for a metre: 4 m in 12 bits.
+const COUNTS: f32 = 1023.0;
+
+/// Counts for the length of a normal.
+const UNIT: f32 = 127.0;
+
+/// A point in 5 bytes: twice 12 bits for the position in its tile, to a millimetre, and a normal to half a degree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KeptPoint {
+    bytes: [u8; 5],
+}
+
+impl KeptPoint {
+    /// Packs a point, given from the corner of its tile.
+    #[must_use]
+    pub fn of(point: &SurfacePoint) -> Self {
+        let count = |length: f32| libm::roundf(length * COUNTS).clamp(0.0, 4095.0) as u16;
+        let normal = |share: f32| (libm::roundf(share * UNIT) as i8).to_le_bytes()[0];
+        let (x, y) = (count(point.position.x), count(point.position.y));
+        let high = ((x >> 8) | ((y >> 8) << 4)) as u8;
+        Self { bytes: [x.to_le_bytes()[0], y.to_le_bytes()[0], high, normal(point.normal.x), normal(point.normal.y)] }
+    }
+
+    /// The point from the corner of its tile.
+    #[must_use]
+    pub fn unpacked(&self) -> SurfacePoint {
+        let [x, y, high, normal_x, normal_y] = self.bytes;
+        let length = |low: u8, high: u8| f32::from(u16::from_le_bytes([low, high])) * (1.0 / COUNTS);
+        let share = |byte: u8| f32::from(i8::from_le_bytes([byte])) * (1.0 / UNIT);
+        SurfacePoint {
+            position: ScanPoint::new(length(x, high & 15), length(y, high >> 4)),
+            normal: ScanPoint::new(share(normal_x), share(normal_y)),
+        }
+    }
+}
+
+/// A square of a map, and which of the points are in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// Row and column: the corner of a tile is at `TILE` times these, y and x.
+    pub place: (i16, i16),
+    /// Number of its first point.
+    pub first: u32,
+    /// Number of its points.
+    pub count: u16,
+}
+
+impl Tile {
+    /// The tile in which a position lies. None beyond 131 km.
+    #[must_use]
+    pub fn place_of(x: f64, y: f64) -> Option<(i16, i16)> {
+        let index = |length: f64| {
+            let index = libm::floor(length / TILE);
+            (libm::fabs(index) < f64::from(i16::MAX)).then_some(index as i16)
+        };
+        Some((index(y)?, index(x)?))
+    }
+}
+
+/// Why a map cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KeptMapError {
+    /// Tiles are not in order of their rows and columns, each once.
+    Order,
+    /// A tile names points that are not there.
+    Points,
+}
+
+/// A map in memory that somebody else holds.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptMap<'a> {
+    tiles: &'a [Tile],
+    points: &'a [KeptPoint],
+}
+
+impl<'a> KeptMap<'a> {
+    /// Tiles in order of their places, and their points.
+    ///
+    /// # Errors
+    /// See [`KeptMapError`].
+    pub fn new(tiles: &'a [Tile], points: &'a [KeptPoint]) -> Result<Self, KeptMapError> {
+        if !tiles.is_sorted_by(|before, after| before.place < after.place) {
+            return Err(KeptMapError::Order);
+        }
+        let ends = |tile: &Tile| (tile.first as usize).checked_add(usize::from(tile.count));
+        if tiles.iter().all(|tile| ends(tile).is_some_and(|end| end <= points.len())) {
+            Ok(Self { tiles, points })
+        } else {
+            Err(KeptMapError::Points)
+        }
+    }
+
+    /// Fills a submap with what is around a place, from near to far. The submap says whether there was room for all.
+    pub fn load<const ROOM: usize>(&self, place: (i16, i16), submap: &mut Submap<ROOM>) {
+        let (row, column) = (i32::from(place.0), i32::from(place.1));
+        let middle = |index: i32| (f64::from(index) + 0.5) * TILE;
+        submap.begin(&Pose::new(middle(column), middle(row), 0.0));
+        for ring in 0..=AROUND {
+            for down in -ring..=ring {
+                for right in -ring..=ring {
+                    if down.abs().max(right.abs()) == ring {
+                        self.load_tile((row + down, column + right), (down, right), submap);
+                    }
+                }
+            }
+        }
+    }
+
+    fn load_tile<const ROOM: usize>(&self, place: (i32, i32), offset: (i32, i32), submap: &mut Submap<ROOM>) {
+        let (Ok(row), Ok(column)) = (i16::try_from(place.0), i16::try_from(place.1)) else { return };
+        let Ok(number) = self.tiles.binary_search_by(|tile| tile.place.cmp(&(row, column))) else { return };
+        let Some(tile) = self.tiles.get(number) else { return };
+        let corner = |steps: i32| (f64::from(steps) - 0.5) as f32 * TILE as f32;
+        let shift = ScanPoint::new(corner(offset.1), corner(offset.0));
+        let first = tile.first as usize;
+        for point in self.points.get(first..first + usize::from(tile.count)).unwrap_or_default() {
+            let point = point.unpacked();
+            submap.add_point(&SurfacePoint { position: point.position + shift, ..point });
+        }
+    }
+}
+
+/// What is around the vehicle of a map that is larger, in a submap with room for `ROOM` points.
+#[derive(Clone, Debug, Default)]
+pub struct Surroundings<const ROOM: usize = 6144> {
+    submap: Submap<ROOM>,
+    place: Option<(i16, i16)>,
+}
+
+/// The submap is loaded anew where the vehicle has come so far out of the tile in whose middle it stands, m.
+const OUTSIDE: f64 = LARGEST_REACH as f64;
+
+impl<const ROOM: usize> Surroundings<ROOM> {
+    /// Nothing is loaded.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { submap: Submap::new(), place: None }
+    }
+
+    /// The map has been replaced.
+    pub const fn forget(&mut self) {
+        self.place = None;
+    }
+
+    /// The surfaces of the map around a pose.
+    pub fn around(&mut self, map: &KeptMap, pose: &Pose) -> &Submap<ROOM> {
+        let from = self.submap.origin();
+        let reach = 0.5 * TILE + OUTSIDE;
+        let is_inside = libm::fabs(pose.x - from.x) < reach && libm::fabs(pose.y - from.y) < reach;
+        let wanted = Tile::place_of(pose.x, pose.y);
+        if (self.place.is_none() || !is_inside)
+            && let Some(place) = wanted
+        {
+            map.load(place, &mut self.submap);
+            self.place = wanted;
+        }
+        &self.submap
+    }
+}

@@ -1,0 +1,84 @@
+//! The last key scans, each as points in the frame of its own laser.
+
+use heapless::Vec;
+
+use super::{PackedPoint, SurfacePoint};
+use crate::geometry::{Pose, difference};
+
+/// A scan of the way behind.
+#[derive(Clone, Debug)]
+pub struct KeyScan<const POINTS: usize> {
+    /// Pose of the laser.
+    pub pose: Pose,
+    /// Points of its surfaces, in the frame of the laser.
+    pub points: Vec<PackedPoint, POINTS>,
+}
+
+impl<const POINTS: usize> KeyScan<POINTS> {
+    const EMPTY: Self = Self { pose: Pose { x: 0.0, y: 0.0, theta: 0.0 }, points: Vec::new() };
+}
+
+/// Distance after which a scan becomes a key scan, m.
+const SPACING: f64 = 0.4;
+
+/// Turn after which it does, rad.
+const TURN: f64 = 20.0 * core::f64::consts::PI / 180.0;
+
+/// The last `KEYS` key scans of at most `POINTS` points.
+#[derive(Clone, Debug)]
+pub struct KeyRing<const KEYS: usize, const POINTS: usize> {
+    keys: [KeyScan<POINTS>; KEYS],
+    /// Number of key scans that were made.
+    made: usize,
+}
+
+impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
+    /// No key scans.
+    #[must_use]
+    pub const fn new() -> Self {
+        const { assert!(KEYS > 0) };
+        Self { keys: [const { KeyScan::EMPTY }; KEYS], made: 0 }
+    }
+
+    /// Forgets all.
+    pub const fn clear(&mut self) {
+        self.made = 0;
+    }
+
+    /// The newest one.
+    #[must_use]
+    pub fn newest(&self) -> Option<&KeyScan<POINTS>> {
+        self.keys.get(self.made.checked_sub(1)? % KEYS)
+    }
+
+    /// All of them, the oldest first.
+    pub fn iter(&self) -> impl Iterator<Item = &KeyScan<POINTS>> {
+        let first = self.made.saturating_sub(KEYS);
+        (first..self.made).filter_map(|number| self.keys.get(number % KEYS))
+    }
+
+    /// Whether a scan at that pose is far enough from the newest key scan to be the next.
+    #[must_use]
+    pub fn wants(&self, pose: &Pose) -> bool {
+        self.newest().is_none_or(|newest| {
+            libm::hypot(pose.x - newest.pose.x, pose.y - newest.pose.y) > SPACING
+                || libm::fabs(difference(pose.theta, newest.pose.theta)) > TURN
+        })
+    }
+
+    /// Keeps a scan in place of the oldest.
+    pub fn keep(&mut self, pose: &Pose, points: &[SurfacePoint]) {
+        let Some(key) = self.keys.get_mut(self.made % KEYS) else { return };
+        key.pose = *pose;
+        key.points.clear();
+        key.points.extend(points.iter().filter_map(PackedPoint::of).take(POINTS));
+        // The remainder stays what it is when the count begins anew.
+        self.made = if self.made >= 2 * KEYS { self.made - KEYS + 1 } else { self.made + 1 };
+    }
+}
+
+impl<const KEYS: usize, const POINTS: usize> Default for KeyRing<KEYS, POINTS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,100 @@
+//! How near surfaces are, in two bits for each cell of a square: what the search looks up.
+
+use crate::geometry::ScanPoint;
+
+/// Size of a cell, m.
+pub const CELL: f32 = 0.1;
+
+/// Cells along a side.
+pub const SIDE: usize = 320;
+
+/// Half of the side, m.
+pub const HALF: f32 = 0.5 * SIDE as f32 * CELL;
+
+/// Bytes.
+const BYTES: usize = SIDE * SIDE / 4;
+
+/// Cells around that of a point, and their least value: three times the density of a Gaussian of 12 cm at the distance of their centres, rounded.
+const STAMP: [(isize, isize, u8); 21] = {
+    let mut stamp = [(0, 0, 3); 21];
+    let (mut count, mut y) = (1, -2);
+    while y <= 2 {
+        let mut x = -2;
+        while x <= 2 {
+            let square: isize = x * x + y * y;
+            if square > 0 && square < 8 {
+                stamp[count] = (x, y, if square <= 1 { 2 } else { 1 });
+                count += 1;
+            }
+            x += 1;
+        }
+        y += 1;
+    }
+    stamp
+};
+
+/// A grid around the origin of its frame.
+#[derive(Clone, Debug)]
+pub struct LikelihoodGrid {
+    cells: [u8; BYTES],
+}
+
+impl LikelihoodGrid {
+    /// Nothing is near.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { cells: [0; BYTES] }
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.cells.fill(0);
+    }
+
+    /// Column and row of a point, m; outside of the grid they are negative or too large.
+    #[must_use]
+    pub fn cell(point: &ScanPoint) -> (i32, i32) {
+        let index = |length: f32| libm::floorf((length + HALF) * (1.0 / CELL)) as i32;
+        (index(point.x), index(point.y))
+    }
+
+    /// From 0 (nothing is near) to 3. Zero outside.
+    #[must_use]
+    pub fn value(&self, column: i32, row: i32) -> u8 {
+        if !(0..SIDE as i32).contains(&column) || !(0..SIDE as i32).contains(&row) {
+            return 0;
+        }
+        let index = row as usize * SIDE + column as usize;
+        self.cells.get(index >> 2).map_or(0, |cells| (cells >> ((index & 3) << 1)) & 3)
+    }
+
+    /// Adds a point, m.
+    pub fn add(&mut self, point: &ScanPoint) {
+        let (column, row) = Self::cell(point);
+        if self.value(column, row) == 3 {
+            return;
+        }
+        for (x, y, value) in STAMP {
+            self.raise(column as isize + x, row as isize + y, value);
+        }
+    }
+
+    fn raise(&mut self, column: isize, row: isize, value: u8) {
+        if !(0..SIDE as isize).contains(&column) || !(0..SIDE as isize).contains(&row) {
+            return;
+        }
+        let index = row as usize * SIDE + column as usize;
+        let shift = (index & 3) << 1;
+        if let Some(cells) = self.cells.get_mut(index >> 2)
+            && (*cells >> shift) & 3 < value
+        {
+            *cells = (*cells & !(3 << shift)) | (value << shift);
+        }
+    }
+}
+
+impl Default for LikelihoodGrid {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,146 @@
+//! Where a laser is by the surfaces of the way behind.
+
+use heapless::Vec;
+use nalgebra::Matrix3;
+
+use super::{KeyRing, Prediction, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
+use crate::geometry::{Pose, ScanPoint};
+use crate::sensing::PointScan;
+
+/// If the surfaces say less than this share along one axis of what they say across it, that axis is free.
+const LEAST_SHARE: f32 = 0.03;
+
+/// If fewer of the points lie on surfaces, the pose is looked for further away.
+const POOR_SHARE: f32 = 0.5;
+
+/// What is found further away is believed if so many do, and twice as many as nearby.
+const SURE_SHARE: f32 = 0.7;
+
+/// What the surfaces say of the pose of the laser.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContourMatch {
+    /// Pose of the laser. Along the free axis it is the predicted one.
+    pub pose: Pose,
+    /// Inverse of the covariance (x, y, theta) if points err independently; nothing along the free axis.
+    pub information: Matrix3<f64>,
+    /// The unit vector along which the surfaces do not say where the laser is, as in a corridor.
+    pub free_axis: Option<ScanPoint>,
+    /// Share of the scan's points that lie on surfaces.
+    pub share: f32,
+}
+
+/// Surfaces of the last `KEYS` key scans of at most `POINTS` points, and of the present one, in a submap with room for `ROOM`.
+#[derive(Clone, Debug)]
+pub struct ContourMatcher<const POINTS: usize = 400, const KEYS: usize = 20, const ROOM: usize = 4096> {
+    points: Vec<SurfacePoint, POINTS>,
+    ring: KeyRing<KEYS, POINTS>,
+    submap: Submap<ROOM>,
+}
+
+impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> ContourMatcher<POINTS, KEYS, ROOM> {
+    /// Nothing has been seen.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { points: Vec::new(), ring: KeyRing::new(), submap: Submap::new() }
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.ring.clear();
+        self.submap.begin(&Pose::default());
+    }
+
+    /// The points of the present scan, in the frame of its points.
+    #[must_use]
+    pub fn points(&self) -> &[SurfacePoint] {
+        &self.points
+    }
+
+    /// The surfaces that are matched with.
+    #[must_use]
+    pub const fn submap(&self) -> &Submap<ROOM> {
+        &self.submap
+    }
+
+    /// Takes the points of a scan.
+    pub fn see<const BEAMS: usize>(&mut self, scan: &PointScan<BEAMS>) {
+        find_surface_points(scan, &mut self.points);
+    }
+
+    /// Where the scan was taken, if the prediction is not too far off. None if it says nothing.
+    #[must_use]
+    pub fn align(&self, predicted: &Prediction) -> Option<ContourMatch> {
+        align(&self.points, &self.submap, predicted)
+    }
+
+    /// Makes the scan a key scan if it was taken far enough from the newest one. Returns whether it was.
+    pub fn keep(&mut self, pose: &Pose) -> bool {
+        let is_kept = self.ring.wants(pose);
+        if is_kept {
+            self.ring.keep(pose, &self.points);
+            self.submap.begin(pose);
+            for key in self.ring.iter() {
+                self.submap.add(&key.pose, key.points.iter());
+            }
+        }
+        is_kept
+    }
+}
+
+impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> Default for ContourMatcher<POINTS, KEYS, ROOM> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The pose of points in any submap: search, refinement, and a free axis that stays where the prediction has it.
+#[must_use]
+pub fn align<const ROOM: usize>(
+    points: &[SurfacePoint],
+    map: &Submap<ROOM>,
+    predicted: &Prediction,
+) -> Option<ContourMatch> {
+    let inside = map.origin().between(&predicted.pose);
+    let share = |inliers: u32| inliers as f32 / points.len().max(1) as f32;
+    let look = |window: &SearchWindow| {
+        let start = search(points, map.grid(), &inside, window).pose;
+        refine(points, map, &start)
+    };
+    let usual = look(&predicted.window());
+    let is_poor = usual.is_none_or(|found| share(found.inliers) < POOR_SHARE);
+    let wide = if is_poor { look(&SearchWindow::WIDE) } else { None };
+    let found = match (usual, wide) {
+        (Some(usual), Some(wide)) if share(wide.inliers) > SURE_SHARE && wide.inliers > 2 * usual.inliers => wide,
+        (usual, wide) => usual.or(wide)?,
+    };
+    let free_axis = weak_axis(found.directions);
+    let mut pose = found.pose;
+    let mut information = found.information;
+    if let Some(axis) = free_axis {
+        let along = f64::from(axis.x) * (inside.x - pose.x) + f64::from(axis.y) * (inside.y - pose.y);
+        pose.x += f64::from(axis.x) * along;
+        pose.y += f64::from(axis.y) * along;
+        information = without(information, axis);
+    }
+    Some(ContourMatch { pose: map.origin().compose(&pose), information, free_axis, share: share(found.inliers) })
+}
+
+/// The axis along which the normals say least, if that is too little.
+fn weak_axis([xx, xy, yy]: [f32; 3]) -> Option<ScanPoint> {
+    let (trace, gap) = (xx + yy, libm::sqrtf((xx - yy) * (xx - yy) + 4.0 * xy * xy));
+    if trace - gap >= LEAST_SHARE * (trace + gap) {
+        return None;
+    }
+    // Half of the angle of the strong axis, a quarter of a turn on.
+    let strong = 0.5 * libm::atan2f(2.0 * xy, xx - yy);
+    let (sine, cosine) = libm::sincosf(strong);
+    Some(ScanPoint::new(-sine, cosine))
+}
+
+/// An information matrix from which all is taken that it says along an axis.
+fn without(information: Matrix3<f64>, axis: ScanPoint) -> Matrix3<f64> {
+    let (x, y) = (f64::from(axis.x), f64::from(axis.y));
+    let projection = Matrix3::new(1.0 - x * x, -x * y, 0.0, -x * y, 1.0 - y * y, 0.0, 0.0, 0.0, 1.0);
+    projection * information * projection
+}

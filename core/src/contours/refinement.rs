@@ -1,0 +1,128 @@
+//! The pose under which the points of a scan lie on surfaces: points to lines, iterated, robustly weighted.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Submap, SurfacePoint};
+use crate::geometry::{Pose, ScanPoint, Transform, difference, wrap};
+
+/// Most iterations.
+const ITERATIONS: usize = 8;
+
+/// Iterations in which surfaces are looked for far away.
+const FAR_ITERATIONS: usize = 2;
+
+/// How far a surface is looked for, m: at first, and then.
+const REACH: (f32, f32) = (0.3, 0.15);
+
+/// Points further from their surface than this weigh half, m.
+const TOLERANCE: f32 = 0.05;
+
+/// Standard deviation of a point across its surface, m.
+const DEVIATION: f32 = 0.03;
+
+/// Weight of a corner along each axis beside that of a point on a line.
+const CORNER: f32 = 0.6;
+
+/// How far the start may be wrong: standard deviation of the position, m, and of the heading, rad.
+const START: (f64, f64) = (0.05, 0.02);
+
+/// Steps shorter than this, m and rad, end the iteration.
+const SMALL: f64 = 2e-4;
+
+/// Fewest points that fix a pose.
+const FEWEST: u32 = 10;
+
+/// What the surfaces say of a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// The pose in the frame of the submap.
+    pub pose: Pose,
+    /// Inverse of the covariance (x, y, theta) if points err independently.
+    pub information: Matrix3<f64>,
+    /// The sum of the outer products of the normals with themselves, weighted: xx, xy, yy.
+    pub directions: [f32; 3],
+    /// Points that lie on surfaces.
+    pub inliers: u32,
+}
+
+/// Sums over points.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    information: [f32; 6],
+    gradient: [f32; 3],
+    directions: [f32; 3],
+    inliers: u32,
+}
+
+impl Sums {
+    /// Adds one equation: `distance` along `normal` for a point with that lever.
+    fn add(&mut self, normal: ScanPoint, lever: ScanPoint, distance: f32, weight: f32) {
+        let row = [normal.x, normal.y, lever.x * normal.y - lever.y * normal.x];
+        let weighted = row.map(|entry| entry * weight);
+        let [xx, xy, xt, yy, yt, tt] = &mut self.information;
+        *xx += weighted[0] * row[0];
+        *xy += weighted[0] * row[1];
+        *xt += weighted[0] * row[2];
+        *yy += weighted[1] * row[1];
+        *yt += weighted[1] * row[2];
+        *tt += weighted[2] * row[2];
+        for (sum, entry) in self.gradient.iter_mut().zip(weighted) {
+            *sum += entry * distance;
+        }
+        self.directions[0] += weighted[0] * row[0];
+        self.directions[1] += weighted[0] * row[1];
+        self.directions[2] += weighted[1] * row[1];
+    }
+
+    /// Adds what a point says.
+    fn see<const ROOM: usize>(&mut self, map: &Submap<ROOM>, point: &SurfacePoint, transform: &Transform, reach: f32) {
+        let moved = point.moved(transform);
+        let Some(surface) = map.nearest(&moved, reach) else { return };
+        let (lever, error) = (moved.position - transform.shift(), moved.position - surface.position);
+        let weight = |square: f32| 1.0 / ((1.0 + square / (TOLERANCE * TOLERANCE)) * DEVIATION * DEVIATION);
+        self.inliers += 1;
+        if surface.is_corner() {
+            let weight = CORNER * weight(error.norm_squared());
+            self.add(ScanPoint::new(1.0, 0.0), lever, error.x, weight);
+            self.add(ScanPoint::new(0.0, 1.0), lever, error.y, weight);
+        } else {
+            let distance = surface.normal.dot(&error);
+            self.add(surface.normal, lever, distance, weight(distance * distance));
+        }
+    }
+
+    fn information(&self) -> Matrix3<f64> {
+        let [xx, xy, xt, yy, yt, tt] = self.information.map(f64::from);
+        Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt)
+    }
+}
+
+/// Moves a scan, which is taken to be at `start` in the frame of the submap, to where its points lie on surfaces. None if too few do.
+#[must_use]
+pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, start: &Pose) -> Option<Refinement> {
+    let (position, heading) = (1.0 / (START.0 * START.0), 1.0 / (START.1 * START.1));
+    let mut pose = *start;
+    let mut outcome = None;
+    for iteration in 0..ITERATIONS {
+        let reach = if iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
+        let transform = Transform::of(&pose);
+        let mut sums = Sums::default();
+        for point in points {
+            sums.see(map, point, &transform, reach);
+        }
+        if sums.inliers < FEWEST {
+            return None;
+        }
+        let information = sums.information();
+        let prior = Vector3::new(position, position, heading);
+        let moved = Vector3::new(pose.x - start.x, pose.y - start.y, difference(pose.theta, start.theta));
+        let gradient = Vector3::from(sums.gradient.map(f64::from)) + prior.component_mul(&moved);
+        let step = (information + Matrix3::from_diagonal(&prior)).cholesky()?.solve(&gradient);
+        pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
+        outcome = Some(Refinement { pose, information, directions: sums.directions, inliers: sums.inliers });
+        if iteration >= FAR_ITERATIONS && step.amax() < SMALL {
+            break;
+        }
+    }
+    outcome.filter(|found| found.pose.is_finite())
+}

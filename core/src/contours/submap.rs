@@ -1,0 +1,165 @@
+//! The surfaces around a place: points looked up by cell, and a grid for the search.
+
+use heapless::Vec;
+
+use super::likelihood_grid::HALF;
+use super::{LikelihoodGrid, PackedPoint, SurfacePoint};
+use crate::geometry::{Pose, ScanPoint, Transform};
+
+/// Size of a cell, m: what is within half of it lies in four cells.
+const CELL: f32 = 0.6;
+
+/// Largest distance at which points are looked up, m.
+pub const LARGEST_REACH: f32 = 0.5 * CELL;
+
+/// Cells along a side.
+const SIDE: usize = 54;
+
+/// Points nearer than this are one if they face the same way, m.
+const SAME: f32 = 0.025;
+
+/// No point.
+const NONE: u16 = u16::MAX;
+
+/// A point and the next one of its cell.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    point: PackedPoint,
+    next: u16,
+}
+
+/// At most `ROOM` points within 16 m of a place along each axis.
+#[derive(Clone, Debug)]
+pub struct Submap<const ROOM: usize> {
+    /// Where its frame is.
+    origin: Pose,
+    entries: Vec<Entry, ROOM>,
+    first: [[u16; SIDE]; SIDE],
+    grid: LikelihoodGrid,
+    has_cut: bool,
+}
+
+impl<const ROOM: usize> Submap<ROOM> {
+    /// Nothing around.
+    #[must_use]
+    pub const fn new() -> Self {
+        const { assert!(ROOM < NONE as usize) };
+        Self {
+            origin: Pose { x: 0.0, y: 0.0, theta: 0.0 },
+            entries: Vec::new(),
+            first: [[NONE; SIDE]; SIDE],
+            grid: LikelihoodGrid::new(),
+            has_cut: false,
+        }
+    }
+
+    /// Empties it, and puts its frame at the position of a pose, its axes along those of the pose's reference frame.
+    pub fn begin(&mut self, place: &Pose) {
+        self.origin = Pose { theta: 0.0, ..*place };
+        self.entries.clear();
+        self.first = [[NONE; SIDE]; SIDE];
+        self.grid.clear();
+        self.has_cut = false;
+    }
+
+    /// Where its frame is.
+    #[must_use]
+    pub const fn origin(&self) -> &Pose {
+        &self.origin
+    }
+
+    /// Whether nothing is in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there was no room for all.
+    #[must_use]
+    pub const fn has_cut(&self) -> bool {
+        self.has_cut
+    }
+
+    /// The grid for the search.
+    #[must_use]
+    pub const fn grid(&self) -> &LikelihoodGrid {
+        &self.grid
+    }
+
+    /// Adds points that were seen from a pose, except those that are in it already.
+    pub fn add<'a>(&mut self, pose: &Pose, points: impl Iterator<Item = &'a PackedPoint>) {
+        let transform = Transform::of(&self.origin.between(pose));
+        for point in points {
+            self.add_point(&point.unpacked().moved(&transform));
+        }
+    }
+
+    /// Adds a point of its own frame, unless it is in it already or too far away.
+    pub fn add_point(&mut self, point: &SurfacePoint) {
+        let is_inside = libm::fabsf(point.position.x) < HALF && libm::fabsf(point.position.y) < HALF;
+        if !is_inside || self.nearest(point, SAME).is_some() {
+            return;
+        }
+        let (Some(packed), Some(first)) = (PackedPoint::of(point), self.first_mut(&point.position)) else { return };
+        let next = *first;
+        if self.entries.len() >= ROOM {
+            self.has_cut = true;
+            return;
+        }
+        let number = self.entries.len() as u16;
+        if let Some(first) = self.first_mut(&point.position) {
+            *first = number;
+        }
+        // There is room.
+        let _ = self.entries.push(Entry { point: packed, next });
+        self.grid.add(&point.position);
+    }
+
+    /// The nearest point of the same kind that faces the same way, if it is within `reach` (m, at most [`LARGEST_REACH`]).
+    #[must_use]
+    pub fn nearest(&self, point: &SurfacePoint, reach: f32) -> Option<SurfacePoint> {
+        let sought = PackedPoint::of(point)?;
+        let reach_in_counts = reach * 1000.0;
+        let mut nearest = (reach_in_counts * reach_in_counts) as u32;
+        let mut best = None;
+        let (low, high) = (Self::column(point.position.x - reach), Self::column(point.position.x + reach));
+        let (bottom, top) = (Self::column(point.position.y - reach), Self::column(point.position.y + reach));
+        for row in self.first.get(bottom..=top)? {
+            for first in row.get(low..=high)? {
+                let mut number = *first;
+                // A chain is no longer than there are points.
+                for _ in 0..ROOM {
+                    let Some(entry) = self.entries.get(usize::from(number)) else { break };
+                    number = entry.next;
+                    let square = entry.point.square(&sought);
+                    if square < nearest && entry.point.is_like(&sought) {
+                        (nearest, best) = (square, Some(entry.point));
+                    }
+                }
+            }
+        }
+        best.map(|point| point.unpacked())
+    }
+
+    /// The column, or row, of a coordinate, the nearest one if it is outside.
+    fn column(length: f32) -> usize {
+        let column = (length + 0.5 * SIDE as f32 * CELL) * (1.0 / CELL);
+        (column.max(0.0) as usize).min(SIDE - 1)
+    }
+
+    fn first_mut(&mut self, position: &ScanPoint) -> Option<&mut u16> {
+        self.first.get_mut(Self::column(position.y))?.get_mut(Self::column(position.x))
+    }
+}
+
+impl<const ROOM: usize> Default for Submap<ROOM> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,266 @@
+//! Localising by contours, in simulated surroundings whose truth is kept apart.
+
+use std::f64::consts::{PI, TAU};
+
+use agv_core::contours::{
+    ContourMatcher, KeptMap, KeptMapError, KeptPoint, Prediction, SurfacePoint, Surroundings, TILE, Tile,
+};
+use agv_core::geometry::{Pose, ScanPoint, difference};
+use agv_core::measurement::{LaserId, Scan, Time};
+use agv_core::sensing::PointScan;
+
+/// Walls from one point to another, m.
+type Walls = Vec<[f64; 4]>;
+
+/// A laser: beams, and the angle that they span, rad.
+#[derive(Clone, Copy)]
+struct Laser {
+    beams: usize,
+    span: f64,
+}
+
+const LASERS: [Laser; 3] =
+    [Laser { beams: 180, span: PI }, Laser { beams: 361, span: PI }, Laser { beams: 1440, span: TAU }];
+
+/// Standard deviation of a range, m.
+const NOISE: f64 = 0.01;
+
+/// The reach of the laser, m.
+const REACH: f64 = 40.0;
+
+/// Numbers that look random: xorshift, J. Stat. Softw. 8 (14), 2003.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Mean zero, standard deviation one: twelve uniform numbers.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn ranges(walls: &Walls, pose: &Pose, laser: Laser, noise: &mut Noise) -> Vec<f32> {
+    let step = laser.span / laser.beams as f64;
+    let range = |beam: usize| {
+        let angle = pose.theta - 0.5 * laser.span + step * beam as f64;
+        let (sine, cosine) = angle.sin_cos();
+        let hit = walls.iter().filter_map(|[ax, ay, bx, by]| {
+            let (dx, dy) = (bx - ax, by - ay);
+            let determinant = cosine * dy - sine * dx;
+            let along = ((ax - pose.x) * dy - (ay - pose.y) * dx) / determinant;
+            let share = ((ax - pose.x) * sine - (ay - pose.y) * cosine) / determinant;
+            (along > 0.05 && (0.0..=1.0).contains(&share)).then_some(along)
+        });
+        hit.min_by(f64::total_cmp).filter(|range| *range < REACH)
+    };
+    (0..laser.beams).map(|beam| range(beam).map_or(0.0, |range| (range + NOISE * noise.normal()) as f32)).collect()
+}
+
+/// How far off the matcher is behind a drive: along the last heading, across it (m), and of the heading (rad); and how often it
+/// said that an axis is free.
+struct Drift {
+    along: f64,
+    across: f64,
+    heading: f64,
+    free: usize,
+}
+
+fn see(matcher: &mut ContourMatcher, walls: &Walls, pose: &Pose, laser: Laser, noise: &mut Noise) {
+    let ranges = ranges(walls, pose, laser, noise);
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: Time::default(),
+        beam_interval: 0.0,
+        first_bearing: -0.5 * laser.span,
+        bearing_step: laser.span / laser.beams as f64,
+        ranges: &ranges,
+        intensities: &[],
+    };
+    let mut points: Box<PointScan<1440>> = Box::default();
+    points.set(&scan, 0.02, 80.0);
+    matcher.see(&points);
+}
+
+/// Drives through walls. The odometry has the way 2 % too long, and turns by 0.2 deg too much for a metre.
+fn drive(walls: &Walls, path: &[Pose], laser: Laser, seed: u64) -> Drift {
+    let mut noise = Noise(seed);
+    let mut matcher: Box<ContourMatcher> = Box::default();
+    let mut found = path[0];
+    let mut free = 0;
+    for (number, truth) in path.iter().enumerate() {
+        see(&mut matcher, walls, truth, laser, &mut noise);
+        if number > 0 {
+            let step = path[number - 1].between(truth);
+            let way = step.position().norm();
+            let odometry = Pose::new(1.02 * step.x, 1.02 * step.y, step.theta + way * 0.2_f64.to_radians());
+            let aligned = matcher.align(&Prediction::by_odometry(&found, &odometry)).unwrap();
+            (found, free) = (aligned.pose, free + usize::from(aligned.free_axis.is_some()));
+        }
+        matcher.keep(&found);
+    }
+    let last = path[path.len() - 1];
+    let error = last.between(&found);
+    Drift { along: error.x, across: error.y, heading: difference(found.theta, last.theta), free }
+}
+
+/// Straight on by 10 cm a scan.
+fn straight(metres: f64) -> Vec<Pose> {
+    (0..=(10.0 * metres) as usize).map(|step| Pose::new(0.1 * step as f64, 0.1, 0.02)).collect()
+}
+
+/// A corridor 2.4 m wide and so long that no end is seen, with niches 20 cm deep and 1 m wide every so many metres, if any.
+fn corridor(niches: Option<f64>) -> Walls {
+    let mut walls = Vec::new();
+    for side in [1.2, -1.2] {
+        let mut x = -60.0;
+        while let Some(every) = niches.filter(|_| x < 80.0) {
+            let (deep, end) = (side * 1.4 / 1.2, x + every);
+            walls.push([x, side, end - 1.0, side]);
+            walls.push([end - 1.0, side, end - 1.0, deep]);
+            walls.push([end - 1.0, deep, end, deep]);
+            walls.push([end, deep, end, side]);
+            x = end;
+        }
+        walls.push([x, side, 90.0, side]);
+    }
+    walls
+}
+
+#[test]
+fn a_plain_corridor_does_not_hold_the_vehicle_back() {
+    for laser in LASERS {
+        for seed in 1..=4 {
+            let drift = drive(&corridor(None), &straight(12.0), laser, seed);
+            let what = format!("{} beams, seed {seed}", laser.beams);
+            // The odometry's own error is 0.24 m; its heading alone would be 2.4 deg off.
+            assert!((drift.along - 0.24).abs() < 0.1, "{what}: {} m along", drift.along);
+            assert!(drift.across.abs() < 0.03, "{what}: {} m across", drift.across);
+            assert!(drift.heading.abs() < 0.4_f64.to_radians(), "{what}: {} deg", drift.heading.to_degrees());
+            assert!(drift.free > 110, "{what}: free {} times", drift.free);
+        }
+    }
+}
+
+#[test]
+fn niches_of_a_corridor_say_how_far_the_vehicle_has_come() {
+    for laser in LASERS {
+        for seed in 1..=4 {
+            let drift = drive(&corridor(Some(4.0)), &straight(12.0), laser, seed);
+            let what = format!("{} beams, seed {seed}", laser.beams);
+            assert!(drift.along.abs() < 0.1, "{what}: {} m along, free {}", drift.along, drift.free);
+            assert!(drift.across.abs() < 0.03, "{what}: {} m across", drift.across);
+        }
+    }
+}
+
+/// A room of 12 m x 9 m with a nook and a cupboard.
+fn room() -> Walls {
+    vec![
+        [-2.0, -3.0, 10.0, -3.0],
+        [10.0, -3.0, 10.0, 6.0],
+        [10.0, 6.0, 3.0, 6.0],
+        [3.0, 6.0, 3.0, 5.0],
+        [3.0, 5.0, -2.0, 5.0],
+        [-2.0, 5.0, -2.0, -3.0],
+        [7.0, -3.0, 7.0, -2.2],
+        [7.0, -2.2, 8.2, -2.2],
+        [8.2, -2.2, 8.2, -3.0],
+    ]
+}
+
+#[test]
+fn a_room_holds_the_pose_to_millimetres() {
+    for laser in LASERS {
+        for seed in 1..=4 {
+            let drift = drive(&room(), &straight(5.0), laser, seed);
+            let what = format!("{} beams, seed {seed}", laser.beams);
+            assert!(drift.along.hypot(drift.across) < 0.02, "{what}: {} m, {} m", drift.along, drift.across);
+            assert!(drift.heading.abs() < 0.25_f64.to_radians(), "{what}: {} deg", drift.heading.to_degrees());
+            assert_eq!(drift.free, 0, "{what}");
+        }
+    }
+}
+
+/// Wheels slip, or a log has a gap: the step is wrong by more than the usual search looks for.
+#[test]
+fn a_step_of_the_wheels_beyond_the_usual_search_is_found() {
+    for laser in LASERS {
+        for (seed, wrong) in
+            [(1, Pose::new(1.3, 0.2, 0.1)), (2, Pose::new(-1.0, 0.9, -0.4)), (3, Pose::new(0.3, 0.0, 0.75))]
+        {
+            let mut noise = Noise(seed);
+            let mut matcher: Box<ContourMatcher> = Box::default();
+            for pose in straight(2.0) {
+                see(&mut matcher, &room(), &pose, laser, &mut noise);
+                matcher.keep(&pose);
+            }
+            let truth = Pose::new(2.2, 0.15, 0.1);
+            see(&mut matcher, &room(), &truth, laser, &mut noise);
+            let step = straight(2.0)[20].between(&truth.compose(&wrong));
+            let found = matcher.align(&Prediction::by_odometry(&straight(2.0)[20], &step)).unwrap();
+            let error = truth.between(&found.pose);
+            let what = format!("{} beams, {wrong:?}: {error:?}, share {}", laser.beams, found.share);
+            assert!(error.position().norm() < 0.05 && error.theta.abs() < 0.02, "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_turn_widens_what_is_searched_and_nonsense_does_not() {
+    let window = |step: Pose| Prediction::by_odometry(&Pose::default(), &step).window();
+    let usual = window(Pose::new(0.1, 0.0, 0.0));
+    assert!(window(Pose::new(0.0, 0.0, 1.5)).turns > usual.turns, "a turn on the spot is wrong by a share of it");
+    assert_eq!(window(Pose::new(0.0, 0.0, 1.5)).shifts, usual.shifts);
+    assert!(window(Pose::new(4.0, 0.0, 0.0)).shifts > usual.shifts);
+    assert_eq!(window(Pose { x: f64::NAN, y: 0.0, theta: f64::NAN }), usual);
+}
+
+#[test]
+fn kept_points_are_true_to_a_millimetre_and_half_a_degree() {
+    let mut noise = Noise(5);
+    for _ in 0..1000 {
+        let position = ScanPoint::new(4.0 * noise.uniform() as f32, 4.0 * noise.uniform() as f32);
+        let angle = TAU * noise.uniform();
+        let normal = ScanPoint::new(angle.cos() as f32, angle.sin() as f32);
+        let kept = KeptPoint::of(&SurfacePoint { position, normal }).unpacked();
+        assert!((kept.position - position).norm() < 0.8e-3);
+        let turn = f64::from(kept.normal.y).atan2(f64::from(kept.normal.x));
+        assert!(difference(turn, angle).abs() < 0.5_f64.to_radians());
+    }
+    let corner = SurfacePoint { position: ScanPoint::new(1.0, 2.0), normal: ScanPoint::zeros() };
+    assert!(KeptPoint::of(&corner).unpacked().is_corner());
+}
+
+#[test]
+fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
+    let point = KeptPoint::of(&SurfacePoint { position: ScanPoint::new(1.0, 3.0), normal: ScanPoint::new(0.0, 1.0) });
+    let points = [point; 3];
+    let tile = |row, column, first| Tile { place: (row, column), first, count: 1 };
+    let tiles = [tile(-2, 5, 0), tile(0, 0, 1), tile(0, 7, 2)];
+    assert!(matches!(KeptMap::new(&[tiles[1], tiles[0]], &points), Err(KeptMapError::Order)));
+    assert!(matches!(KeptMap::new(&[tiles[0], tiles[0]], &points), Err(KeptMapError::Order)));
+    assert!(matches!(KeptMap::new(&[tile(0, 0, 3)], &points), Err(KeptMapError::Points)));
+    assert!(matches!(KeptMap::new(&[tile(0, 0, u32::MAX)], &points), Err(KeptMapError::Points)));
+
+    let map = KeptMap::new(&tiles, &points).unwrap();
+    let mut surroundings: Box<Surroundings> = Box::default();
+    // The three points are at (1, 3), (29, 3) and (21, -5).
+    assert_eq!(surroundings.around(&map, &Pose::new(2.0, 2.0, 0.3)).len(), 1);
+    assert_eq!(surroundings.around(&map, &Pose::new(25.0, 2.0, 0.3)).len(), 2);
+    let around = surroundings.around(&map, &Pose::new(14.0, 2.0, 0.3));
+    assert_eq!(around.len(), 3);
+    let at = |x: f64, y: f64| {
+        let position = ScanPoint::new((x - around.origin().x) as f32, (y - around.origin().y) as f32);
+        let sought = SurfacePoint { position, normal: ScanPoint::new(0.0, 1.0) };
+        around.nearest(&sought, 0.01).is_some_and(|found| (found.position - position).norm() < 2e-3)
+    };
+    assert!(at(1.0, 3.0) && at(29.0, 3.0) && at(21.0, -5.0) && !at(21.0, -4.9));
+    assert_eq!(surroundings.around(&map, &Pose::new(1e9, f64::NAN, 0.3)).len(), 3, "nowhere is no other place");
+    assert!((TILE - 4.0).abs() < 1e-12);
+}

@@ -1,0 +1,188 @@
+//! Maps of contours from scans whose poses are known: in each cell the mean of the points that face the same way.
+
+use std::collections::BTreeMap;
+
+use agv_core::contours::{KeptMap, KeptMapError, KeptPoint, SurfacePoint, TILE, Tile, find_surface_points};
+use agv_core::geometry::{Point, Pose};
+use agv_core::sensing::{PointScan, SensorPath};
+use heapless::Vec as BoundedVec;
+
+use crate::import::RANGES;
+use crate::recording::{RecordedEvent, RecordedScan, Recording, Truth, truth_at};
+
+/// Beams of the longest scan that is looked at.
+const BEAMS: usize = 1440;
+
+/// Points of a scan that are mapped.
+const POINTS: usize = 1440;
+
+/// Size of a cell, m.
+pub const CELL: f64 = 0.1;
+
+/// Cosine of the angle up to which normals are of one surface.
+const ALIKE: f64 = 0.848;
+
+/// A point of a map in W, m, and the unit normal of its surface; a corner has none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapPoint {
+    /// Position.
+    pub position: Point,
+    /// Normal, or zero.
+    pub normal: Point,
+}
+
+/// A map in tiles, as the vehicle keeps it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContourMap {
+    tiles: Vec<Tile>,
+    points: Vec<KeptPoint>,
+}
+
+impl ContourMap {
+    /// Puts points into tiles. Those beyond 131 km, and those of a tile with more than 65,535, are left out.
+    #[must_use]
+    pub fn of(points: impl IntoIterator<Item = MapPoint>) -> Self {
+        let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
+        for MapPoint { position, normal } in points {
+            let Some(place) = Tile::place_of(position.x, position.y) else { continue };
+            let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
+            let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
+            by_tile.entry(place).or_default().push(KeptPoint::of(&point));
+        }
+        let mut map = Self::default();
+        for (place, points) in by_tile {
+            let count = u16::try_from(points.len()).unwrap_or(u16::MAX);
+            map.tiles.push(Tile { place, first: map.points.len() as u32, count });
+            map.points.extend(points.into_iter().take(usize::from(count)));
+        }
+        map
+    }
+
+    /// The map as the core uses it.
+    ///
+    /// # Errors
+    /// Never for a map that was made here.
+    pub fn view(&self) -> Result<KeptMap<'_>, KeptMapError> {
+        KeptMap::new(&self.tiles, &self.points)
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether it holds nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// How large it is in the vehicle: points, and eight bytes a tile.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.points.len() * size_of::<KeptPoint>() + self.tiles.len() * 8
+    }
+
+    /// Its points in W.
+    pub fn points(&self) -> impl Iterator<Item = MapPoint> {
+        self.tiles.iter().flat_map(|tile| {
+            let corner = Point::new(f64::from(tile.place.1), f64::from(tile.place.0)) * TILE;
+            let first = tile.first as usize;
+            self.points[first..first + usize::from(tile.count)].iter().map(move |point| {
+                let point = point.unpacked();
+                MapPoint { position: corner + point.position.cast::<f64>(), normal: point.normal.cast() }
+            })
+        })
+    }
+}
+
+/// Points of one surface in one cell.
+#[derive(Clone, Copy, Debug)]
+struct Cluster {
+    count: f64,
+    position: Point,
+    normal: Point,
+}
+
+/// Collects the points of scans by cell.
+#[derive(Clone, Debug)]
+pub struct ContourMapper {
+    cell: f64,
+    cells: BTreeMap<(i64, i64), Vec<Cluster>>,
+    points: BoundedVec<SurfacePoint, POINTS>,
+    scan: PointScan<BEAMS>,
+}
+
+impl ContourMapper {
+    /// A mapper with cells of that size, m.
+    #[must_use]
+    pub fn new(cell: f64) -> Self {
+        Self { cell, cells: BTreeMap::new(), points: BoundedVec::new(), scan: PointScan::new() }
+    }
+
+    /// Adds a scan whose beams were simultaneous, or along a path, from a known pose of the laser at its first beam.
+    pub fn add(&mut self, scan: &RecordedScan, laser: &Pose, path: Option<&SensorPath>) {
+        self.scan.set(&scan.view(), RANGES.0, RANGES.1);
+        if let Some(path) = path {
+            path.correct(&scan.view(), &mut self.scan);
+        }
+        find_surface_points(&self.scan, &mut self.points);
+        for point in &self.points {
+            let normal = laser.transform(&point.normal.cast()) - laser.position();
+            let position = laser.transform(&point.position.cast());
+            let index = |length: f64| (length / self.cell).floor() as i64;
+            let clusters = self.cells.entry((index(position.y), index(position.x))).or_default();
+            let is_alike = |cluster: &&mut Cluster| {
+                let is_corner = cluster.normal == Point::zeros();
+                is_corner == point.is_corner() && (is_corner || cluster.normal.normalize().dot(&normal) > ALIKE)
+            };
+            match clusters.iter_mut().find(is_alike) {
+                Some(cluster) => {
+                    cluster.count += 1.0;
+                    cluster.position += position;
+                    cluster.normal += if point.is_corner() { Point::zeros() } else { normal };
+                }
+                None => {
+                    let normal = if point.is_corner() { Point::zeros() } else { normal };
+                    clusters.push(Cluster { count: 1.0, position, normal });
+                }
+            }
+        }
+    }
+
+    /// The map of all that was added.
+    #[must_use]
+    pub fn finish(&self) -> ContourMap {
+        let points = self.cells.values().flatten().map(|cluster| MapPoint {
+            position: cluster.position / cluster.count,
+            normal: if cluster.normal == Point::zeros() { cluster.normal } else { cluster.normal.normalize() },
+        });
+        ContourMap::of(points)
+    }
+}
+
+/// A map of the scans of a recording that were taken between the first and the last of the known poses of R.
+#[must_use]
+pub fn map_contours_at(recording: &Recording, poses: &[Truth], cell: f64) -> ContourMap {
+    let mut mapper = ContourMapper::new(cell);
+    for event in &recording.events {
+        let RecordedEvent::Scan(scan) = event else { continue };
+        let Some(mount) = recording.parameters.lasers.mount(scan.laser) else { continue };
+        let Some(start) = truth_at(poses, scan.start) else { continue };
+        let end = scan.view().end();
+        let steps = if end > scan.start { PATH_STEPS } else { 0 };
+        let times =
+            (0..=steps).map(|step| scan.start.offset(end.since(scan.start) * f64::from(step) / f64::from(PATH_STEPS)));
+        let displacements: Option<Vec<_>> =
+            times.map(|time| Some((time, start.between(&truth_at(poses, time)?)))).collect();
+        let Some(displacements) = displacements else { continue };
+        let mut path = SensorPath::default();
+        path.set(scan.start, mount, displacements.into_iter());
+        mapper.add(scan, &start.compose(mount), Some(&path));
+    }
+    mapper.finish()
+}
+
+/// Places along the way during a revolution.
+const PATH_STEPS: u32 = 8;

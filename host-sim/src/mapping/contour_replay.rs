@@ -1,0 +1,179 @@
+//! A drive that is localised in a kept map of contours.
+
+use agv_core::contours::{ContourMatcher, KeptMap, KeptMapError, Prediction, Surroundings, align};
+use agv_core::geometry::Pose;
+use agv_core::localizer::{Localizer, MapUse, PoseOutput};
+use agv_core::measurement::Time;
+use agv_core::odometry::OdometryNoise;
+use agv_core::sensing::{PointScan, SensorPath};
+use agv_core::sources::ContourFix;
+
+use super::contour_map::ContourMap;
+use super::known_poses::by_odometry;
+use crate::accuracy::quantile;
+use crate::import::{BEAMS, RANGES};
+use crate::recording::{RecordedEvent, RecordedScan, Recording};
+use crate::replay::{Replay, ReplayError, replay, replay_aided};
+
+/// Why a drive cannot be localised in a map of contours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ContourReplayError {
+    /// The recording cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// The map is none.
+    #[error("the map of contours is not in order")]
+    Map,
+}
+
+impl From<KeptMapError> for ContourReplayError {
+    fn from(_: KeptMapError) -> Self {
+        Self::Map
+    }
+}
+
+/// Places along the way during a revolution.
+const PATH_STEPS: u32 = 8;
+
+/// Where the odometry has the vehicle.
+struct OdometryPath<'a>(&'a [PoseOutput]);
+
+impl OdometryPath<'_> {
+    /// At a time, at constant body velocity between the poses that were told; the nearest one outside of them.
+    fn at(&self, time: Time) -> Option<Pose> {
+        let after = self.0.partition_point(|pose| pose.time <= time);
+        let Some(before) = after.checked_sub(1).map(|before| self.0[before]) else {
+            return self.0.first().map(|first| first.smooth);
+        };
+        let Some(next) = self.0.get(after) else { return Some(before.smooth) };
+        let share = time.since(before.time) / next.time.since(before.time);
+        Some(before.smooth.compose(&before.smooth.between(&next.smooth).fraction(share)))
+    }
+
+    /// Moves the returns of a scan to where they are seen from at its first beam.
+    fn points(&self, scan: &RecordedScan, mount: &Pose, points: &mut PointScan<BEAMS>) {
+        let view = scan.view();
+        points.set(&view, RANGES.0, RANGES.1);
+        let (start, duration) = (scan.start, view.end().since(scan.start));
+        if duration <= 0.0 {
+            return;
+        }
+        let Some(from) = self.at(start) else { return };
+        let times = (0..=PATH_STEPS).map(|step| start.offset(duration * f64::from(step) / f64::from(PATH_STEPS)));
+        let displacements = times.filter_map(|time| Some((time, from.between(&self.at(time)?))));
+        let mut path = SensorPath::default();
+        path.set(start, mount, displacements);
+        path.correct(&view, points);
+    }
+}
+
+/// Localises a recording in a map, beside the landmarks that it uses anyhow. The state has no landmarks of its own then.
+///
+/// # Errors
+/// See [`ContourReplayError`].
+pub fn replay_in(
+    recording: &Recording,
+    map: &ContourMap,
+    progress: impl FnMut(usize),
+) -> Result<Replay, ContourReplayError> {
+    let map: KeptMap = map.view()?;
+    let mut surroundings: Box<Surroundings> = Box::default();
+    let mut matcher: Box<ContourMatcher<400, 1, 1>> = Box::default();
+    let mut points: Box<PointScan<BEAMS>> = Box::default();
+    let mut last: Option<Pose> = None;
+    let lasers = recording.parameters.lasers;
+    let aid = |localizer: &mut Localizer, event: &RecordedEvent, poses: &[PoseOutput]| {
+        let RecordedEvent::Scan(scan) = event else { return };
+        let Some(mount) = lasers.mount(scan.laser) else { return };
+        let odometry = OdometryPath(poses);
+        let now = localizer.outputs().pose;
+        let Some(smooth) = odometry.at(scan.start) else { return };
+        let predicted = now.pose.compose(&now.smooth.between(&smooth));
+        let step = last.map_or(Pose::default(), |last| last.between(&smooth));
+        odometry.points(scan, mount, &mut points);
+        matcher.see(&points);
+        let prediction =
+            Prediction { pose: predicted.compose(mount), ..Prediction::by_odometry(&Pose::default(), &step) };
+        let around = surroundings.around(&map, &prediction.pose);
+        let found = align(matcher.points(), around, &prediction);
+        if let Some(fix) = found.and_then(|found| ContourFix::new(scan.start, &found, mount)) {
+            localizer.aid(&fix);
+        }
+        last = Some(smooth);
+    };
+    Ok(replay_aided(recording, progress, aid)?)
+}
+
+/// Prepares the parameters of a recording for [`replay_in`]: no landmarks in the state, and the noise of its odometry as
+/// the scans say it is.
+///
+/// # Errors
+/// If the recording cannot be replayed.
+pub fn prepare(recording: &mut Recording) -> Result<OdometryNoise, ReplayError> {
+    let noise = odometry_noise(recording)?;
+    recording.parameters.maps = MapUse { slam: false, dynamic: false, ..recording.parameters.maps };
+    recording.parameters.odometry_noise = noise;
+    Ok(noise)
+}
+
+/// Steps shorter than this say nothing of the noise, m.
+const LEAST_WAY: f64 = 0.05;
+
+/// Fewest steps that say something.
+const FEWEST_STEPS: usize = 20;
+
+/// The noise of the odometry by what remains between its steps and those of scans matched to the way behind. The random walks are taken
+/// from the 80 per cent quantile, as a few steps in a hundred are wrong by far more than the others; what the parameters
+/// state is not made less.
+///
+/// # Errors
+/// If the recording cannot be replayed.
+pub fn odometry_noise(recording: &Recording) -> Result<OdometryNoise, ReplayError> {
+    let odometry = replay(&by_odometry(recording, Pose::default()), |_| {})?;
+    let path = OdometryPath(&odometry.poses);
+    let mut matcher: Box<ContourMatcher> = Box::default();
+    let mut points: Box<PointScan<BEAMS>> = Box::default();
+    let mut last: Option<(Pose, Pose)> = None;
+    let (mut along, mut turned) = (Vec::new(), Vec::new());
+    for event in &recording.events {
+        let RecordedEvent::Scan(scan) = event else { continue };
+        if scan.laser != agv_core::measurement::LaserId::FIRST {
+            continue;
+        }
+        let (mount, Some(smooth)) = (recording.parameters.lasers.first(), path.at(scan.start)) else { continue };
+        path.points(scan, mount, &mut points);
+        matcher.see(&points);
+        let laser = smooth.compose(mount);
+        let mut pose = laser;
+        if let Some((before, found_before)) = last {
+            let step = before.between(&laser);
+            let way = step.position().norm();
+            let prediction = Prediction::by_odometry(&found_before, &step);
+            pose = prediction.pose;
+            if let Some(found) = matcher.align(&prediction).filter(|found| found.share > 0.5) {
+                pose = found.pose;
+                let rest = step.between(&found_before.between(&found.pose));
+                if way > LEAST_WAY {
+                    if found.free_axis.is_none() {
+                        along.push(rest.position().norm() / way.sqrt());
+                    }
+                    turned.push(rest.theta.abs() / way.sqrt());
+                }
+            }
+        }
+        matcher.keep(&pose);
+        last = Some((laser, pose));
+    }
+    let stated = recording.parameters.odometry_noise;
+    let walk = |mut rests: Vec<f64>, least: f64| {
+        rests.sort_by(f64::total_cmp);
+        // A normal number is within 1.28 deviations in 80 per cent.
+        if rests.len() < FEWEST_STEPS { least } else { (quantile(&rests, 0.8) / 1.28).max(least) }
+    };
+    Ok(OdometryNoise {
+        slip: walk(along.clone(), stated.slip),
+        side_slip: walk(along, stated.side_slip),
+        yaw: walk(turned, stated.yaw),
+        ..stated
+    })
+}
