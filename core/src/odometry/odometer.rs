@@ -60,6 +60,14 @@ impl<K: Kinematics> Odometer<K> {
     /// # Errors
     /// See [`OdometryError`]; a refused step is not made up for later, except that the reports go on from it.
     pub fn report(&mut self, report: &K::Report) -> Result<Motion, OdometryError> {
+        self.report_with_slip(report).map(|(motion, _)| motion)
+    }
+
+    /// The motion since the last report, and what redundant wheels say differently of it, m ([`super::Step::slip`]).
+    ///
+    /// # Errors
+    /// As [`Self::report`].
+    pub fn report_with_slip(&mut self, report: &K::Report) -> Result<(Motion, f64), OdometryError> {
         if !self.kinematics.is_sound(report) {
             return Err(OdometryError::Implausible);
         }
@@ -86,7 +94,7 @@ impl<K: Kinematics> Odometer<K> {
             return Err(OdometryError::Implausible);
         }
         let (displacement, covariance, distance) = (step.displacement, step.covariance, step.distance);
-        Ok(Motion { start, end, displacement, covariance, distance })
+        Ok((Motion { start, end, displacement, covariance, distance }, step.slip))
     }
 }
 
