@@ -5,6 +5,7 @@ pub mod capture;
 pub mod carmen;
 pub mod carpark;
 pub mod graph_log;
+pub mod optiodom;
 pub mod packets;
 mod posed_scan;
 pub mod poses;
@@ -17,6 +18,8 @@ mod scan_drive;
 mod scan_record;
 mod table;
 pub mod tcp_stream;
+mod units;
+pub mod wheel_table;
 
 pub use posed_scan::{BEAMS, KEYPOINTS, PosedScan, RANGES, ScanLog};
 pub use scan_drive::drive;
