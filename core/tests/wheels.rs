@@ -167,6 +167,20 @@ proptest! {
                         end(&changed, &motions)
                     });
                     let found = path.derivative(number, parameter);
+                    if parameter != WheelParameter::SteeringRatio {
+                        for other in 0..wheels.len() {
+                            let slip = |step: f64| {
+                                let mut changed = wheels.clone();
+                                changed[number] = changed[number].changed(parameter, step);
+                                WheelPath::new(&changed, &motions, &noise, integration).unwrap().slip(other)
+                            };
+                            let found = path.slip_derivative(other, number, parameter);
+                            for (found, (more, less)) in found.into_iter().zip(slip(step).into_iter().zip(slip(-step))) {
+                                let expected = (more - less) / (2.0 * step);
+                                prop_assert!((found - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{name} {other}");
+                            }
+                        }
+                    }
                     let is_absent = parameter == WheelParameter::SteeringRatio && wheels[number].steering.is_none();
                     let expected = if is_absent { Vector3::zeros() } else { expected };
                     prop_assert!(

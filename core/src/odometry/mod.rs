@@ -21,6 +21,7 @@ mod vehicle;
 mod wheel;
 mod wheel_equations;
 mod wheel_path;
+mod wheel_vehicle;
 mod wheels;
 
 pub use ackermann::Ackermann;
@@ -43,4 +44,5 @@ pub use tricycle::Tricycle;
 pub use vehicle::Vehicle;
 pub use wheel::{AngleEncoder, Contact, Wheel, WheelMotion, WheelParameter};
 pub use wheel_path::WheelPath;
-pub use wheels::{DrivenWheel, WheelBased, Wheels, step_of};
+pub use wheel_vehicle::WheelVehicle;
+pub use wheels::{DrivenWheel, WheelBased, Wheels, wheel_motion_between};

@@ -2,7 +2,7 @@
 
 use super::kinematics::Believed;
 use super::{Increments, Integration, Kinematics, Motion, OdometryNoise, Vehicle};
-use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample};
+use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, WheelSample};
 
 /// Why a report gave no motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,6 +107,8 @@ pub enum VehicleOdometer {
     Ackermann(Odometer<super::Ackermann>),
     /// See [`Increments`].
     Increments(Odometer<Increments>),
+    /// See [`super::WheelVehicle`].
+    Wheels(Odometer<super::WheelVehicle>),
 }
 
 impl VehicleOdometer {
@@ -117,6 +119,7 @@ impl VehicleOdometer {
             Vehicle::Tricycle(tricycle) => Self::Tricycle(Odometer::new(*tricycle, parameters)),
             Vehicle::Ackermann(car) => Self::Ackermann(Odometer::new(*car, parameters)),
             Vehicle::Increments => Self::Increments(Odometer::new(Increments, parameters)),
+            Vehicle::Wheels(vehicle) => Self::Wheels(Odometer::new(*vehicle, parameters)),
         }
     }
 
@@ -126,6 +129,7 @@ impl VehicleOdometer {
             Self::Tricycle(odometer) => odometer.restart(),
             Self::Ackermann(odometer) => odometer.restart(),
             Self::Increments(odometer) => odometer.restart(),
+            Self::Wheels(odometer) => odometer.restart(),
         }
     }
 
@@ -147,6 +151,17 @@ impl VehicleOdometer {
     pub fn speed(&mut self, sample: &SpeedSample) -> Result<Motion, OdometryError> {
         match self {
             Self::Ackermann(odometer) => odometer.report(sample),
+            _ => Err(OdometryError::WrongVehicle),
+        }
+    }
+
+    /// The motion since the last sample of several wheels.
+    ///
+    /// # Errors
+    /// See [`Odometer::report`].
+    pub fn wheels(&mut self, sample: &WheelSample) -> Result<Motion, OdometryError> {
+        match self {
+            Self::Wheels(odometer) => odometer.report(sample),
             _ => Err(OdometryError::WrongVehicle),
         }
     }

@@ -148,6 +148,40 @@ pub fn derivative(
     solution.spread * change
 }
 
+/// What does not fit of a wheel: of its turn, and across it, m; zero for what it does not tell.
+#[must_use]
+pub fn rests(wheel: &Wheel, motion: &WheelMotion, share: f64, noise: &OdometryNoise, solution: &Solution) -> [f64; 2] {
+    let steering = steering_at(wheel, motion, share);
+    [rolling(wheel, motion.turn, steering, noise), sideways(wheel, steering, noise)]
+        .map(|equation| equation.map_or(0.0, |equation| equation.way - equation.row.dot(&solution.motion)))
+}
+
+/// Derivative of [`rests`] of a wheel while the solution changes by `change`; by a parameter of the same wheel, if one is given.
+#[must_use]
+pub fn rests_derivative(
+    wheel: &Wheel,
+    motion: &WheelMotion,
+    share: f64,
+    noise: &OdometryNoise,
+    (solution, change): (&Solution, &Vector3<f64>),
+    own: Option<WheelParameter>,
+) -> [f64; 2] {
+    let steering = steering_at(wheel, motion, share);
+    let along = wheel.heading + steering + roller(wheel);
+    let of = |equation: Option<Equation>, angle: f64, is_rolling: bool| {
+        let Some(equation) = equation else { return 0.0 };
+        let by_own = own.map_or(0.0, |parameter| {
+            let way = if is_rolling { way_derivative(wheel, motion.turn, parameter) } else { 0.0 };
+            way - row_derivative(wheel, angle, steering, is_rolling, parameter).dot(&solution.motion)
+        });
+        by_own - equation.row.dot(change)
+    };
+    [
+        of(rolling(wheel, motion.turn, steering, noise), along, true),
+        of(sideways(wheel, steering, noise), wheel.heading + steering + QUARTER, false),
+    ]
+}
+
 fn row_derivative(
     wheel: &Wheel,
     angle: f64,

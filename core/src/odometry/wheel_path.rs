@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::wheel_equations::{Solution, derivative, solve};
+use super::wheel_equations::{Solution, derivative, rests, rests_derivative, solve};
 use super::{Integration, OdometryNoise, Wheel, WheelMotion, WheelParameter};
 use crate::geometry::{Pose, Twist};
 
@@ -102,6 +102,29 @@ impl<'a> WheelPath<'a> {
         let motions = self.solutions.map(|solution| solution.motion);
         let terms = self.terms().unwrap_or(&[]);
         terms.iter().map(|term| term.change(&motions, &changes)).sum()
+    }
+
+    /// What does not fit of the wheel of that number, in the middle: of its turn, and across it, m.
+    #[must_use]
+    pub fn slip(&self, wheel: usize) -> [f64; 2] {
+        let (Some(which), Some(motion)) = (self.wheels.get(wheel), self.motions.get(wheel)) else {
+            return [0.0; 2];
+        };
+        rests(which, motion, 0.5, self.noise, self.middle())
+    }
+
+    /// Derivative of [`Self::slip`] of a wheel by a parameter of the wheel `by`.
+    #[must_use]
+    pub fn slip_derivative(&self, wheel: usize, by: usize, parameter: WheelParameter) -> [f64; 2] {
+        let wheels = || self.wheels.get(wheel).zip(self.motions.get(wheel));
+        let (Some((which, motion)), Some((other, other_motion))) =
+            (wheels(), self.wheels.get(by).zip(self.motions.get(by)))
+        else {
+            return [0.0; 2];
+        };
+        let solution = self.middle();
+        let change = derivative(other, other_motion, 0.5, self.noise, solution, parameter);
+        rests_derivative(which, motion, 0.5, self.noise, (solution, &change), (wheel == by).then_some(parameter))
     }
 
     const fn terms(&self) -> Option<&'static [Term]> {

@@ -45,7 +45,7 @@ impl DrivenWheel {
 
 /// What a wheel did between two readings of its counters.
 #[must_use]
-pub fn motion_between(wheel: &Wheel, from: &WheelReading, to: &WheelReading) -> WheelMotion {
+pub fn wheel_motion_between(wheel: &Wheel, from: &WheelReading, to: &WheelReading) -> WheelMotion {
     let angle =
         |reading: u32| wheel.steering.map_or(0.0, |encoder| encoder.scale * encoder.range.signed(reading) as f64);
     WheelMotion {
@@ -84,8 +84,7 @@ fn covariance(path: &WheelPath, wheels: &[Wheel], way: f64, duration: f64, noise
 }
 
 /// The step that those wheels made in `duration` seconds. Its displacement is not a number if they do not determine it.
-#[must_use]
-pub fn step_of(wheels: &[Wheel], motions: &[WheelMotion], duration: f64, believed: &Believed) -> Step {
+fn step_of(wheels: &[Wheel], motions: &[WheelMotion], duration: f64, believed: &Believed) -> Step {
     let distance = mean_way(wheels, motions);
     let Some(path) = WheelPath::new(wheels, motions, &believed.noise, believed.integration) else {
         return Step { distance: f64::NAN, ..Step::standing(believed.was_backward) };
@@ -116,7 +115,7 @@ impl<V: WheelBased> Kinematics for V {
         let mut motions = [WheelMotion::default(); crate::measurement::MOST_WHEELS];
         let readings = from.wheels.iter().zip(&to.wheels);
         for ((motion, wheel), (from, to)) in motions.iter_mut().zip(wheels.as_ref()).zip(readings) {
-            *motion = motion_between(wheel, from, to);
+            *motion = wheel_motion_between(wheel, from, to);
         }
         step_of(wheels.as_ref(), &motions, duration, believed)
     }

@@ -19,6 +19,7 @@ mod scan_record;
 mod table;
 pub mod tcp_stream;
 mod units;
+pub mod wheel_recording;
 pub mod wheel_table;
 
 pub use posed_scan::{BEAMS, KEYPOINTS, PosedScan, RANGES, ScanLog};

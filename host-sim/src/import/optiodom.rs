@@ -6,15 +6,17 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
-use agv_core::odometry::{AngleEncoder, Contact, CounterRange, Wheel};
+use agv_core::odometry::{
+    AngleEncoder, Contact, CounterRange, Differential, DrivenWheel, Mecanum, Omnidirectional, Tricycle, Vehicle, Wheel,
+    WheelVehicle,
+};
 
+use super::wheel_recording;
 use super::wheel_table::{self, Column, ReferenceColumns, TableColumns, WheelColumns};
 use crate::calibrate::wheeled::drive::WheelDrive;
 use crate::calibrate::wheeled::unknowns::{Kind, WheeledModel};
+use crate::recording::Recording;
 use crate::text_file::{self, TextFileError};
-
-/// The kinds of robots, by the names of their folders.
-pub const KINDS: [&str; 4] = ["tricyc", "diff", "omni3", "omni4"];
 
 /// A session: runs of one robot on one day.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,27 +45,8 @@ struct Metadata {
 /// # Errors
 /// If there is no such folder, a table in it is bad, or a robot is of no known kind.
 pub fn read(folder: &Path) -> Result<Session, TextFileError> {
-    let entries = std::fs::read_dir(folder).map_err(|error| TextFileError::of_system(folder, error))?;
-    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    files.sort();
-    let is_named = |path: &Path, part: &str| {
-        path.file_name()
-            .and_then(|name| name.to_str())
-            .is_some_and(|name| name.contains(part) && name.ends_with(".csv"))
-    };
-    let table = files.iter().find(|path| is_named(path, "_metadata")).ok_or_else(|| TextFileError::Foreign {
-        path: folder.to_owned(),
-        expected: "a session of the OptiOdom robots",
-        looks_like: "a folder without a table of nominal values",
-    })?;
-    let metadata = Metadata::read(table)?;
-    let (kind, wheels) = metadata.wheels().ok_or_else(|| {
-        TextFileError::of_line(
-            table,
-            1,
-            format!("there is no such robot, or its measures are missing: {:?}", metadata.kind),
-        )
-    })?;
+    let (files, metadata) = session_of(folder)?;
+    let (kind, wheels) = metadata.wheels(folder)?;
     let columns = metadata.columns();
     let run = |path: &PathBuf| {
         let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default().to_owned();
@@ -75,6 +58,41 @@ pub fn read(folder: &Path) -> Result<Session, TextFileError> {
         return Err(TextFileError::Empty { path: folder.to_owned() });
     }
     Ok(Session { kind, nominal: WheeledModel { wheels, sensor: Pose::default() }, runs })
+}
+
+/// Reads one run as a drive with its nominal vehicle; what is nominal lies beside it. References are the poses of the capture.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_run(path: &Path) -> Result<Recording, TextFileError> {
+    let (_, metadata) = session_of(path.parent().unwrap_or(Path::new(".")))?;
+    let (_, wheels) = metadata.wheels(path)?;
+    let mut drive = wheel_table::read(path, &metadata.columns())?;
+    if metadata.kind == "diff" {
+        // The right wheel comes first in the table, the left one in events.
+        drive.steps.iter_mut().for_each(|step| step.motions.reverse());
+    }
+    let vehicle = metadata.vehicle(&wheels).ok_or_else(|| metadata.no_such_robot(path))?;
+    wheel_recording::of(&drive, vehicle, Some(metadata.radius()), Pose::default())
+        .map_err(|error| TextFileError::of_line(path, 1, error.to_string()))
+}
+
+fn is_named(path: &Path, part: &str) -> bool {
+    path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.contains(part) && name.ends_with(".csv"))
+}
+
+/// The files of a session, in order, and what is nominal.
+fn session_of(folder: &Path) -> Result<(Vec<PathBuf>, Metadata), TextFileError> {
+    let entries = std::fs::read_dir(folder).map_err(|error| TextFileError::of_system(folder, error))?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.sort();
+    let table = files.iter().find(|path| is_named(path, "_metadata")).ok_or_else(|| TextFileError::Foreign {
+        path: folder.to_owned(),
+        expected: "a session of the OptiOdom robots",
+        looks_like: "a folder without a table of nominal values",
+    })?;
+    let metadata = Metadata::read(table)?;
+    Ok((files, metadata))
 }
 
 impl Metadata {
@@ -98,8 +116,57 @@ impl Metadata {
             .ok_or_else(|| TextFileError::of_line(path, 1, "a row of type, ngear, encRes, Li or Di is missing or bad"))
     }
 
+    fn no_such_robot(&self, path: &Path) -> TextFileError {
+        let problem = format!("there is no such robot, or its measures are missing: {:?}", self.kind);
+        TextFileError::of_line(path, 1, problem)
+    }
+
+    /// Radius of the first wheel, m.
+    fn radius(&self) -> f64 {
+        0.5 * self.diameters.first().copied().unwrap_or_default()
+    }
+
+    fn wheels(&self, path: &Path) -> Result<(Kind, Vec<Wheel>), TextFileError> {
+        self.nominal_wheels().ok_or_else(|| self.no_such_robot(path))
+    }
+
+    /// The vehicle as logs have it: counters of a millionth of a radian.
+    fn vehicle(&self, wheels: &[Wheel]) -> Option<Vehicle> {
+        const TICK: AngleEncoder = AngleEncoder { scale: 1e-6, range: CounterRange::BITS_32 };
+        let backward = AngleEncoder { scale: -TICK.scale, ..TICK };
+        let driven =
+            |number: usize, turn: AngleEncoder| Some(DrivenWheel { radius: wheels.get(number)?.radius.abs(), turn });
+        let first = wheels.first()?;
+        Some(match self.kind.as_str() {
+            "tricyc" => Vehicle::Tricycle(Tricycle {
+                wheelbase: first.x,
+                drive_scale: first.radius * TICK.scale,
+                drive_range: TICK.range,
+                steering_scale: TICK.scale,
+                steering_range: TICK.range,
+                steering_offset_forward: 0.0,
+                steering_offset_backward: 0.0,
+            }),
+            "diff" => Vehicle::Wheels(WheelVehicle::Differential(Differential {
+                track: 2.0 * first.y.abs(),
+                left: driven(1, TICK)?,
+                right: driven(0, TICK)?,
+            })),
+            "omni3" => Vehicle::Wheels(WheelVehicle::ThreeOmnidirectional(Omnidirectional {
+                arm: first.x.hypot(first.y),
+                first: first.y.atan2(first.x),
+                driven: [driven(0, backward)?, driven(1, backward)?, driven(2, backward)?],
+            })),
+            _ => Vehicle::Wheels(WheelVehicle::Mecanum(Mecanum {
+                wheelbase: 2.0 * first.x,
+                track: 2.0 * first.y,
+                driven: [driven(0, TICK)?, driven(1, backward)?, driven(2, TICK)?, driven(3, backward)?],
+            })),
+        })
+    }
+
     /// A steered wheel's reading is an angle already; the nominal ratio to it is one.
-    fn wheels(&self) -> Option<(Kind, Vec<Wheel>)> {
+    fn nominal_wheels(&self) -> Option<(Kind, Vec<Wheel>)> {
         let encoder = AngleEncoder { scale: 1.0, range: CounterRange::BITS_32 };
         let length = *self.distances.first()?;
         let wheel = |number: usize, place: [f64; 2], heading: f64, contact: Contact| {

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use thiserror::Error;
 
-use super::super::least_squares::{self, minimise};
+use super::super::least_squares::{self, minimise_kinked};
 use super::clock::Clock;
 use super::drive::WheelDrive;
-use super::path::LinearisedPath;
+use super::path::{LinearisedPath, is_redundant};
 use super::unknowns::{Unknown, WheeledModel};
 use super::windows::{self, MEMORY, SECONDS, STRIDE, Window};
 
@@ -61,8 +61,9 @@ const OPEN: f64 = 0.5;
 /// Residuals before the first fit, m; and never less than this.
 const FIRST_RESIDUAL: f64 = 0.01;
 const LEAST_RESIDUAL: f64 = 1e-13;
-/// Rounds of fit and residual.
+/// Rounds of fit and residual, at most; they end when the residual changes by less than this share.
 const ROUNDS: usize = 4;
+const SETTLED: f64 = 0.02;
 
 struct Problem<'a> {
     drives: &'a [WheelDrive],
@@ -72,6 +73,8 @@ struct Problem<'a> {
     /// Of the vehicle's unknowns; those of the clocks follow, two a drive.
     priors: Vec<f64>,
     clocks: bool,
+    /// Residuals of a window.
+    rows: usize,
 }
 
 /// Fits the unknowns, and the clock of each drive if `clocks` says so.
@@ -93,12 +96,16 @@ pub fn fit(
     if 3 * windows.len() < 2 * priors.len() || windows.is_empty() {
         return Err(WheeledFitError::TooShort);
     }
-    let problem = Problem { drives, nominal, unknowns, windows, priors, clocks };
+    let rows = if is_redundant(nominal) { 3 + 2 * nominal.wheels.len() } else { 3 };
+    let problem = Problem { drives, nominal, unknowns, windows, priors, clocks, rows };
     let mut values = vec![0.0; problem.priors.len()];
     let mut residual = FIRST_RESIDUAL;
     for _ in 0..ROUNDS {
         values = problem.solve(&values, residual)?;
-        residual = problem.residual(&values)?.max(LEAST_RESIDUAL);
+        let before = std::mem::replace(&mut residual, problem.residual(&values)?.max(LEAST_RESIDUAL));
+        if (residual - before).abs() <= SETTLED * before {
+            break;
+        }
     }
     problem.finish(&values, residual)
 }
@@ -132,16 +139,17 @@ impl Problem<'_> {
         let mut linearised = least_squares::Linearised { residuals: Vec::new(), rows: Vec::new() };
         let count = self.unknowns.len();
         for window in &self.windows {
-            let (residual, by_unknowns, by_clock) = window.residual(&paths[window.drive], &clocks[window.drive]);
-            for (row, arm) in [1.0, 1.0, HEADING_ARM].into_iter().enumerate() {
-                linearised.residuals.push(arm * residual[row]);
+            let residual = window.residual(&paths[window.drive], &clocks[window.drive]);
+            for (row, value) in residual.values.iter().enumerate() {
+                let arm = if row == 2 { HEADING_ARM } else { 1.0 };
+                linearised.residuals.push(arm * value);
                 let mut line = vec![0.0; self.priors.len()];
                 for column in 0..count {
-                    line[column] = arm * by_unknowns[(row, column)] * self.priors[column];
+                    line[column] = arm * residual.by_unknowns[(row, column)] * self.priors[column];
                 }
-                for (index, by) in by_clock.iter().enumerate().filter(|_| self.clocks) {
+                for index in (0..2).filter(|_| self.clocks) {
                     let column = count + 2 * window.drive + index;
-                    line[column] = arm * by[row] * self.priors[column];
+                    line[column] = arm * residual.by_clock[(row, index)] * self.priors[column];
                 }
                 linearised.rows.extend(line);
             }
@@ -155,8 +163,8 @@ impl Problem<'_> {
         self.windows(start).ok_or(WheeledFitError::Undetermined)?;
         let evaluate = |values: &[f64]| {
             let not_determined = || least_squares::Linearised {
-                residuals: vec![f64::MAX.sqrt(); 3 * self.windows.len()],
-                rows: vec![0.0; 3 * self.windows.len() * values.len()],
+                residuals: vec![f64::MAX.sqrt(); self.rows * self.windows.len()],
+                rows: vec![0.0; self.rows * self.windows.len() * values.len()],
             };
             let mut linearised = self.windows(values).unwrap_or_else(not_determined);
             for (row, value) in values.iter().enumerate() {
@@ -167,13 +175,13 @@ impl Problem<'_> {
             linearised.residuals.iter_mut().chain(&mut linearised.rows).for_each(|entry| *entry /= weight);
             linearised
         };
-        minimise(start, evaluate).ok_or(WheeledFitError::NoConvergence)
+        minimise_kinked(start, evaluate).ok_or(WheeledFitError::NoConvergence)
     }
 
     fn residual(&self, values: &[f64]) -> Result<f64, WheeledFitError> {
         let windows = self.windows(values).ok_or(WheeledFitError::Undetermined)?;
         let squares: f64 = windows.residuals.iter().map(|residual| residual * residual).sum();
-        Ok((squares / windows.residuals.len() as f64).sqrt())
+        Ok((squares / (3 * self.windows.len()) as f64).sqrt())
     }
 
     fn finish(&self, values: &[f64], residual: f64) -> Result<WheeledFit, WheeledFitError> {
@@ -199,7 +207,9 @@ impl Problem<'_> {
         let normal = rows.transpose() * &rows + DMatrix::identity(count, count);
         let inverse = normal.try_inverse().ok_or(WheeledFitError::Undetermined)?;
         let scores: Vec<DVector<f64>> = (0..self.windows.len())
-            .map(|window| rows.rows(3 * window, 3).transpose() * residuals.rows(3 * window, 3))
+            .map(|window| {
+                rows.rows(self.rows * window, self.rows).transpose() * residuals.rows(self.rows * window, self.rows)
+            })
             .collect();
         // Neighbours within the memory are correlated: their products count, the less the further apart.
         let mut scatter = DMatrix::identity(count, count);

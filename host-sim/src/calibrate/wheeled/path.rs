@@ -25,6 +25,8 @@ pub struct LinearisedPath {
     poses: Vec<Vector3<f64>>,
     /// Three rows each.
     derivatives: Vec<DMatrix<f64>>,
+    /// What redundant wheels have said differently since the start, two numbers a wheel, m, and its derivatives; empty without them.
+    slips: Vec<(DVector<f64>, DMatrix<f64>)>,
     sensor: agv_core::geometry::Pose,
     sensor_columns: [Option<usize>; 3],
 }
@@ -40,25 +42,53 @@ const NOISE: OdometryNoise = OdometryNoise {
     unknown_turn: 1.0,
 };
 
-/// The displacement of one step, and its derivative by the unknowns. None if the wheels do not determine it.
-fn step(model: &WheeledModel, motions: &[WheelMotion], unknowns: &[Unknown]) -> Option<(Vector3<f64>, DMatrix<f64>)> {
-    let path = WheelPath::new(&model.wheels, motions, &NOISE, Integration::RungeKutta2)?;
+/// What one step adds, and its derivatives by the unknowns.
+struct Added {
+    displacement: Vector3<f64>,
+    by_unknowns: DMatrix<f64>,
+    slip: DVector<f64>,
+    slip_by_unknowns: DMatrix<f64>,
+}
+
+/// None if the wheels do not determine the step.
+fn step(model: &WheeledModel, motions: &[WheelMotion], unknowns: &[Unknown], is_redundant: bool) -> Option<Added> {
+    let path = WheelPath::new(&model.wheels, motions, &NOISE, Integration::Arc)?;
     let end = path.displacement();
-    let mut derivative = DMatrix::zeros(3, unknowns.len());
-    if motions.iter().any(|motion| motion.turn != 0.0) {
-        for (column, unknown) in unknowns.iter().enumerate() {
-            if let Moves::Wheels(moves) = &unknown.moves {
-                for (wheel, parameter, factor) in moves {
-                    let share = factor / base(model, *wheel, *parameter);
-                    let change = share * path.derivative(*wheel, *parameter);
-                    let mut place = derivative.column_mut(column);
-                    place += change;
+    let slips = if is_redundant { model.wheels.len() } else { 0 };
+    let mut added = Added {
+        // A step turns by less than half a turn.
+        displacement: Vector3::new(end.x, end.y, end.theta),
+        by_unknowns: DMatrix::zeros(3, unknowns.len()),
+        slip: DVector::from_iterator(2 * slips, (0..slips).flat_map(|wheel| path.slip(wheel))),
+        slip_by_unknowns: DMatrix::zeros(2 * slips, unknowns.len()),
+    };
+    if motions.iter().all(|motion| motion.turn == 0.0) {
+        return Some(added);
+    }
+    for (column, unknown) in unknowns.iter().enumerate() {
+        let Moves::Wheels(moves) = &unknown.moves else { continue };
+        for (wheel, parameter, factor) in moves {
+            let share = factor / base(model, *wheel, *parameter);
+            let mut place = added.by_unknowns.column_mut(column);
+            place += share * path.derivative(*wheel, *parameter);
+            for slipping in 0..slips {
+                for (axis, change) in path.slip_derivative(slipping, *wheel, *parameter).into_iter().enumerate() {
+                    added.slip_by_unknowns[(2 * slipping + axis, column)] += share * change;
                 }
             }
         }
     }
-    // A step turns by less than half a turn.
-    Some((Vector3::new(end.x, end.y, end.theta), derivative))
+    Some(added)
+}
+
+/// Whether there is a motion of those wheels in which they contradict each other.
+pub fn is_redundant(model: &WheeledModel) -> bool {
+    let motion = |number: usize| {
+        let steering = 0.1 * (number + 1) as f64;
+        WheelMotion { turn: 1.0 / (number + 1) as f64, steering_start: steering, steering_end: steering }
+    };
+    let motions: Vec<WheelMotion> = (0..model.wheels.len()).map(motion).collect();
+    WheelPath::new(&model.wheels, &motions, &NOISE, Integration::Arc).is_some_and(|path| path.middle().slip > 1e-9)
 }
 
 /// A ratio is changed as a share of what it is now.
@@ -76,13 +106,21 @@ impl LinearisedPath {
             times: vec![0.0],
             poses: vec![Vector3::zeros()],
             derivatives: vec![DMatrix::zeros(3, unknowns.len())],
+            slips: Vec::new(),
             sensor: model.sensor,
             sensor_columns: [column(0), column(1), column(2)],
         };
         let (mut pose, mut derivative) = (Vector3::zeros(), DMatrix::zeros(3, unknowns.len()));
+        let is_redundant = is_redundant(model);
+        let rows = if is_redundant { 2 * model.wheels.len() } else { 0 };
+        let mut slip = (DVector::zeros(rows), DMatrix::zeros(rows, unknowns.len()));
+        path.slips.push(slip.clone());
         for WheelStep { end, motions } in scaled(drive, model) {
-            let (moved, by_unknowns) = step(model, &motions, unknowns)?;
-            (pose, derivative) = composed(&pose, &derivative, &moved, &by_unknowns);
+            let added = step(model, &motions, unknowns, is_redundant)?;
+            (pose, derivative) = composed(&pose, &derivative, &added.displacement, &added.by_unknowns);
+            slip.0 += added.slip;
+            slip.1 += added.slip_by_unknowns;
+            path.slips.push(slip.clone());
             path.times.push(end);
             path.poses.push(pose);
             path.derivatives.push(derivative.clone());
@@ -90,17 +128,36 @@ impl LinearisedPath {
         Some(path)
     }
 
-    /// R between two steps, at constant velocity; it stands before the first and behind the last one.
-    fn robot_at(&self, time: f64) -> Linearised {
+    /// Where a time of the odometry's clock lies: before it, behind it, and the share of the way; the ends for a time outside.
+    fn place(&self, time: f64) -> (usize, usize, f64) {
         let after = self.times.partition_point(|end| *end <= time);
         if after == 0 || after == self.times.len() {
-            let at = after.saturating_sub(1);
-            let by_unknowns = self.derivatives[at].clone();
-            return Linearised { pose: self.poses[at], by_unknowns, velocity: Vector3::zeros() };
+            let end = after.saturating_sub(1);
+            return (end, end, 0.0);
         }
-        let before = after - 1;
+        let (before, duration) = (after - 1, self.times[after] - self.times[after - 1]);
+        (before, after, (time - self.times[before]) / duration)
+    }
+
+    /// What redundant wheels have said differently until a time of the poses' clock, m, with its derivatives by the unknowns and by
+    /// time.
+    #[must_use]
+    pub fn slip_at(&self, time: f64, clock: &Clock) -> (DVector<f64>, DMatrix<f64>, DVector<f64>) {
+        let (before, after, share) = self.place(clock.odometry_time(time));
+        let ((first, first_by), (second, second_by)) = (&self.slips[before], &self.slips[after]);
         let duration = self.times[after] - self.times[before];
-        let share = (time - self.times[before]) / duration;
+        let rate = if duration > 0.0 { (second - first) / duration } else { DVector::zeros(first.len()) };
+        (first * (1.0 - share) + second * share, first_by * (1.0 - share) + second_by * share, rate)
+    }
+
+    /// R between two steps, at constant velocity; it stands before the first and behind the last one.
+    fn robot_at(&self, time: f64) -> Linearised {
+        let (before, after, share) = self.place(time);
+        if before == after {
+            let by_unknowns = self.derivatives[before].clone();
+            return Linearised { pose: self.poses[before], by_unknowns, velocity: Vector3::zeros() };
+        }
+        let duration = self.times[after] - self.times[before];
         let change = self.poses[after] - self.poses[before];
         Linearised {
             pose: self.poses[before] + share * change,

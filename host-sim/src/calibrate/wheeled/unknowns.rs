@@ -85,35 +85,47 @@ impl Unknown {
     }
 
     fn geometry(kind: Kind, wheels: &[Wheel]) -> Vec<Self> {
-        use WheelParameter::{Heading, Roller, X, Y};
+        use WheelParameter::{X, Y};
         let away = |wheel: usize| wheels.get(wheel).map_or(0.0, |wheel| wheel.x.hypot(wheel.y));
-        let track = || Self::wheel("track m".to_owned(), vec![(0, Y, 0.5), (1, Y, -0.5)], SHARE * 2.0 * away(0));
+        let half = |wheel: usize| wheels.get(wheel).map_or(0.5, |wheel| 0.5_f64.copysign(wheel.y));
+        let track = || Self::wheel("track m".to_owned(), vec![(0, Y, half(0)), (1, Y, half(1))], SHARE * 2.0 * away(0));
         let base = |wheel: usize| Self::wheel("wheelbase m".to_owned(), vec![(wheel, X, 1.0)], SHARE * away(wheel));
-        let each = |(number, wheel): (usize, &Wheel)| {
-            let away = away(number);
-            let arm = vec![(number, X, wheel.x / away), (number, Y, wheel.y / away)];
-            let (what, angle) = match wheel.contact {
-                // The rollers' axis is the direction in which such a wheel measures.
-                Contact::Rollers(angle) if angle != 0.0 => ("rollers", Roller),
-                _ => ("direction", Heading),
-            };
-            let number_of = number + 1;
-            [
-                Self::wheel(format!("arm of wheel {number_of} m"), arm, SHARE * away),
-                Self::wheel(format!("{what} of wheel {number_of} rad"), vec![(number, angle, 1.0)], MOUNTING),
-            ]
-        };
         match kind {
             Kind::Tricycle => vec![base(0)],
             Kind::Differential => vec![track()],
-            // Both on one line: only their distance is told.
             Kind::BiSteerable => {
                 let distance = away(0) + away(1);
                 vec![Self::wheel("wheelbase m".to_owned(), vec![(0, X, 0.5), (1, X, -0.5)], SHARE * distance)]
             }
             Kind::Ackermann => vec![track(), base(2)],
-            Kind::Omnidirectional => wheels.iter().enumerate().flat_map(each).collect(),
+            Kind::Omnidirectional => {
+                let outward = |(number, wheel): (usize, &Wheel)| {
+                    [(number, X, wheel.x / away(number)), (number, Y, wheel.y / away(number))]
+                };
+                let arms = wheels.iter().enumerate().flat_map(outward).collect();
+                let mut unknowns = vec![Self::wheel("arm m".to_owned(), arms, SHARE * away(0))];
+                unknowns.extend(Self::directions(wheels));
+                unknowns
+            }
         }
+    }
+
+    /// Directions in which omnidirectional wheels measure. As R may lie anywhere, what moves all of them alike is none: with rollers
+    /// across, those of all wheels but the first; with four mecanum wheels, three directions of motion tell one angle of all rollers.
+    fn directions(wheels: &[Wheel]) -> Vec<Self> {
+        let rollers = wheels.iter().enumerate().filter_map(|(number, wheel)| match wheel.contact {
+            Contact::Rollers(angle) if angle != 0.0 => Some((number, WheelParameter::Roller, angle.signum())),
+            _ => None,
+        });
+        let rollers: Vec<_> = rollers.collect();
+        if !rollers.is_empty() {
+            return vec![Self::wheel("rollers rad".to_owned(), rollers, MOUNTING)];
+        }
+        let direction = |number: usize| {
+            let name = format!("direction of wheel {} rad", number + 1);
+            Self::wheel(name, vec![(number, WheelParameter::Heading, 1.0)], MOUNTING)
+        };
+        (1..wheels.len().min(3)).map(direction).collect()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::drive::{TimedPose, WheelDrive};
 use super::path::LinearisedPath;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Length of a window, s: long enough that counters which stall and catch up do not matter, short enough that nothing adds up.
 pub const SECONDS: f64 = 2.0;
@@ -46,32 +46,56 @@ fn between(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(cosine * change.x + sine * change.y, cosine * change.y - sine * change.x, change.z)
 }
 
+/// What a window contributes: residuals, and their derivatives by the unknowns and by offset and rate of the clock.
+pub struct Residual {
+    /// What the wheels say less what the poses say: x, y, m, heading, rad; then what redundant wheels say differently, m.
+    pub values: DVector<f64>,
+    /// One row a value.
+    pub by_unknowns: DMatrix<f64>,
+    /// One row a value; offset, rate.
+    pub by_clock: DMatrix<f64>,
+}
+
 impl Window {
-    /// What the wheels say less what the poses say: x, y, m, heading, rad; its derivatives by the unknowns, and by offset and rate of
-    /// the clock.
-    pub fn residual(&self, path: &LinearisedPath, clock: &Clock) -> (Vector3<f64>, DMatrix<f64>, [Vector3<f64>; 2]) {
+    /// The residual of the window.
+    pub fn residual(&self, path: &LinearisedPath, clock: &Clock) -> Residual {
         let (start, end) = (path.sensor_at(self.start.time, clock), path.sensor_at(self.end.time, clock));
+        let (slip_start, slip_end) = (path.slip_at(self.start.time, clock), path.slip_at(self.end.time, clock));
         let said = between(&start.pose, &end.pose);
         let vector = |pose: &TimedPose| Vector3::new(pose.x, pose.y, pose.heading);
         let seen = between(&vector(&self.start), &vector(&self.end));
         let (sine, cosine) = start.pose.z.sin_cos();
         // Derivative of the displacement by the derivatives of its ends.
-        let derive = |first: [f64; 3], second: [f64; 3]| {
-            let change = [second[0] - first[0], second[1] - first[1], second[2] - first[2]];
+        let derive = |first: Vector3<f64>, second: Vector3<f64>| {
+            let change = second - first;
             Vector3::new(
-                cosine * change[0] + sine * change[1] + said.y * first[2],
-                cosine * change[1] - sine * change[0] - said.x * first[2],
-                change[2],
+                cosine * change.x + sine * change.y + said.y * first.z,
+                cosine * change.y - sine * change.x - said.x * first.z,
+                change.z,
             )
         };
-        let mut by_unknowns = DMatrix::zeros(3, start.by_unknowns.ncols());
-        for column in 0..by_unknowns.ncols() {
-            let of = |matrix: &DMatrix<f64>| [matrix[(0, column)], matrix[(1, column)], matrix[(2, column)]];
-            by_unknowns.set_column(column, &derive(of(&start.by_unknowns), of(&end.by_unknowns)));
+        let rows = 3 + slip_start.0.len();
+        let mut residual = Residual {
+            values: DVector::zeros(rows),
+            by_unknowns: DMatrix::zeros(rows, start.by_unknowns.ncols()),
+            by_clock: DMatrix::zeros(rows, 2),
+        };
+        residual.values.rows_mut(0, 3).copy_from(&(said - seen));
+        residual.values.rows_mut(3, rows - 3).copy_from(&(slip_end.0 - slip_start.0));
+        for column in 0..residual.by_unknowns.ncols() {
+            let of =
+                |matrix: &DMatrix<f64>| Vector3::new(matrix[(0, column)], matrix[(1, column)], matrix[(2, column)]);
+            let derived = derive(of(&start.by_unknowns), of(&end.by_unknowns));
+            residual.by_unknowns.view_mut((0, column), (3, 1)).copy_from(&derived);
         }
-        let moved = |velocity: &Vector3<f64>, by: f64| [velocity.x * by, velocity.y * by, velocity.z * by];
-        let by_offset = derive(moved(&start.velocity, -1.0), moved(&end.velocity, -1.0));
-        let by_rate = derive(moved(&start.velocity, -self.start.time), moved(&end.velocity, -self.end.time));
-        (said - seen, by_unknowns, [by_offset, by_rate])
+        residual.by_unknowns.rows_mut(3, rows - 3).copy_from(&(slip_end.1 - slip_start.1));
+        // The later the odometry's clock says it, the earlier on it is the time that is asked for.
+        for (column, [first, second]) in [[1.0, 1.0], [self.start.time, self.end.time]].into_iter().enumerate() {
+            let derived = derive(-start.velocity * first, -end.velocity * second);
+            residual.by_clock.view_mut((0, column), (3, 1)).copy_from(&derived);
+            let slip = &slip_start.2 * first - &slip_end.2 * second;
+            residual.by_clock.view_mut((3, column), (rows - 3, 1)).copy_from(&slip);
+        }
+        residual
     }
 }
