@@ -38,12 +38,9 @@ impl Kinematics for Differential {
     fn step(&self, from: &Wheels, to: &Wheels, duration: f64, believed: &Believed) -> Step {
         let [left, right] = [to.left - from.left, to.right - from.right].map(|ticks| self.scale * ticks as f64);
         let (along, turn) = (0.5 * (left + right), (right - left) / self.track);
-        Step {
-            displacement: Pose::exp(&Twist { x: along, y: 0.0, theta: turn }),
-            covariance: believed.noise.of_displacement(along.abs(), duration),
-            distance: along.abs(),
-            is_backward: along < 0.0,
-        }
+        let displacement = Pose::exp(&Twist { x: along, y: 0.0, theta: turn });
+        let covariance = believed.noise.of_displacement(along.abs(), duration);
+        Step { displacement, covariance, distance: along.abs(), is_backward: along < 0.0, slip: 0.0 }
     }
 
     fn steering_lever(&self) -> Option<f64> {
@@ -77,6 +74,6 @@ pub fn main() {
     let said = localizer.outputs().pose;
     println!("{:.4} m, {:.4} m, {:.4} rad after a quarter of a circle", said.pose.x, said.pose.y, said.pose.theta);
     println!("standard deviations {:.4} m and {:.4} m", said.covariance[0].sqrt(), said.covariance[2].sqrt());
-    assert!((said.pose.x - radius).abs() < 1e-3 && (said.pose.y - radius).abs() < 1e-3);
-    assert!((said.pose.theta - quarter).abs() < 1e-3);
+    let off = [said.pose.x - radius, said.pose.y - radius, said.pose.theta - quarter];
+    assert!(off.iter().all(|off| off.abs() < 1e-3));
 }

@@ -3,7 +3,7 @@
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{Event, Misuse, Mode, PoseFix, Reason};
 use agv_core::maps::{Landmark, LandmarkKind, MapError};
-use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
+use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time, WheelSample};
 
 use super::support::stage::{Stage, features, parameters, reflectors};
 
@@ -18,6 +18,7 @@ fn what_was_wrong_with_an_event_is_said() {
     let cases = [
         (Event::Encoders(EncoderSample { time: now, drive: 1, steering: 1 }), Misuse::WrongVehicle),
         (Event::Speed(SpeedSample { time: now, speed: 1.0, steering: 0.0 }), Misuse::WrongVehicle),
+        (Event::Wheels(WheelSample { time: now, wheels: Default::default() }), Misuse::WrongVehicle),
         (Event::Increment(PoseIncrement { time: now, displacement: Pose::default() }), Misuse::OutOfOrder),
         (Event::SetPose(PoseFix { position_deviation: f64::NAN, ..fix }), Misuse::NoPose),
         (Event::SetPose(PoseFix { pose: Pose { x: f64::INFINITY, ..fix.pose }, ..fix }), Misuse::NoPose),

@@ -8,7 +8,7 @@ use agv_core::localizer::{
 use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
     EncoderFault, EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan,
-    SpeedSample, Time,
+    SpeedSample, Time, WheelReading, WheelSample,
 };
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 use agv_core::record::{
@@ -24,6 +24,7 @@ enum Owned {
     Landmarks(Vec<Landmark>),
     Encoders(EncoderSample),
     Speed(SpeedSample),
+    Wheels(WheelSample),
     Increment(PoseIncrement),
     Reflectors(Vec<ReflectorObservation>),
     Scan(Time, [f64; 3], Vec<f32>, Vec<u16>),
@@ -49,6 +50,7 @@ impl Owned {
             Self::Encoders(sample) => Record::Event(Event::Encoders(*sample)),
             Self::EncoderFaults(faults) => Record::Event(Event::EncoderFaults(*faults)),
             Self::Speed(sample) => Record::Event(Event::Speed(*sample)),
+            Self::Wheels(sample) => Record::Event(Event::Wheels(*sample)),
             Self::Increment(increment) => Record::Event(Event::Increment(*increment)),
             Self::Reflectors(observations) => Record::Event(Event::Reflectors(Reflectors::of_first(observations))),
             Self::Scan(start, [beam_interval, first_bearing, bearing_step], ranges, intensities) => {
@@ -206,6 +208,10 @@ fn record() -> impl Strategy<Value = Owned> {
             let (drive, steering) = if is_driving { (jumped, None) } else { (None, out_of_range) };
             Owned::EncoderFaults(EncoderFaults { time, drive, steering })
         }),
+        (time(), any::<[(u32, u32); 4]>()).prop_map(|(time, wheels)| Owned::Wheels(WheelSample {
+            time,
+            wheels: wheels.map(|(count, steering)| WheelReading { count, steering }),
+        })),
         (time(), number(), number()).prop_map(|(time, speed, steering)| Owned::Speed(SpeedSample {
             time,
             speed,

@@ -6,6 +6,8 @@ mod published;
 mod report;
 mod simulate;
 mod two_lasers;
+mod wheel_table;
+mod wheeled_fit;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
 #[test]

@@ -1,5 +1,6 @@
 //! The real tricycle, held to what its calibration must show.
 
+use agv_lab::evaluate::calibration::optiodom;
 use agv_lab::evaluate::calibration::sapienza::{self, Fit};
 use agv_tests::recordings;
 
@@ -28,4 +29,33 @@ fn the_real_tricycle_is_calibrated() {
     for half in &checked.halves {
         assert!(half.checked_ate_rmse_m < 0.1 && half.checked_heading_rmse_deg < 2.0, "{half:?}");
     }
+}
+
+/// Four kinds of robots, fitted on a session or two and dead reckoned on all others: no worse than was measured once, and better than
+/// nominal where a path is like the fitted ones.
+#[test]
+fn real_robots_of_four_kinds_are_calibrated() {
+    let Some(folder) = recordings("real_robots_of_four_kinds_are_calibrated", "optiodom") else { return };
+    let outcome = optiodom::run(&folder).unwrap();
+    let cell = |kind: &str, path: &str, method: &str| {
+        let is_it = |cell: &&optiodom::Cell| cell.kind == kind && cell.path == path && cell.method == method;
+        outcome.cells.iter().find(is_it).unwrap()
+    };
+    for (kind, path, most) in [
+        ("tricycle", "free", 0.039),
+        ("differential", "free", 0.022),
+        ("omni3", "joystick", 0.050),
+        ("omni4", "square", 0.029),
+    ] {
+        let (nominal, joint) = (cell(kind, path, "nominal"), cell(kind, path, "joint"));
+        println!("{joint:?}");
+        assert!(joint.ate_m <= most && joint.ate_m < 0.5 * nominal.ate_m, "{kind}: {joint:?}");
+        assert!(joint.end_m < nominal.end_m && joint.end_heading_deg < nominal.end_heading_deg, "{kind}: {joint:?}");
+        assert!(joint.clock_offset_s.is_some() && nominal.clock_offset_s.is_none());
+    }
+    // The tricycle's computer is up to 1.5 s late and runs up to 2 % fast.
+    let [least, _] = cell("tricycle", "square", "joint").clock_offset_s.unwrap();
+    let [_, fastest] = cell("tricycle", "square", "joint").clock_rate.unwrap();
+    assert!(least < -1.4 && (0.014..0.022).contains(&fastest), "{least} {fastest}");
+    assert!(outcome.cells.iter().any(|cell| cell.method == "closed_form"));
 }

@@ -1,11 +1,13 @@
 //! `agv calibrate`.
 
 mod plan;
+mod wheels;
 
 use std::path::PathBuf;
 
 use agv_core::calibration::{MountingSide, Offsets};
 use agv_core::maps::{Landmark, LandmarkKind};
+use agv_core::odometry::Vehicle;
 use agv_host_sim::calibrate::drive::{Drive, Preparation};
 use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find};
 use agv_host_sim::calibrate::log_input::LogInput;
@@ -30,6 +32,7 @@ Examples:
 
 The vehicle drives arcs from standstill to standstill, forward and backward, to the left and to the right, with different
 steering angles, among at least four reflectors. Without stops, or with poses instead of reflectors, the drive is cut by time.
+A vehicle of several wheels is fitted to poses, with the clocks of both; what the drive does not tell is said to be open.
 Keys of --json:
   method, source, segments, grade, parameters, std, wheelbase_seen_m, wheelbase_seen_std_m,
   conditioning {equations, normal_equations}, noise {slip_m_per_root_m, steering_rad, laser},
@@ -165,6 +168,13 @@ struct Outlier {
 }
 
 impl Calibrate {
+    /// Whether nothing is asked for that the joint fit of several wheels does not have.
+    fn is_plain(&self) -> bool {
+        let is_switched = self.wheelbase || self.steering_ratio || self.mend;
+        let is_given = self.side.is_some() || self.map.is_some() || self.apply.is_some() || self.report.is_some();
+        self.method == MethodName::Joint && !is_switched && !is_given
+    }
+
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         if let Some(Subcommand::Plan(plan)) = self.command {
@@ -175,6 +185,14 @@ impl Calibrate {
         let reading = progress::bar("reading", size);
         let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
+        if matches!(input.parameters.vehicle, Vehicle::Wheels(_)) {
+            ensure!(
+                self.is_plain(),
+                "{}: of a vehicle with several wheels, --json alone is an option of the joint fit",
+                log.display()
+            );
+            return wheels::run(&input, self.json).with_context(|| log.display().to_string());
+        }
         let map: Option<Vec<Landmark>> = match &self.map {
             Some(path) => {
                 let mut map = map_file::read(path)?;

@@ -8,7 +8,9 @@ use agv_core::geometry::Pose;
 use agv_host_sim::import::raw::{self, RawBytes};
 #[cfg(feature = "bags")]
 use agv_host_sim::import::ros;
-use agv_host_sim::import::{self, ScanLog, candump, capture, carmen, carpark, graph_log, sapienza};
+use agv_host_sim::import::{
+    self, ScanLog, candump, capture, carmen, carpark, graph_log, optiodom, sapienza, wheel_recording,
+};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
 use anyhow::{Context, bail};
@@ -31,7 +33,17 @@ Examples:
   agv import capture nav350.pcapng --like hall.agvlog --output laser.agvlog
   agv import mcap drive.mcap --output drive.agvlog
   agv import rosbag2 rosbag2_2026_05_04 --scan-topic /front/scan --laser 1.2,0,0 --output drive.agvlog
-  agv import raw drive.agvlog --output again.agvlog";
+  agv import raw drive.agvlog --output again.agvlog
+  agv import optiodom shared/data/optiodom/diff/free/030120210001/030120210001_run-01.csv --output drive.agvlog
+  agv import csv drive.csv --columns vehicle.toml --output drive.agvlog
+
+A file of columns names the vehicle, and for each column its name and unit:
+  vehicle = { wheels = { differential = { track = 0.5, left = { radius = 0.1, turn = { scale = 1e-5, range = 65536 } }, ... } } }
+  sensor = { x = 0.3, y = 0.0, theta = 0.0 }             where that is whose poses the reference tells
+  [table]
+  time = { column = \"t\", unit = \"ms\" }
+  wheel = [{ turn = { column = \"left\", unit = \"ticks\", ticks = 2000 } }, { turn = { column = \"right\", unit = \"rpm\" } }]
+  reference = { x = { column = \"x\", unit = \"m\" }, y = { column = \"y\", unit = \"m\" }, heading = { column = \"h\", unit = \"deg\" } }";
 
 /// Turn the recordings of others into logs.
 #[derive(clap::Args)]
@@ -50,6 +62,9 @@ pub struct Import {
     /// Port of the sensor in a capture; 2111 and 2112 if absent.
     #[arg(long)]
     port: Option<u16>,
+    /// File that says what the columns of a table are; for csv.
+    #[arg(long, value_name = "TOML")]
+    columns: Option<PathBuf>,
     #[command(flatten)]
     encoders: EncoderArguments,
     /// Topic of the laser in a recording of ROS 2 that has several.
@@ -74,6 +89,10 @@ enum Format {
     Carpark,
     /// Tricycle dataset of the Sapienza University of Rome: raw encoder counters and tracked poses.
     Sapienza,
+    /// Table with named columns and units: counters, speeds or rates of wheels, steering angles, poses of a reference.
+    Csv,
+    /// A run of the OptiOdom robots; the session's nominal values lie beside it.
+    Optiodom,
     /// CARMEN log, plain or compressed (.gz): FLASER or ROBOTLASER1, and ODOM.
     Carmen,
     /// Log of candump -l: what two encoders said on a CAN bus.
@@ -107,6 +126,8 @@ impl Import {
             Format::Mcap | Format::Rosbag2 => self.ros_drive()?,
             Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
             Format::Sapienza => sapienza::read(&self.input)?,
+            Format::Csv => self.table()?,
+            Format::Optiodom => optiodom::read_run(&self.input)?,
             Format::Carmen => self.carmen_drive()?,
             Format::Graph => drive(&self.input, "pose-graph", &graph_log::read(&self.input)?.log)?,
             Format::Auto => unreachable!("the format has been found above"),
@@ -170,6 +191,11 @@ impl Import {
             note(&format!("agv: {}: {}", self.input.display(), log.defects));
         }
         drive(&self.input, "CARMEN", &log.front)
+    }
+
+    fn table(&self) -> anyhow::Result<Recording> {
+        let columns = self.columns.as_deref().context("--columns: a file that says what the columns are is needed")?;
+        Ok(wheel_recording::read(&self.input, columns)?)
     }
 
     fn raw_drive(&self) -> anyhow::Result<Recording> {

@@ -26,9 +26,7 @@ impl Summary {
         let count = |is: fn(&RecordedEvent) -> bool| recording.events.iter().filter(|event| is(event)).count();
         let steps = recording.truth.windows(2).map(|pair| (pair[1].pose.position() - pair[0].pose.position()).norm());
         Self {
-            odometry: count(|event| {
-                matches!(event, RecordedEvent::Encoders(_) | RecordedEvent::Speed(_) | RecordedEvent::Increment(_))
-            }),
+            odometry: count(RecordedEvent::is_odometry),
             scans: count(|event| matches!(event, RecordedEvent::Scan(_))),
             reflectors: count(|event| matches!(event, RecordedEvent::Reflectors(_))),
             landmarks: recording.landmarks.len(),

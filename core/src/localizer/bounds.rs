@@ -33,7 +33,7 @@ const SMALL: f64 = 1e-9;
 const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     match &parameters.vehicle {
         Vehicle::Tricycle(tricycle) => Some(tricycle),
-        Vehicle::Ackermann(_) | Vehicle::Increments => None,
+        Vehicle::Ackermann(_) | Vehicle::Increments | Vehicle::Wheels(_) => None,
     }
 }
 
@@ -318,6 +318,9 @@ impl Parameters {
         });
         if let Some((leaf, _)) = scales.into_iter().flatten().find(|(_, scale)| *scale == 0.0) {
             return Err(ParameterError { leaf });
+        }
+        if matches!(&self.vehicle, Vehicle::Wheels(vehicle) if !vehicle.is_sound()) {
+            return Err(ParameterError { leaf: "vehicle" });
         }
         if self.features.nearest >= self.features.farthest {
             return Err(ParameterError { leaf: "features.nearest" });

@@ -1,7 +1,7 @@
 //! What the localiser is told: the one table of events.
 
 use crate::measurement::{
-    EncoderFaults, EncoderSample, LaserId, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample, Time,
+    EncoderFaults, EncoderSample, LaserId, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample, Time, WheelSample,
 };
 
 /// Reflectors, whoever keeps them.
@@ -76,6 +76,8 @@ events! {
     3 SPEED Speed(SpeedSample), |sample| Some((sample.time, sample.time));
     /// Motion that the vehicle has integrated itself.
     4 INCREMENT Increment(PoseIncrement), |increment| Some((increment.time, increment.time));
+    /// Counters of several wheels.
+    17 WHEELS Wheels(WheelSample), |sample| Some((sample.time, sample.time));
     /// Reflectors that a laser has found.
     5 REFLECTORS Reflectors(R), |reflectors| {
         let seen = reflectors.as_reflectors().observations;
@@ -123,6 +125,12 @@ impl<R: AsReflectors, S: AsScan> AnyEvent<R, S> {
 }
 
 impl<R, S> AnyEvent<R, S> {
+    /// Whether the vehicle has told how it moves.
+    #[must_use]
+    pub const fn is_odometry(&self) -> bool {
+        matches!(self, Self::Encoders(_) | Self::Speed(_) | Self::Increment(_) | Self::Wheels(_))
+    }
+
     /// Whether somebody has told where the vehicle is.
     #[must_use]
     pub const fn is_told(&self) -> bool {
@@ -140,6 +148,7 @@ impl<R, S> AnyEvent<R, S> {
             Self::EncoderFaults(faults) => AnyEvent::EncoderFaults(*faults),
             Self::Speed(sample) => AnyEvent::Speed(*sample),
             Self::Increment(increment) => AnyEvent::Increment(*increment),
+            Self::Wheels(sample) => AnyEvent::Wheels(*sample),
             Self::Reflectors(seen) => AnyEvent::Reflectors(reflectors(seen)),
             Self::Scan(seen) => AnyEvent::Scan(scan(seen)),
             Self::SetPose(fix) => AnyEvent::SetPose(*fix),

@@ -235,6 +235,10 @@ impl<
                 let motion = self.odometer.increment(increment);
                 self.move_by(increment.time, motion);
             }
+            Event::Wheels(sample) => {
+                let motion = self.odometer.wheels(sample);
+                self.move_by(sample.time, motion);
+            }
             Event::Reflectors(seen) => self.reflectors_of(seen),
             Event::Scan(scan) => self.scan(scan),
             Event::SetPose(fix) => self.set_pose(fix),

@@ -99,6 +99,10 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 let motion = self.odometer.increment(increment);
                 self.travel(increment.time, motion);
             }
+            Event::Wheels(sample) => {
+                let motion = self.odometer.wheels(sample);
+                self.travel(sample.time, motion);
+            }
             Event::Reflectors(seen) => self.revolution(seen.laser, seen.observations, reflectors),
             Event::Scan(scan) => {
                 if let Some(detection) = self.parameters.reflectors.detection

@@ -7,6 +7,7 @@ mod pose_fix;
 mod reflectors;
 mod scan;
 mod time;
+mod wheels;
 
 pub use encoder::{EncoderSample, PoseIncrement, SpeedSample};
 pub use encoder_fault::{EncoderFault, EncoderFaults};
@@ -15,3 +16,4 @@ pub use pose_fix::PoseFix;
 pub use reflectors::{ReflectorObservation, Reflectors};
 pub use scan::Scan;
 pub use time::Time;
+pub use wheels::{MOST_WHEELS, WheelReading, WheelSample};

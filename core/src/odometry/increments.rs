@@ -30,6 +30,7 @@ impl Kinematics for Increments {
             covariance: believed.noise.of_displacement(distance, duration),
             distance: if is_turn { distance } else { f64::NAN },
             is_backward: displacement.x < 0.0,
+            slip: 0.0,
         }
     }
 

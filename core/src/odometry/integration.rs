@@ -49,6 +49,7 @@ impl Control {
             covariance: believed.noise.of_control(self, wheelbase, duration),
             distance: libm::fabs(self.distance),
             is_backward: self.distance < 0.0,
+            slip: 0.0,
         }
     }
 

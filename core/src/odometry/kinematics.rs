@@ -53,4 +53,15 @@ pub struct Step {
     pub distance: f64,
     /// Whether it went backward.
     pub is_backward: bool,
+    /// What redundant measurements say differently: root of the sum of squares over all wheels, m. Zero without redundancy.
+    pub slip: f64,
+}
+
+impl Step {
+    /// A vehicle that stands.
+    #[must_use]
+    pub fn standing(is_backward: bool) -> Self {
+        let (displacement, covariance) = (Pose::default(), Matrix3::zeros());
+        Self { displacement, covariance, distance: 0.0, is_backward, slip: 0.0 }
+    }
 }

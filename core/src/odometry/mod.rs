@@ -1,29 +1,48 @@
 //! The vehicle's own account of its motion.
 
 mod ackermann;
+mod ackermann_wheels;
+mod bi_steerable;
 mod bias;
 mod coasting;
 mod counter;
+mod differential;
 mod increments;
 mod integration;
 mod kinematics;
+mod mecanum;
 mod motion;
 mod noise;
 mod odometer;
+mod omnidirectional;
 mod recent_motion;
 mod tricycle;
 mod vehicle;
+mod wheel;
+mod wheel_equations;
+mod wheel_path;
+mod wheel_vehicle;
+mod wheels;
 
 pub use ackermann::Ackermann;
+pub use ackermann_wheels::AckermannWheels;
+pub use bi_steerable::{BiSteerable, SteeredWheel};
 pub use bias::{BiasJacobian, OdometryBias};
 pub use coasting::Coasting;
 pub use counter::{CounterRange, CounterRangeError};
+pub use differential::Differential;
 pub use increments::Increments;
 pub use integration::{Control, Integration};
 pub use kinematics::{Believed, Kinematics, Step};
+pub use mecanum::Mecanum;
 pub use motion::Motion;
 pub use noise::OdometryNoise;
 pub use odometer::{Odometer, OdometerParameters, OdometryError, VehicleOdometer};
+pub use omnidirectional::Omnidirectional;
 pub use recent_motion::RecentMotion;
 pub use tricycle::Tricycle;
 pub use vehicle::Vehicle;
+pub use wheel::{AngleEncoder, Contact, Wheel, WheelMotion, WheelParameter};
+pub use wheel_path::WheelPath;
+pub use wheel_vehicle::WheelVehicle;
+pub use wheels::{DrivenWheel, WheelBased, Wheels, wheel_motion_between};

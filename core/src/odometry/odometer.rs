@@ -2,7 +2,7 @@
 
 use super::kinematics::Believed;
 use super::{Increments, Integration, Kinematics, Motion, OdometryNoise, Vehicle};
-use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample};
+use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, WheelSample};
 
 /// Why a report gave no motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +60,14 @@ impl<K: Kinematics> Odometer<K> {
     /// # Errors
     /// See [`OdometryError`]; a refused step is not made up for later, except that the reports go on from it.
     pub fn report(&mut self, report: &K::Report) -> Result<Motion, OdometryError> {
+        self.report_with_slip(report).map(|(motion, _)| motion)
+    }
+
+    /// The motion since the last report, and what redundant wheels say differently of it, m ([`super::Step::slip`]).
+    ///
+    /// # Errors
+    /// As [`Self::report`].
+    pub fn report_with_slip(&mut self, report: &K::Report) -> Result<(Motion, f64), OdometryError> {
         if !self.kinematics.is_sound(report) {
             return Err(OdometryError::Implausible);
         }
@@ -86,7 +94,7 @@ impl<K: Kinematics> Odometer<K> {
             return Err(OdometryError::Implausible);
         }
         let (displacement, covariance, distance) = (step.displacement, step.covariance, step.distance);
-        Ok(Motion { start, end, displacement, covariance, distance })
+        Ok((Motion { start, end, displacement, covariance, distance }, step.slip))
     }
 }
 
@@ -99,6 +107,8 @@ pub enum VehicleOdometer {
     Ackermann(Odometer<super::Ackermann>),
     /// See [`Increments`].
     Increments(Odometer<Increments>),
+    /// See [`super::WheelVehicle`].
+    Wheels(Odometer<super::WheelVehicle>),
 }
 
 impl VehicleOdometer {
@@ -109,6 +119,7 @@ impl VehicleOdometer {
             Vehicle::Tricycle(tricycle) => Self::Tricycle(Odometer::new(*tricycle, parameters)),
             Vehicle::Ackermann(car) => Self::Ackermann(Odometer::new(*car, parameters)),
             Vehicle::Increments => Self::Increments(Odometer::new(Increments, parameters)),
+            Vehicle::Wheels(vehicle) => Self::Wheels(Odometer::new(*vehicle, parameters)),
         }
     }
 
@@ -118,6 +129,7 @@ impl VehicleOdometer {
             Self::Tricycle(odometer) => odometer.restart(),
             Self::Ackermann(odometer) => odometer.restart(),
             Self::Increments(odometer) => odometer.restart(),
+            Self::Wheels(odometer) => odometer.restart(),
         }
     }
 
@@ -139,6 +151,17 @@ impl VehicleOdometer {
     pub fn speed(&mut self, sample: &SpeedSample) -> Result<Motion, OdometryError> {
         match self {
             Self::Ackermann(odometer) => odometer.report(sample),
+            _ => Err(OdometryError::WrongVehicle),
+        }
+    }
+
+    /// The motion since the last sample of several wheels.
+    ///
+    /// # Errors
+    /// See [`Odometer::report`].
+    pub fn wheels(&mut self, sample: &WheelSample) -> Result<Motion, OdometryError> {
+        match self {
+            Self::Wheels(odometer) => odometer.report(sample),
             _ => Err(OdometryError::WrongVehicle),
         }
     }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kinematics::{Believed, Kinematics, Step};
-use super::{Control, CounterRange};
+use super::{AngleEncoder, Contact, Control, CounterRange, Wheel};
 use crate::measurement::{EncoderSample, Time};
 
 /// A tricycle whose front wheel steers and drives (K 2.1.1), with one steering offset for each direction of travel
@@ -58,5 +58,19 @@ impl Kinematics for Tricycle {
     /// At its fastest the vehicle may go half of the counter's range; beyond, it may seem to go the other way.
     fn longest_interval(&self, fastest: f64) -> f64 {
         0.5 * self.drive_range.values() as f64 * libm::fabs(self.drive_scale) / fastest
+    }
+}
+
+impl Tricycle {
+    /// The same vehicle as wheels of the general model, while it drives forward: the driving wheel, and one that carries on the
+    /// rear axle. The wheel has the radius 1 m and turns by [`Self::drive_scale`] for a tick.
+    #[must_use]
+    pub const fn wheels(&self) -> [Wheel; 2] {
+        let turn = AngleEncoder { scale: self.drive_scale, range: self.drive_range };
+        let steering = AngleEncoder { scale: self.steering_scale, range: self.steering_range };
+        let rear =
+            Wheel { x: 0.0, y: 0.0, heading: 0.0, radius: 1.0, contact: Contact::Tyre, turn: None, steering: None };
+        let heading = self.steering_offset_forward;
+        [Wheel { x: self.wheelbase, heading, turn: Some(turn), steering: Some(steering), ..rear }, rear]
     }
 }

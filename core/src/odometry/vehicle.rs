@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Ackermann, Increments, Kinematics, Tricycle};
+use super::{Ackermann, Increments, Kinematics, Tricycle, WheelVehicle};
 
 /// How the vehicle moves and what it reports of that.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,6 +14,8 @@ pub enum Vehicle {
     Ackermann(Ackermann),
     /// Displacements that the vehicle has integrated itself.
     Increments,
+    /// Encoder counters of several wheels.
+    Wheels(WheelVehicle),
 }
 
 impl Vehicle {
@@ -24,6 +26,7 @@ impl Vehicle {
             Self::Tricycle(tricycle) => tricycle.steering_lever(),
             Self::Ackermann(car) => car.steering_lever(),
             Self::Increments => Increments.steering_lever(),
+            Self::Wheels(vehicle) => vehicle.steering_lever(),
         }
     }
 }

@@ -201,6 +201,7 @@ impl Record<'_> {
             Self::Event(Event::EncoderFaults(faults)) => put(faults, room),
             Self::Event(Event::Speed(sample)) => put(sample, room),
             Self::Event(Event::Increment(increment)) => put(increment, room),
+            Self::Event(Event::Wheels(sample)) => put(sample, room),
             Self::Event(Event::Reflectors(reflectors)) => put(reflectors, room),
             Self::Event(Event::Scan(scan)) => put_scan(scan, room),
             Self::Event(Event::SetPose(fix)) => put(fix, room),
@@ -238,6 +239,7 @@ impl Record<'_> {
             kind::ENCODER_FAULTS => Record::Event(Event::EncoderFaults(take(payload)?)),
             kind::SPEED => Record::Event(Event::Speed(take(payload)?)),
             kind::INCREMENT => Record::Event(Event::Increment(take(payload)?)),
+            kind::WHEELS => Record::Event(Event::Wheels(take(payload)?)),
             kind::REFLECTORS => {
                 let (laser, rest) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
                 take_each(rest, &mut scratch.observations)?;

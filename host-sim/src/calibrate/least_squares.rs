@@ -1,6 +1,6 @@
 //! The solver's view of a fit.
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra_least_squares::storage::Owned;
 use nalgebra_least_squares::{DMatrix, DVector, Dyn};
 
@@ -44,8 +44,25 @@ impl<F: Fn(&[f64]) -> Linearised> LeastSquaresProblem<f64, Dyn, Dyn> for Fit<F> 
 
 /// Parameters with the least squared residuals, from `start`. None if the solver fails.
 pub fn minimise(start: &[f64], evaluate: impl Fn(&[f64]) -> Linearised) -> Option<Vec<f64>> {
+    solve(start, evaluate, TerminationReason::was_successful)
+}
+
+/// The same for residuals with kinks, of which the least one has no slope that a solver could find to be zero: where no step makes
+/// them less is the solution.
+pub fn minimise_kinked(start: &[f64], evaluate: impl Fn(&[f64]) -> Linearised) -> Option<Vec<f64>> {
+    let is_found = |reason: &TerminationReason| {
+        reason.was_successful() || matches!(reason, TerminationReason::NoImprovementPossible(_))
+    };
+    solve(start, evaluate, is_found)
+}
+
+fn solve(
+    start: &[f64],
+    evaluate: impl Fn(&[f64]) -> Linearised,
+    is_found: impl Fn(&TerminationReason) -> bool,
+) -> Option<Vec<f64>> {
     let linearised = evaluate(start);
     let fit = Fit { parameters: DVector::from_column_slice(start), linearised, evaluate };
     let (fit, report) = LevenbergMarquardt::new().minimize(fit);
-    report.termination.was_successful().then(|| fit.parameters.as_slice().to_vec())
+    is_found(&report.termination).then(|| fit.parameters.as_slice().to_vec())
 }

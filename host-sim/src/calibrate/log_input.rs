@@ -5,7 +5,7 @@ use std::path::Path;
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Parameters};
 use agv_core::maps::{Landmark, LandmarkKind};
-use agv_core::measurement::{EncoderSample, ReflectorObservation};
+use agv_core::measurement::{EncoderSample, ReflectorObservation, WheelSample};
 use agv_core::record::{Damage, Item, Record};
 
 use super::windows::LaserPose;
@@ -19,6 +19,8 @@ pub struct LogInput {
     pub parameters: Parameters,
     /// Samples of the encoders, in the order of arrival.
     pub encoders: Vec<EncoderSample>,
+    /// Samples of several wheels, in the order of arrival.
+    pub wheels: Vec<WheelSample>,
     /// Reflectors revolution by revolution, without those that are not finite.
     pub revolutions: Vec<Vec<ReflectorObservation>>,
     /// Observations of reflectors that were no numbers.
@@ -38,6 +40,7 @@ impl LogInput {
         Self {
             parameters,
             encoders: Vec::new(),
+            wheels: Vec::new(),
             revolutions: Vec::new(),
             bad_observations: 0,
             laser_poses: Vec::new(),
@@ -102,6 +105,7 @@ impl LogInput {
     pub fn add(&mut self, event: &Event) {
         match event {
             Event::Encoders(sample) => self.encoders.push(*sample),
+            Event::Wheels(sample) => self.wheels.push(*sample),
             Event::Reflectors(reflectors) => {
                 let is_good = |seen: &&ReflectorObservation| {
                     seen.range.is_finite() && seen.bearing.is_finite() && (0.0..1e4).contains(&seen.range)
@@ -118,6 +122,12 @@ impl LogInput {
             }
             _ => {}
         }
+    }
+
+    /// Poses of the laser: those that another instrument has measured; if there are none, those that were given from outside.
+    #[must_use]
+    pub fn poses(&self) -> &[LaserPose] {
+        if self.laser_poses.is_empty() { &self.given_poses } else { &self.laser_poses }
     }
 
     fn add_laser_pose(&mut self, time: agv_core::measurement::Time, pose: Pose) {

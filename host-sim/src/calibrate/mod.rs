@@ -22,6 +22,7 @@ pub mod stops;
 pub mod surveyed_map;
 pub mod tracking;
 pub mod vehicle_file;
+pub mod wheeled;
 mod whitening;
 pub mod window;
 pub mod windows;

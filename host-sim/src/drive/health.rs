@@ -17,9 +17,7 @@ pub fn health_rows(recording: &Recording) -> Vec<[String; 2]> {
     let times = |wanted: fn(&RecordedEvent) -> bool| {
         recording.events.iter().filter(move |event| wanted(event)).filter_map(RecordedEvent::time)
     };
-    let is_odometry = |event: &RecordedEvent| {
-        matches!(event, RecordedEvent::Encoders(_) | RecordedEvent::Speed(_) | RecordedEvent::Increment(_))
-    };
+    let is_odometry = |event: &RecordedEvent| event.is_odometry();
     let silence = |longest: Option<f64>| longest.map_or("-".to_owned(), |longest| format!("{longest:.3} s"));
     let mut changes: Vec<EncoderFaults> = Vec::new();
     for event in &recording.events {

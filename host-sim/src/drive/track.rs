@@ -122,6 +122,7 @@ fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
             RecordedEvent::Encoders(sample) => odometer.encoders(sample),
             RecordedEvent::Speed(sample) => odometer.speed(sample),
             RecordedEvent::Increment(increment) => odometer.increment(increment),
+            RecordedEvent::Wheels(sample) => odometer.wheels(sample),
             RecordedEvent::EncoderFaults(_) => {
                 odometer.restart();
                 return 0.0;

@@ -304,6 +304,7 @@ impl Exporter {
             RecordedEvent::Encoders(sample) => self.odometer.encoders(sample).ok(),
             RecordedEvent::Speed(sample) => self.odometer.speed(sample).ok(),
             RecordedEvent::Increment(increment) => self.odometer.increment(increment).ok(),
+            RecordedEvent::Wheels(sample) => self.odometer.wheels(sample).ok(),
             RecordedEvent::EncoderFaults(faults) => {
                 self.odometer.restart();
                 self.faults = *faults;

@@ -8,6 +8,7 @@ pub mod graph_log;
 mod line_times;
 #[cfg(feature = "bags")]
 mod mounting;
+pub mod optiodom;
 pub mod packets;
 mod posed_scan;
 pub mod poses;
@@ -20,6 +21,9 @@ mod scan_drive;
 mod scan_record;
 mod table;
 pub mod tcp_stream;
+mod units;
+pub mod wheel_recording;
+pub mod wheel_table;
 
 pub use posed_scan::{BEAMS, KEYPOINTS, PosedScan, RANGES, ScanLog};
 pub use scan_drive::drive;

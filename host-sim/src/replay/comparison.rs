@@ -55,10 +55,7 @@ impl Comparisons {
     #[must_use]
     pub fn remarks(&self) -> Vec<[String; 2]> {
         let named = [("outputs", self.outputs), ("published", self.published)];
-        named
-            .into_iter()
-            .filter_map(|(what, comparison)| Some([what.to_owned(), comparison?.verdict()]))
-            .collect()
+        named.into_iter().filter_map(|(what, comparison)| Some([what.to_owned(), comparison?.verdict()])).collect()
     }
 }
 

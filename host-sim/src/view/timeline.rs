@@ -245,6 +245,7 @@ impl Timeline {
             Event::Encoders(sample) => self.take_odometry(sample.time),
             Event::Speed(sample) => self.take_odometry(sample.time),
             Event::Increment(increment) => self.take_odometry(increment.time),
+            Event::Wheels(sample) => self.take_odometry(sample.time),
             Event::EncoderFaults(faults) => {
                 self.see(faults.time);
                 let is_new =

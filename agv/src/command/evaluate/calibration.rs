@@ -2,7 +2,7 @@
 
 use agv_host_sim::data;
 use agv_lab::evaluate::calibration::simulated::{self, ADOPTED_ROW, Experiment, Figures};
-use agv_lab::evaluate::calibration::{course::Disturbance, sapienza, thesis};
+use agv_lab::evaluate::calibration::{course::Disturbance, optiodom, sapienza, thesis};
 use anyhow::{Context, ensure};
 
 use super::super::progress;
@@ -33,6 +33,8 @@ enum Set {
     Sapienza,
     /// The drives of K tables 5.1 and 5.2.
     Simulated,
+    /// Robots of four kinds with motion capture (OptiOdom): fitted on one or two sessions, checked on all others.
+    Optiodom,
 }
 
 impl Calibration {
@@ -41,6 +43,7 @@ impl Calibration {
         match self.set {
             Set::Sapienza => self.sapienza(),
             Set::Simulated => self.simulated(),
+            Set::Optiodom => self.optiodom(),
         }
     }
 
@@ -62,6 +65,41 @@ impl Calibration {
                 print_fit("", half.fitted_on, &half.fit);
                 println!(" {:>9.3} {:>10.3}", half.fitted_ate_rmse_m, half.checked_ate_rmse_m);
             }
+        }
+        Ok(())
+    }
+
+    fn optiodom(&self) -> anyhow::Result<()> {
+        let folder = data::folder().context("the recordings are not there: set AGV_DATA to their folder")?;
+        let outcome = optiodom::run(&folder.join("optiodom"))?;
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&outcome.cells)?);
+            return Ok(());
+        }
+        for fit in &outcome.fits {
+            println!("{}, fitted on {}", fit.kind, fit.fitted_on.join(", "));
+            for fitted in &fit.fit.fitted {
+                let open = if fitted.is_open { "  open" } else { "" };
+                println!("  {:<32} {:>+10.5} +- {:.5}{open}", fitted.name, fitted.change, fitted.deviation);
+            }
+        }
+        println!(
+            "{:<13} {:<9} {:>6} {:<11} {:>7} {:>7} {:>7} {:>11} {:>8}",
+            "kind", "path", "drives", "method", "end m", "ATE m", "deg", "as recorded", "worst m"
+        );
+        for cell in &outcome.cells {
+            println!(
+                "{:<13} {:<9} {:>6} {:<11} {:>7.4} {:>7.4} {:>7.2} {:>11.4} {:>8.4}",
+                cell.kind,
+                cell.path,
+                cell.drives,
+                cell.method,
+                cell.end_m,
+                cell.ate_m,
+                cell.end_heading_deg,
+                cell.ate_as_recorded_m,
+                cell.worst_ate_m
+            );
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ use agv_core::localizer::{self, Event, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
     EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
+    WheelSample,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
 use agv_firmware::app::room;
@@ -56,6 +57,7 @@ fn event() -> Event<'static> {
             ranges: part(&RANGES),
             intensities: part(&INTENSITIES),
         }),
+        6 => Event::Wheels(any(WheelSample { time, wheels: Default::default() })),
         _ => Event::SetPose(PoseFix { time, pose, position_deviation: any(0.0), heading_deviation: any(0.0) }),
     }
 }
