@@ -40,7 +40,7 @@ impl Kinematics for Differential {
         let (along, turn) = (0.5 * (left + right), (right - left) / self.track);
         Step {
             displacement: Pose::exp(&Twist { x: along, y: 0.0, theta: turn }),
-            covariance: believed.noise.of_displacement(along.abs(), duration),
+            covariance: believed.noise.of_displacement(along.abs(), turn, duration),
             distance: along.abs(),
             is_backward: along < 0.0,
         }
