@@ -17,7 +17,7 @@ const BEAMS: usize = 1440;
 const POINTS: usize = 1440;
 
 /// Size of a cell, m.
-pub const CELL: f64 = 0.1;
+pub const CELL: f64 = 0.2;
 
 /// Cosine of the angle up to which normals are of one surface.
 const ALIKE: f64 = 0.848;
