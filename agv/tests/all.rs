@@ -5,6 +5,7 @@ mod calibrate;
 mod campaign;
 mod can;
 mod command;
+mod contours;
 mod exchange;
 mod import;
 mod import_scans;

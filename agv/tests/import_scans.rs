@@ -101,6 +101,9 @@ fn carmen_log_says_which_line_is_wrong() {
     assert!(matches!(carmen::read(&path).unwrap_err(), TextFileError::Io { .. }));
 }
 
+/// The time of each line.
+type Times<'a> = &'a dyn Fn(usize) -> String;
+
 /// A straight drive of 1 m a line of odometry, a scan behind each second one, and corrected poses 0.1 m off that are
 /// repeated: the times are what is asked for.
 fn straight_drive(odometry: impl Fn(usize) -> String, scan: impl Fn(usize) -> String, repeat: &str) -> String {
@@ -129,14 +132,14 @@ fn times_that_contradict_the_lines_of_a_carmen_log_are_made_from_their_order() {
     let rounded = |line: usize| format!("{:.0}", 100.0 + 0.25 * line as f64);
     let zero = |line: usize| if line > 4 { "0".to_owned() } else { right(line) };
     let late = |line: usize| format!("{}", 103.0 + 0.5 * line as f64);
-    let read = |odometry: &dyn Fn(usize) -> String, scan: &dyn Fn(usize) -> String| {
+    let read = |odometry: Times, scan: Times| {
         let (_folder, path) = file("carmen.log", straight_drive(odometry, scan, "0").as_bytes());
         carmen::read(&path).unwrap()
     };
     let good = read(&right, &right);
     assert!(good.defects.is_none() && good.front.scans[1].scan.start == Time::from_seconds(2.0));
 
-    let wrong: [(&dyn Fn(usize) -> String, &dyn Fn(usize) -> String); 5] =
+    let wrong: [(Times, Times); 5] =
         [(&backward, &right), (&rounded, &rounded), (&right, &zero), (&right, &backward), (&right, &late)];
     for (number, (odometry, scan)) in wrong.into_iter().enumerate() {
         let log = read(odometry, scan);

@@ -39,7 +39,7 @@ impl Kinematics for Differential {
         let [left, right] = [to.left - from.left, to.right - from.right].map(|ticks| self.scale * ticks as f64);
         let (along, turn) = (0.5 * (left + right), (right - left) / self.track);
         let displacement = Pose::exp(&Twist { x: along, y: 0.0, theta: turn });
-        let covariance = believed.noise.of_displacement(along.abs(), duration);
+        let covariance = believed.noise.of_displacement(along.abs(), turn, duration);
         Step { displacement, covariance, distance: along.abs(), is_backward: along < 0.0, slip: 0.0 }
     }
 

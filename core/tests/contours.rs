@@ -1,4 +1,5 @@
 //! Localising by contours, in simulated surroundings whose truth is kept apart.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use std::f64::consts::{PI, TAU};
 

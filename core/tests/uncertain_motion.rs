@@ -27,6 +27,7 @@ const NOISE: OdometryNoise = OdometryNoise {
     slip: 0.006,
     side_slip: 0.003,
     yaw: 0.004,
+    turn: 0.05,
     unknown_acceleration: 1.5,
     unknown_turn: 0.7,
 };
@@ -64,14 +65,21 @@ fn noise_of_controls_enters_by_their_derivatives_and_the_rest_by_the_way() {
         // 0.05 m/s for 0.2 s, and 6 mm for a square root of a metre of 0.3 m.
         let of_way = (0.05_f64 * 0.2).powi(2) + 0.006_f64.powi(2) * 0.3;
         let controls = Matrix2::new(of_way, 0.0, 0.0, 0.002_f64.powi(2));
-        let floor = Matrix3::from_diagonal(&[0.0, 0.003_f64.powi(2) * 0.3, 0.004_f64.powi(2) * 0.3].into());
+        let turn = 0.3 / 1.4 * 0.45_f64.sin();
+        let of_heading = 0.004_f64.powi(2) * 0.3 + 0.05_f64.powi(2) * turn;
+        let floor = Matrix3::from_diagonal(&[0.0, 0.003_f64.powi(2) * 0.3, of_heading].into());
         let expected = jacobian * controls * jacobian.transpose() + floor;
         let stated = NOISE.of_control(&control, 1.4, 0.2);
         assert!((stated - expected).norm() < 1e-6 * expected.norm(), "{stated} {expected}");
     }
     let of_way = (0.05_f64 * 0.2).powi(2) + 0.006_f64.powi(2) * 0.3;
     let expected = Matrix3::from_diagonal(&[of_way, 0.003_f64.powi(2) * 0.3, 0.004_f64.powi(2) * 0.3].into());
-    assert!((NOISE.of_displacement(0.3, 0.2) - expected).norm() < 1e-15);
+    assert!((NOISE.of_displacement(0.3, 0.0, 0.2) - expected).norm() < 1e-15);
+    // A turn on the spot moves nothing, and its heading is uncertain all the same.
+    for turn in [0.8, -0.8] {
+        let expected = Matrix3::from_diagonal(&[(0.05_f64 * 0.2).powi(2), 0.0, 0.05_f64.powi(2) * 0.8].into());
+        assert!((NOISE.of_displacement(0.0, turn, 0.2) - expected).norm() < 1e-15);
+    }
 }
 
 /// A motion of 40 ms on an arc, and the pose that its velocity leads to after `seconds`.
@@ -238,7 +246,7 @@ fn an_increment_is_taken_as_it_is_if_the_vehicle_can_be_so_fast() {
         assert_eq!(motion.displacement, Pose::new(0.12, -0.16, 3.1));
         assert_eq!((motion.start, motion.end), (time(0), time(100_000)));
         assert!((motion.distance - 0.2).abs() < 1e-15);
-        assert!((motion.covariance - NOISE.of_displacement(0.2, 0.1)).norm() < 1e-15);
+        assert!((motion.covariance - NOISE.of_displacement(0.2, 3.1, 0.1)).norm() < 1e-15);
         true
     }));
     assert_eq!(vehicle.increment(&increment(100_000, 0.0, 0.0, 0.0)), Err(OdometryError::OutOfOrder));

@@ -146,7 +146,7 @@ macro_rules! address {
 }
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 70] = [
+pub static LEAVES: [Leaf; 71] = [
     tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
     tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
     tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
@@ -164,6 +164,7 @@ pub static LEAVES: [Leaf; 70] = [
     number!(144, "odometry.yaw", "rad/sqrt(m)", parameters.odometry_noise.yaw),
     number!(145, "odometry.unknown_acceleration", "m/s^2", parameters.odometry_noise.unknown_acceleration),
     number!(146, "odometry.unknown_turn", "rad/s^2", parameters.odometry_noise.unknown_turn),
+    number!(147, "odometry.turn", "rad/sqrt(rad)", parameters.odometry_noise.turn),
     switch!(150, "sources.reflectors", parameters.sources.reflectors),
     switch!(151, "sources.corners", parameters.sources.corners),
     switch!(152, "sources.end_points", parameters.sources.end_points),

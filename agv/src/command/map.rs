@@ -46,7 +46,7 @@ pub struct Map {
     /// Find the poses too, from odometry, scans and the loops that are recognised; nothing is known of the hall.
     #[arg(long, conflicts_with = "poses")]
     slam: bool,
-    /// Size of the cells of a map of contours, m; 0.1 if absent.
+    /// Size of the cells of a map of contours, m; 0.2 if absent.
     #[arg(long)]
     cell: Option<f64>,
     /// Print the summary as JSON.

@@ -245,7 +245,10 @@ fn set_start(recording: &mut Recording, start: Start) -> anyhow::Result<()> {
         }
     };
     let fix = PoseFix { time, pose, position_deviation, heading_deviation };
-    recording.events.insert(0, RecordedEvent::SetPose(fix));
+    // Behind what happened before: a pose from the future is not believed.
+    let is_later = |event: &RecordedEvent| event.time().is_some_and(|other| other >= time);
+    let place = recording.events.iter().position(is_later).unwrap_or(recording.events.len());
+    recording.events.insert(place, RecordedEvent::SetPose(fix));
     Ok(())
 }
 

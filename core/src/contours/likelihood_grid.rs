@@ -15,23 +15,7 @@ pub const HALF: f32 = 0.5 * SIDE as f32 * CELL;
 const BYTES: usize = SIDE * SIDE / 4;
 
 /// Cells around that of a point, and their least value: three times the density of a Gaussian of 12 cm at the distance of their centres, rounded.
-const STAMP: [(isize, isize, u8); 21] = {
-    let mut stamp = [(0, 0, 3); 21];
-    let (mut count, mut y) = (1, -2);
-    while y <= 2 {
-        let mut x = -2;
-        while x <= 2 {
-            let square: isize = x * x + y * y;
-            if square > 0 && square < 8 {
-                stamp[count] = (x, y, if square <= 1 { 2 } else { 1 });
-                count += 1;
-            }
-            x += 1;
-        }
-        y += 1;
-    }
-    stamp
-};
+const STAMP: [[u8; 5]; 5] = [[0, 1, 1, 1, 0], [1, 1, 2, 1, 1], [1, 2, 3, 2, 1], [1, 1, 2, 1, 1], [0, 1, 1, 1, 0]];
 
 /// A grid around the origin of its frame.
 #[derive(Clone, Debug)]
@@ -74,8 +58,10 @@ impl LikelihoodGrid {
         if self.value(column, row) == 3 {
             return;
         }
-        for (x, y, value) in STAMP {
-            self.raise(column as isize + x, row as isize + y, value);
+        for (y, values) in (-2..).zip(STAMP) {
+            for (x, value) in (-2..).zip(values) {
+                self.raise(column as isize + x, row as isize + y, value);
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 use heapless::Vec;
 use nalgebra::Matrix3;
 
-use super::{KeyRing, Prediction, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
+use super::{KeyRing, Prediction, Refinement, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
 use crate::geometry::{Pose, ScanPoint};
 use crate::sensing::PointScan;
 
@@ -110,10 +110,9 @@ pub fn align<const ROOM: usize>(
     let usual = look(&predicted.window());
     let is_poor = usual.is_none_or(|found| share(found.inliers) < POOR_SHARE);
     let wide = if is_poor { look(&SearchWindow::WIDE) } else { None };
-    let found = match (usual, wide) {
-        (Some(usual), Some(wide)) if share(wide.inliers) > SURE_SHARE && wide.inliers > 2 * usual.inliers => wide,
-        (usual, wide) => usual.or(wide)?,
-    };
+    let nearby = usual.map_or(0, |found| found.inliers);
+    let is_sure = |far: &Refinement| share(far.inliers) > SURE_SHARE && far.inliers > 2 * nearby;
+    let found = wide.filter(is_sure).or(usual)?;
     let free_axis = weak_axis(found.directions);
     let mut pose = found.pose;
     let mut information = found.information;

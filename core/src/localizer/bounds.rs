@@ -37,7 +37,7 @@ const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     }
 }
 
-const BOUNDS: [Bound; 45] = [
+const BOUNDS: [Bound; 46] = [
     Bound {
         leaf: "vehicle.wheelbase",
         least: 0.05,
@@ -91,6 +91,7 @@ const BOUNDS: [Bound; 45] = [
         get: |parameters| Some(parameters.odometry_noise.side_slip),
     },
     Bound { leaf: "odometry.yaw", least: 0.0, most: 1.0, get: |parameters| Some(parameters.odometry_noise.yaw) },
+    Bound { leaf: "odometry.turn", least: 0.0, most: 1.0, get: |parameters| Some(parameters.odometry_noise.turn) },
     Bound {
         leaf: "odometry.unknown_acceleration",
         least: SMALL,

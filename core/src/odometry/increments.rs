@@ -27,7 +27,7 @@ impl Kinematics for Increments {
         let is_turn = libm::fabs(displacement.theta) <= PI;
         Step {
             displacement,
-            covariance: believed.noise.of_displacement(distance, duration),
+            covariance: believed.noise.of_displacement(distance, displacement.theta, duration),
             distance: if is_turn { distance } else { f64::NAN },
             is_backward: displacement.x < 0.0,
             slip: 0.0,

@@ -20,6 +20,8 @@ pub struct OdometryNoise {
     pub side_slip: f64,
     /// Random walk of the heading, rad for a square root of a metre.
     pub yaw: f64,
+    /// Random walk of the heading for a turn, on the spot too, rad for a square root of a radian.
+    pub turn: f64,
     /// Standard deviation of the acceleration of a vehicle whose odometry is not believed, m/s^2.
     pub unknown_acceleration: f64,
     /// Standard deviation of the angular acceleration of such a vehicle, rad/s^2.
@@ -35,6 +37,7 @@ impl Default for OdometryNoise {
             slip: 6e-3,
             side_slip: 1e-3,
             yaw: 1.5e-3,
+            turn: 0.0,
             unknown_acceleration: 1.0,
             unknown_turn: 0.5,
         }
@@ -53,23 +56,25 @@ impl OdometryNoise {
             self.steering * self.steering,
         );
         let jacobian = control.jacobian(wheelbase);
-        jacobian * controls * jacobian.transpose() + self.floor(libm::fabs(control.distance))
+        let angle = 0.5 * (control.steering_start + control.steering_end);
+        let turn = if self.turn > 0.0 { control.distance / wheelbase * libm::sin(angle) } else { 0.0 };
+        jacobian * controls * jacobian.transpose() + self.floor(libm::fabs(control.distance), turn)
     }
 
-    /// Covariance of a displacement of that length, m, that the vehicle has integrated itself.
+    /// Covariance of a displacement of that length, m, and turn, rad, that the vehicle has integrated itself.
     #[must_use]
-    pub fn of_displacement(&self, distance: f64, duration: f64) -> Matrix3<f64> {
+    pub fn of_displacement(&self, distance: f64, turn: f64, duration: f64) -> Matrix3<f64> {
         let speed = self.speed * duration;
-        let mut covariance = self.floor(distance);
+        let mut covariance = self.floor(distance, turn);
         covariance.m11 += speed * speed + self.slip * self.slip * distance;
         covariance
     }
 
-    fn floor(&self, distance: f64) -> Matrix3<f64> {
+    fn floor(&self, distance: f64, turn: f64) -> Matrix3<f64> {
         Matrix3::from_diagonal(&nalgebra::Vector3::new(
             0.0,
             self.side_slip * self.side_slip * distance,
-            self.yaw * self.yaw * distance,
+            self.yaw * self.yaw * distance + self.turn * self.turn * libm::fabs(turn),
         ))
     }
 }

@@ -17,10 +17,13 @@ const BEAMS: usize = 1440;
 const POINTS: usize = 1440;
 
 /// Size of a cell, m.
-pub const CELL: f64 = 0.1;
+pub const CELL: f64 = 0.2;
 
 /// Cosine of the angle up to which normals are of one surface.
 const ALIKE: f64 = 0.848;
+
+/// What was seen less often than this share of what was seen most often in the same cell is noise, or has passed by.
+const LEAST_SHARE: f64 = 0.2;
 
 /// A point of a map in W, m, and the unit normal of its surface; a corner has none.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,7 +157,11 @@ impl ContourMapper {
     /// The map of all that was added.
     #[must_use]
     pub fn finish(&self) -> ContourMap {
-        let points = self.cells.values().flatten().map(|cluster| MapPoint {
+        let strong = |clusters: &'_ Vec<Cluster>| {
+            let most = clusters.iter().map(|cluster| cluster.count).fold(0.0, f64::max);
+            clusters.iter().filter(|cluster| cluster.count >= LEAST_SHARE * most).copied().collect::<Vec<_>>()
+        };
+        let points = self.cells.values().flat_map(strong).map(|cluster| MapPoint {
             position: cluster.position / cluster.count,
             normal: if cluster.normal == Point::zeros() { cluster.normal } else { cluster.normal.normalize() },
         });

@@ -119,6 +119,9 @@ pub fn prepare(recording: &mut Recording) -> Result<OdometryNoise, ReplayError> 
 /// Steps shorter than this say nothing of the noise, m.
 const LEAST_WAY: f64 = 0.05;
 
+/// Turns smaller than this say nothing of the noise of a turn, and larger ones nothing of that of the way, rad.
+const LEAST_TURN: f64 = 0.1;
+
 /// Fewest steps that say something.
 const FEWEST_STEPS: usize = 20;
 
@@ -134,7 +137,7 @@ pub fn odometry_noise(recording: &Recording) -> Result<OdometryNoise, ReplayErro
     let mut matcher: Box<ContourMatcher> = Box::default();
     let mut points: Box<PointScan<BEAMS>> = Box::default();
     let mut last: Option<(Pose, Pose)> = None;
-    let (mut along, mut turned) = (Vec::new(), Vec::new());
+    let (mut along, mut yaw, mut turn) = (Vec::new(), Vec::new(), Vec::new());
     for event in &recording.events {
         let RecordedEvent::Scan(scan) = event else { continue };
         if scan.laser != agv_core::measurement::LaserId::FIRST {
@@ -153,11 +156,13 @@ pub fn odometry_noise(recording: &Recording) -> Result<OdometryNoise, ReplayErro
             if let Some(found) = matcher.align(&prediction).filter(|found| found.share > 0.5) {
                 pose = found.pose;
                 let rest = step.between(&found_before.between(&found.pose));
-                if way > LEAST_WAY {
-                    if found.free_axis.is_none() {
-                        along.push(rest.position().norm() / way.sqrt());
-                    }
-                    turned.push(rest.theta.abs() / way.sqrt());
+                if way > LEAST_WAY && found.free_axis.is_none() {
+                    along.push(rest.position().norm() / way.sqrt());
+                }
+                if step.theta.abs() > LEAST_TURN {
+                    turn.push(rest.theta.abs() / step.theta.abs().sqrt());
+                } else if way > LEAST_WAY {
+                    yaw.push(rest.theta.abs() / way.sqrt());
                 }
             }
         }
@@ -173,7 +178,8 @@ pub fn odometry_noise(recording: &Recording) -> Result<OdometryNoise, ReplayErro
     Ok(OdometryNoise {
         slip: walk(along.clone(), stated.slip),
         side_slip: walk(along, stated.side_slip),
-        yaw: walk(turned, stated.yaw),
+        yaw: walk(yaw, stated.yaw),
+        turn: walk(turn, stated.turn),
         ..stated
     })
 }
