@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use agv_core::geometry::Pose;
 use agv_core::odometry::VehicleOdometer;
+use agv_host_sim::calibrate::wheeled::clock::Clock;
+use agv_host_sim::calibrate::wheeled::path::LinearisedPath;
 use agv_host_sim::import::wheel_table::{TableColumns, read};
 use agv_host_sim::import::{optiodom, wheel_recording};
 use agv_host_sim::recording::RecordedEvent;
@@ -150,4 +152,39 @@ fn a_table_becomes_a_drive_of_its_vehicle() {
     std::fs::write(&columns, DESCRIPTION.replace("track = 0.5", "trak = 0.5")).unwrap();
     let found = wheel_recording::read(&path, &columns).unwrap_err().to_string();
     assert!(found.contains("columns.toml:") && found.contains("track") && !found.contains('\n'), "{found}");
+}
+
+/// What the log's vehicle makes of the counters is what the table's own wheels make of the turns, for every kind of robot.
+#[test]
+fn a_run_of_every_robot_is_dead_reckoned_from_its_log_as_from_its_table() {
+    let test = "a_run_of_every_robot_is_dead_reckoned_from_its_log_as_from_its_table";
+    let Some(folder) = agv_host_sim::data::for_test(test, "optiodom") else { return };
+    for session in
+        ["tricyc/free/140120211525", "diff/free/030120210001", "omni3/square/221220201934", "omni4/square/080920201205"]
+    {
+        let folder = folder.join(session);
+        let read = optiodom::read(&folder).unwrap();
+        let (name, drive) = &read.runs[0];
+        let recording = optiodom::read_run(&folder.join(format!("{name}.csv"))).unwrap();
+        let path = LinearisedPath::new(drive, &read.nominal, &[]).unwrap();
+        let end = path.sensor_at(1e6, &Clock::default()).pose;
+        let parameters = agv_core::localizer::Parameters {
+            integration: agv_core::odometry::Integration::Arc,
+            ..recording.parameters
+        };
+        let mut odometer = VehicleOdometer::new(&parameters.vehicle, &parameters.odometer());
+        let mut pose = Pose::default();
+        for event in &recording.events {
+            let motion = match event {
+                RecordedEvent::Wheels(sample) => odometer.wheels(sample),
+                RecordedEvent::Encoders(sample) => odometer.encoders(sample),
+                _ => panic!("{event:?}"),
+            };
+            pose = motion.map_or(pose, |motion| pose.compose(&motion.displacement));
+        }
+        let off = (pose.x - end.x).hypot(pose.y - end.y);
+        let turned = agv_core::geometry::difference(pose.theta, end.z);
+        assert!(off < 2e-3 && turned.abs() < 2e-3, "{session}: {pose:?} is not {end:?}");
+        assert!(end.x.hypot(end.y) > 0.02 || end.z.abs() > 0.5, "{session} goes nowhere");
+    }
 }

@@ -89,6 +89,9 @@ enum MethodName {
     Atc,
     /// Nonlinear fit of everything at once, with two offsets.
     Joint,
+    /// Fit to poses with one offset and with the clocks of both sides, as for any vehicle of wheels; also of a drive that only goes
+    /// forward.
+    Clocks,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -172,7 +175,7 @@ impl Calibrate {
     fn is_plain(&self) -> bool {
         let is_switched = self.wheelbase || self.steering_ratio || self.mend;
         let is_given = self.side.is_some() || self.map.is_some() || self.apply.is_some() || self.report.is_some();
-        self.method == MethodName::Joint && !is_switched && !is_given
+        matches!(self.method, MethodName::Joint | MethodName::Clocks) && !is_switched && !is_given
     }
 
     /// Runs the command.
@@ -185,12 +188,8 @@ impl Calibrate {
         let reading = progress::bar("reading", size);
         let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
-        if matches!(input.parameters.vehicle, Vehicle::Wheels(_)) {
-            ensure!(
-                self.is_plain(),
-                "{}: of a vehicle with several wheels, --json alone is an option of the joint fit",
-                log.display()
-            );
+        if matches!(input.parameters.vehicle, Vehicle::Wheels(_)) || self.method == MethodName::Clocks {
+            ensure!(self.is_plain(), "{}: the fit of any wheels takes no option but --json", log.display());
             return wheels::run(&input, self.json).with_context(|| log.display().to_string());
         }
         let map: Option<Vec<Landmark>> = match &self.map {
@@ -261,6 +260,7 @@ impl Calibrate {
                 MethodName::Stc => "stc",
                 MethodName::Atc => "atc",
                 MethodName::Joint => "joint",
+                MethodName::Clocks => "clocks",
             },
             source: drive.source.name(),
             segments: drive.windows.len(),

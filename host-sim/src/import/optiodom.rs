@@ -68,9 +68,15 @@ pub fn read_run(path: &Path) -> Result<Recording, TextFileError> {
     let (_, metadata) = session_of(path.parent().unwrap_or(Path::new(".")))?;
     let (_, wheels) = metadata.wheels(path)?;
     let mut drive = wheel_table::read(path, &metadata.columns())?;
-    if metadata.kind == "diff" {
-        // The right wheel comes first in the table, the left one in events.
-        drive.steps.iter_mut().for_each(|step| step.motions.reverse());
+    for step in &mut drive.steps {
+        match metadata.kind.as_str() {
+            // The right wheel comes first in the table, the left one in events.
+            "diff" => step.motions.reverse(),
+            // Wheels of the vehicle roll to the left about the middle, those of the table to the right.
+            "omni3" => step.motions.iter_mut().for_each(|motion| motion.turn = -motion.turn),
+            "omni4" => step.motions.iter_mut().skip(1).step_by(2).for_each(|motion| motion.turn = -motion.turn),
+            _ => {}
+        }
     }
     let vehicle = metadata.vehicle(&wheels).ok_or_else(|| metadata.no_such_robot(path))?;
     wheel_recording::of(&drive, vehicle, Some(metadata.radius()), Pose::default())
@@ -133,9 +139,7 @@ impl Metadata {
     /// The vehicle as logs have it: counters of a millionth of a radian.
     fn vehicle(&self, wheels: &[Wheel]) -> Option<Vehicle> {
         const TICK: AngleEncoder = AngleEncoder { scale: 1e-6, range: CounterRange::BITS_32 };
-        let backward = AngleEncoder { scale: -TICK.scale, ..TICK };
-        let driven =
-            |number: usize, turn: AngleEncoder| Some(DrivenWheel { radius: wheels.get(number)?.radius.abs(), turn });
+        let driven = |number: usize| Some(DrivenWheel { radius: wheels.get(number)?.radius.abs(), turn: TICK });
         let first = wheels.first()?;
         Some(match self.kind.as_str() {
             "tricyc" => Vehicle::Tricycle(Tricycle {
@@ -149,18 +153,18 @@ impl Metadata {
             }),
             "diff" => Vehicle::Wheels(WheelVehicle::Differential(Differential {
                 track: 2.0 * first.y.abs(),
-                left: driven(1, TICK)?,
-                right: driven(0, TICK)?,
+                left: driven(1)?,
+                right: driven(0)?,
             })),
             "omni3" => Vehicle::Wheels(WheelVehicle::ThreeOmnidirectional(Omnidirectional {
                 arm: first.x.hypot(first.y),
                 first: first.y.atan2(first.x),
-                driven: [driven(0, backward)?, driven(1, backward)?, driven(2, backward)?],
+                driven: [driven(0)?, driven(1)?, driven(2)?],
             })),
             _ => Vehicle::Wheels(WheelVehicle::Mecanum(Mecanum {
                 wheelbase: 2.0 * first.x,
                 track: 2.0 * first.y,
-                driven: [driven(0, TICK)?, driven(1, backward)?, driven(2, TICK)?, driven(3, backward)?],
+                driven: [driven(0)?, driven(1)?, driven(2)?, driven(3)?],
             })),
         })
     }

@@ -1,6 +1,6 @@
 //! The drive in a log.
 
-use agv_core::measurement::{MOST_WHEELS, Time, WheelSample};
+use agv_core::measurement::{EncoderSample, MOST_WHEELS, Time, WheelReading, WheelSample};
 use agv_core::odometry::{
     AngleEncoder, CounterRange, Vehicle, Wheel, WheelBased, WheelMotion, WheelVehicle, wheel_motion_between,
 };
@@ -28,15 +28,20 @@ impl LogDrive {
     /// # Errors
     /// If the vehicle has no wheels that are counted, or nothing says how it moved.
     pub fn new(input: &LogInput) -> Result<Self, Refusal> {
-        let Vehicle::Wheels(vehicle) = input.parameters.vehicle else { return Err(Refusal::OtherVehicle) };
-        let (Some(first), poses) = (input.wheels.first(), input.poses()) else { return Err(Refusal::NoEncoders) };
+        let (kind, believed, samples) = match input.parameters.vehicle {
+            Vehicle::Wheels(vehicle) => (kind(&vehicle), vehicle.wheels().as_ref().to_vec(), input.wheels.clone()),
+            Vehicle::Tricycle(tricycle) => {
+                (Kind::Tricycle, tricycle.wheels().to_vec(), input.encoders.iter().map(of_tricycle).collect())
+            }
+            _ => return Err(Refusal::OtherVehicle),
+        };
+        let (Some(first), poses) = (samples.first(), input.poses()) else { return Err(Refusal::NoEncoders) };
         if poses.is_empty() {
             return Err(Refusal::NoLaserMotion);
         }
-        let believed: Vec<Wheel> = vehicle.wheels().as_ref().to_vec();
         let start = first.time;
         let mut ordered: Vec<&WheelSample> = Vec::new();
-        for sample in &input.wheels {
+        for sample in &samples {
             if ordered.last().is_none_or(|last| sample.time > last.time) {
                 ordered.push(sample);
             }
@@ -50,8 +55,15 @@ impl LogDrive {
         };
         let wheels = believed.into_iter().map(ratio).collect();
         let nominal = WheeledModel { wheels, sensor: *input.parameters.lasers.first() };
-        Ok(Self { kind: kind(&vehicle), nominal, drive: WheelDrive::new(steps, poses) })
+        Ok(Self { kind, nominal, drive: WheelDrive::new(steps, poses) })
     }
+}
+
+/// The counters of a tricycle as those of its driving wheel, and nothing of the one that carries.
+fn of_tricycle(sample: &EncoderSample) -> WheelSample {
+    let mut wheels = [WheelReading::default(); MOST_WHEELS];
+    wheels[0] = WheelReading { count: sample.drive, steering: sample.steering };
+    WheelSample { time: sample.time, wheels }
 }
 
 fn kind(vehicle: &WheelVehicle) -> Kind {
