@@ -55,6 +55,7 @@ enum Command {
     Record(command::record::Record),
     Emulate(command::emulate::Emulate),
     Ctl(command::ctl::Ctl),
+    Settings(command::settings::Settings),
     Provision(command::provision::Provision),
     Completion(command::completion::Completion),
 }
@@ -92,6 +93,7 @@ fn main() -> ExitCode {
         Some(Command::Record(command)) => command.run(),
         Some(Command::Emulate(command)) => command.run(),
         Some(Command::Ctl(command)) => command.run(),
+        Some(Command::Settings(command)) => command.run(),
         Some(Command::Provision(command)) => command.run(),
         Some(Command::Completion(command)) => command.run::<Agv>(),
     };

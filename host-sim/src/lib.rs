@@ -27,6 +27,8 @@ pub mod report;
 #[cfg(feature = "bags")]
 pub mod ros;
 pub mod serve;
+pub mod setting_doubts;
+pub mod setting_meanings;
 pub mod simulate;
 pub mod text_file;
 pub mod view;

@@ -32,6 +32,8 @@ pub mod provision;
 pub mod record;
 pub mod replay;
 pub mod report;
+mod setting_arguments;
+pub mod settings;
 pub mod simulate;
 mod stop;
 mod summary;

@@ -13,11 +13,13 @@ use agv_host_sim::mapping::map_file;
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
 use agv_host_sim::replay::{Comparison, compare, replay};
 use agv_host_sim::report::Page;
+use agv_host_sim::setting_doubts::doubt;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
 use super::drive_summary::DriveSummary;
 use super::lidar3d::relocalise::Relocalisation;
+use super::setting_arguments::SettingArguments;
 use super::{output, pose_argument, progress};
 
 const HELP: &str = "\
@@ -65,6 +67,8 @@ pub struct Replay {
     /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose.
     #[arg(long, value_name = "POSE", value_parser = start, allow_hyphen_values = true)]
     start: Option<Start>,
+    #[command(flatten)]
+    settings: SettingArguments,
     #[command(flatten)]
     relocalisation: Relocalisation,
     /// Print one JSON object instead of a table.
@@ -117,13 +121,18 @@ impl Replay {
             && self.landmarks.is_empty()
             && self.start.is_none()
             && self.vehicle.is_none()
+            && self.settings.is_empty()
             && !self.relocalisation.is_wanted();
         self.relocalisation.apply(&mut recording).with_context(|| self.log.display().to_string())?;
         if let Some(start) = self.start {
             set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
         }
+        self.settings.apply(&mut recording.parameters)?;
         if let Some(path) = &self.vehicle {
-            let is_tricycle = VehicleFile::read(path)?.apply(&mut recording.parameters);
+            let vehicle = VehicleFile::read(path)?;
+            let doubts = vehicle.settings().filter_map(|(name, value)| doubt(name, value));
+            doubts.for_each(|doubt| output::note(&format!("agv: {}: {doubt}", path.display())));
+            let is_tricycle = vehicle.apply(&mut recording.parameters);
             ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
         }
         for path in &self.map {
