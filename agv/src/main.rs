@@ -58,6 +58,7 @@ enum Command {
     Settings(command::settings::Settings),
     Provision(command::provision::Provision),
     Completion(command::completion::Completion),
+    Manual(command::manual::Manual),
 }
 
 fn main() -> ExitCode {
@@ -96,6 +97,7 @@ fn main() -> ExitCode {
         Some(Command::Settings(command)) => command.run(),
         Some(Command::Provision(command)) => command.run(),
         Some(Command::Completion(command)) => command.run::<Agv>(),
+        Some(Command::Manual(command)) => command.run::<Agv>(),
     };
     finish(outcome)
 }

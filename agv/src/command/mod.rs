@@ -20,6 +20,7 @@ pub mod import;
 pub mod layout;
 pub mod lidar3d;
 mod like;
+pub mod manual;
 pub mod map;
 pub mod nav350;
 pub mod output;
