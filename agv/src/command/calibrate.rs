@@ -1,5 +1,6 @@
 //! `agv calibrate`.
 
+mod noise;
 mod plan;
 
 use std::path::PathBuf;
@@ -26,6 +27,7 @@ Examples:
   agv calibrate drive.agvlog --method atc --report calibration
   agv calibrate drive.agvlog --wheelbase --apply vehicle.toml
   agv replay other.agvlog --vehicle vehicle.toml
+  agv calibrate noise hall.agvlog
   agv calibrate plan --area 14x11 --steering 18..50 --time 900 --scenario plan.toml
 
 The vehicle drives arcs from standstill to standstill, forward and backward, to the left and to the right, with different
@@ -75,6 +77,7 @@ pub struct Calibrate {
 
 #[derive(clap::Subcommand)]
 enum Subcommand {
+    Noise(noise::Noise),
     Plan(plan::Plan),
 }
 
@@ -167,8 +170,10 @@ struct Outlier {
 impl Calibrate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        if let Some(Subcommand::Plan(plan)) = self.command {
-            return plan.run();
+        match self.command {
+            Some(Subcommand::Noise(noise)) => return noise.run(),
+            Some(Subcommand::Plan(plan)) => return plan.run(),
+            None => {}
         }
         let log = self.log.as_ref().context("a log is needed")?;
         let size = std::fs::metadata(log).map_or(0, |metadata| metadata.len());

@@ -6,6 +6,7 @@ mod counting_direction;
 pub mod design;
 pub mod drive;
 pub mod found;
+pub mod innovation_noise;
 pub mod joint;
 mod least_squares;
 pub mod log_input;
