@@ -1,5 +1,6 @@
 //! Calibration from a log: windows of motion, encoder faults, the closed forms of the core and a joint nonlinear fit.
 
+pub mod causes;
 pub mod closed_form;
 pub mod counted;
 mod counting_direction;
