@@ -3,9 +3,11 @@
 //! A subcommand is a clap `Args` structure with `run(self) -> anyhow::Result<()>`. Results go to standard output,
 //! progress and notes to standard error.
 
+pub mod accept;
 pub mod calibrate;
 pub mod campaign;
 pub mod can;
+pub mod check;
 pub mod complaint;
 pub mod completion;
 pub mod ctl;

@@ -8,6 +8,7 @@ use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::record::Damage;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
+use agv_host_sim::drive_check::{POOR, poor_share};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::map_file;
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
@@ -176,6 +177,11 @@ impl Replay {
         }
         let mut rows = remarks;
         rows.extend(figure_rows(&figures));
+        let poor = poor_share(&figures);
+        if poor > POOR {
+            let next = format!("for {:.0} % of the time; agv check {} says why", 100.0 * poor, self.log.display());
+            rows.push(["lost or poor".to_owned(), next]);
+        }
         if let Some(folder) = &self.report {
             rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
         }
