@@ -201,10 +201,8 @@ impl Drive {
     /// The vehicle with parameters that were found: a counter that counts the wrong way has a negative scale.
     #[must_use]
     pub fn vehicle(&self, model: &VehicleModel) -> Tricycle {
-        let is_wrong = |steering| {
-            self.is_mended
-                && self.faults.iter().any(|fault| *fault == CounterFault::WrongDirection { is_steering: steering })
-        };
+        let is_wrong =
+            |is_steering| self.is_mended && self.faults.contains(&CounterFault::WrongDirection { is_steering });
         let sign = |is_turned: bool| if is_turned { -1.0 } else { 1.0 };
         let found = model.apply(&self.tricycle);
         Tricycle {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use agv_host_sim::calibrate::innovation_noise::{STEPS, SourceNoise, Squares, find};
+use agv_host_sim::calibrate::innovation_noise::{HONEST, STEPS, SourceNoise, Squares, find};
 use agv_host_sim::log;
 use anyhow::Context;
 use serde_json::json;
@@ -56,8 +56,12 @@ impl Noise {
             println!("{:<32} {:.6} was {:.6}", changed.name, changed.after, changed.before);
         }
         for noise in found.iter().filter(|noise| !noise.is_good()) {
-            let what = noise.source.name();
-            println!("{what}: the second half of the drive disagrees; do not take these settings from it");
+            let why = if HONEST.contains(&noise.after.mean) {
+                "the second half of the drive disagrees"
+            } else {
+                "no setting brings it to 1, as the detector or the map states another noise"
+            };
+            println!("{}: {why}", noise.source.name());
         }
         println!("next: agv accept {}{}", self.log.display(), options(&found));
         Ok(())
@@ -81,8 +85,8 @@ fn entry(noise: &SourceNoise) -> serde_json::Value {
     })
 }
 
-/// The settings that are good as options of other commands.
+/// The settings as options of other commands: all of them, as they were found together.
 fn options(found: &[SourceNoise]) -> String {
-    let good = found.iter().filter(|noise| noise.is_good()).flat_map(|noise| noise.settings);
-    good.map(|changed| format!(" --set {}={:.6}", changed.name, changed.after)).collect()
+    let settings = found.iter().flat_map(|noise| noise.settings);
+    settings.map(|changed| format!(" --set {}={:.6}", changed.name, changed.after)).collect()
 }
