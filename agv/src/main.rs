@@ -31,7 +31,7 @@ Examples:
   agv replay drive.agvlog --report report
   agv view drive.agvlog
 
-Exit codes: 0 done; 1 it could not be done, and one line on standard error says why; 2 the command line is wrong;
+Exit codes: 0 done (agv accept says more); 1 it could not be done, and one line on standard error says why; 2 the command line is wrong;
 130 ended by a second Ctrl-C.";
 
 #[derive(Subcommand)]
@@ -40,6 +40,8 @@ enum Command {
     Export(command::export::Export),
     Simulate(command::simulate::Simulate),
     Replay(command::replay::Replay),
+    Check(command::check::Check),
+    Accept(command::accept::Accept),
     View(command::view::View),
     Report(command::report::Report),
     Map(command::map::Map),
@@ -55,8 +57,10 @@ enum Command {
     Record(command::record::Record),
     Emulate(command::emulate::Emulate),
     Ctl(command::ctl::Ctl),
+    Settings(command::settings::Settings),
     Provision(command::provision::Provision),
     Completion(command::completion::Completion),
+    Manual(command::manual::Manual),
 }
 
 fn main() -> ExitCode {
@@ -77,6 +81,11 @@ fn main() -> ExitCode {
         Some(Command::Export(command)) => command.run(),
         Some(Command::Simulate(command)) => command.run(),
         Some(Command::Replay(command)) => command.run(),
+        Some(Command::Check(command)) => command.run(),
+        Some(Command::Accept(command)) => match command.run() {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
         Some(Command::View(command)) => command.run(),
         Some(Command::Report(command)) => command.run(),
         Some(Command::Map(command)) => command.run(),
@@ -92,8 +101,10 @@ fn main() -> ExitCode {
         Some(Command::Record(command)) => command.run(),
         Some(Command::Emulate(command)) => command.run(),
         Some(Command::Ctl(command)) => command.run(),
+        Some(Command::Settings(command)) => command.run(),
         Some(Command::Provision(command)) => command.run(),
         Some(Command::Completion(command)) => command.run::<Agv>(),
+        Some(Command::Manual(command)) => command.run::<Agv>(),
     };
     finish(outcome)
 }

@@ -5,6 +5,7 @@ mod calibrate;
 mod campaign;
 mod can;
 mod command;
+mod commissioning;
 mod contours;
 mod exchange;
 mod import;

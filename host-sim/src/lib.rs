@@ -1,10 +1,12 @@
 //! The localiser on a desktop: simulation, replay, import, evaluation and reports.
 
+pub mod acceptance;
 pub mod accuracy;
 pub mod bus;
 pub mod calibrate;
 pub mod data;
 pub mod drive;
+pub mod drive_check;
 pub mod emulate;
 pub mod export;
 pub mod file_kind;
@@ -27,6 +29,8 @@ pub mod report;
 #[cfg(feature = "bags")]
 pub mod ros;
 pub mod serve;
+pub mod setting_doubts;
+pub mod setting_meanings;
 pub mod simulate;
 pub mod text_file;
 pub mod view;

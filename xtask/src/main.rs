@@ -2,6 +2,7 @@
 
 mod audit;
 mod chip;
+mod dist;
 mod emulate;
 mod firmware;
 mod fuzz;
@@ -25,6 +26,7 @@ struct Xtask {
 enum Command {
     Audit(audit::Audit),
     Chip(chip::Chip),
+    Dist(dist::Dist),
     Emulate(emulate::Emulate),
     Firmware(firmware::Firmware),
     Fuzz(fuzz::Fuzz),
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
     let outcome = match Xtask::parse().command {
         Command::Audit(audit) => audit.run(),
         Command::Chip(chip) => chip.run(),
+        Command::Dist(dist) => dist.run(),
         Command::Emulate(emulate) => emulate.run(),
         Command::Firmware(firmware) => firmware.run(),
         Command::Fuzz(fuzz) => fuzz.run(),

@@ -1,5 +1,6 @@
 //! `agv calibrate`.
 
+mod noise;
 mod plan;
 mod wheels;
 
@@ -8,10 +9,12 @@ use std::path::PathBuf;
 use agv_core::calibration::{MountingSide, Offsets};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::odometry::Vehicle;
+use agv_host_sim::calibrate::causes::{Cause, Explanation, TRIES, differences, explain, with_signs};
 use agv_host_sim::calibrate::drive::{Drive, Preparation};
 use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find};
 use agv_host_sim::calibrate::log_input::LogInput;
 use agv_host_sim::calibrate::model::PARAMETERS;
+use agv_host_sim::calibrate::refusal::Refusal;
 use agv_host_sim::calibrate::report::{add_calibration, parameter_rows, remark_rows};
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::mapping::map_file;
@@ -28,6 +31,7 @@ Examples:
   agv calibrate drive.agvlog --method atc --report calibration
   agv calibrate drive.agvlog --wheelbase --apply vehicle.toml
   agv replay other.agvlog --vehicle vehicle.toml
+  agv calibrate noise hall.agvlog
   agv calibrate plan --area 14x11 --steering 18..50 --time 900 --scenario plan.toml
 
 The vehicle drives arcs from standstill to standstill, forward and backward, to the left and to the right, with different
@@ -78,6 +82,7 @@ pub struct Calibrate {
 
 #[derive(clap::Subcommand)]
 enum Subcommand {
+    Noise(noise::Noise),
     Plan(plan::Plan),
 }
 
@@ -170,6 +175,32 @@ struct Outlier {
     theta_rad: f64,
 }
 
+/// Differences of the wheelbase that are told: in standard deviations, and as a share of it.
+const CLEAR: f64 = 4.0;
+const NOTABLE: f64 = 0.003;
+
+/// Every explanation of a drive that cannot be calibrated.
+fn explanations(input: &LogInput) -> Vec<Explanation> {
+    let bar = progress::bar("looking for the reason", TRIES as u64);
+    let found = explain(input, |done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    found
+}
+
+/// Why there is no result, with the mistakes that would explain the drive.
+fn explained(refusal: &Refusal, explanations: &[Explanation]) -> anyhow::Error {
+    let together = |causes: &[Cause]| causes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
+    let causes: Vec<String> =
+        explanations.iter().filter(|found| !found.causes.is_empty()).map(|found| together(&found.causes)).collect();
+    if causes.is_empty() {
+        return anyhow::anyhow!("{refusal}");
+    }
+    let is_sign = |cause: &Cause| matches!(cause, Cause::DriveReversed | Cause::SteeringReversed);
+    let mend = explanations.iter().flat_map(|found| &found.causes).any(is_sign);
+    let next = if mend { "; --mend --apply FILE mends a sign" } else { "" };
+    anyhow::anyhow!("{refusal}; the drive makes sense if {}{next}; agv check says what to do", causes.join(", or if "))
+}
+
 impl Calibrate {
     /// Whether nothing is asked for that the joint fit of several wheels does not have.
     fn is_plain(&self) -> bool {
@@ -180,8 +211,10 @@ impl Calibrate {
 
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        if let Some(Subcommand::Plan(plan)) = self.command {
-            return plan.run();
+        match self.command {
+            Some(Subcommand::Noise(noise)) => return noise.run(),
+            Some(Subcommand::Plan(plan)) => return plan.run(),
+            None => {}
         }
         let log = self.log.as_ref().context("a log is needed")?;
         let size = std::fs::metadata(log).map_or(0, |metadata| metadata.len());
@@ -202,11 +235,12 @@ impl Calibrate {
             None => None,
         };
         let name = || log.display().to_string();
-        let mut drive = Drive::new(&input, &Preparation { map: map.as_deref(), mend: self.mend }).with_context(name)?;
+        let preparation = Preparation { map: map.as_deref(), mend: self.mend };
+        let (found, mut drive) = self.calibrated(&input, &preparation).with_context(name)?;
         drive.remarks.extend(damages.iter().map(|damage| format!("the log is damaged: {damage}")));
-        let found = find(&drive, &self.question()).with_context(name)?;
+        drive.remarks.extend(self.differences(&drive, &found));
         if let Some(path) = &self.apply {
-            VehicleFile::of(&found.model.apply(&drive.tricycle), &found.model.laser).write(path)?;
+            VehicleFile::of(&drive.vehicle(&found.model), &found.model.laser).write(path)?;
         }
         if let Some(folder) = &self.report {
             let mut page =
@@ -230,6 +264,37 @@ impl Calibrate {
         }
         output::print_rows(&rows);
         Ok(())
+    }
+
+    /// The parameters; of counters that count the other way if that explains the drive and is to be mended.
+    fn calibrated(&self, input: &LogInput, preparation: &Preparation) -> anyhow::Result<(Found, Drive)> {
+        let attempt = |input: &LogInput| {
+            let drive = Drive::new(input, preparation)?;
+            Ok((find(&drive, &self.question())?, drive))
+        };
+        let refusal: Refusal = match attempt(input) {
+            Ok(found) => return Ok(found),
+            Err(refusal) => refusal,
+        };
+        let explanations = explanations(input);
+        let signed = if self.mend { with_signs(input, &explanations) } else { None };
+        let Some(signed) = signed else { return Err(explained(&refusal, &explanations)) };
+        let (found, mut drive) = attempt(&signed).map_err(|again: Refusal| explained(&again, &explanations))?;
+        drive.remarks.push("a counter counts the wrong way, mended: its scale is negative".to_owned());
+        Ok((found, drive))
+    }
+
+    /// What a result says that is no adjustment any more.
+    fn differences(&self, drive: &Drive, found: &Found) -> Vec<String> {
+        let causes = differences(found, &drive.nominal);
+        let mut remarks: Vec<String> = causes.iter().map(ToString::to_string).collect();
+        let [wheelbase, deviation] = found.suggested_wheelbase;
+        let stretch = (wheelbase - found.model.wheelbase).abs();
+        if !self.wheelbase && stretch > CLEAR * deviation && stretch > NOTABLE * found.model.wheelbase {
+            remarks
+                .push(format!("the wheelbase seems to be {wheelbase:.3} m; --wheelbase finds it with everything else"));
+        }
+        remarks
     }
 
     fn question(&self) -> Question {

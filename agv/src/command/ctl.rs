@@ -3,14 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
+use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, Setting};
 use agv_host_sim::link::with_port;
+use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::Value;
 use anyhow::{Context, bail};
 use serde_json::json;
 
-use super::output::print_rows;
+use super::output::{note, print_rows};
 use super::progress;
 
 const HELP: &str = "\
@@ -21,6 +23,7 @@ Examples:
   agv ctl 192.168.1.20 version
   agv ctl 192.168.1.20 list
   agv ctl 192.168.1.20 --key agv.key set vehicle.wheelbase 1.482
+  agv ctl 192.168.1.20 --key agv.key apply vehicle.toml
   agv ctl 192.168.1.20 --key agv.key map upload hall.imk
   agv ctl 192.168.1.20 --key agv.key store
   agv ctl 192.168.1.20 --key agv.key reboot
@@ -60,6 +63,14 @@ enum Action {
         name: String,
         /// A number, true or false, or an IPv4 address.
         value: String,
+    },
+    /// Change the settings that a file of the vehicle's parameters states, show what changes, and keep them in flash.
+    Apply {
+        /// File as `agv calibrate --apply` writes it.
+        file: PathBuf,
+        /// Show what would change, and change nothing.
+        #[arg(long)]
+        dry_run: bool,
     },
     /// Keep all settings in flash.
     Store,
@@ -141,7 +152,7 @@ pub fn parse_value(name: &str, text: &str, like: Value) -> anyhow::Result<Value>
     value.with_context(|| format!("{name} must be {wanted}, not '{text}'"))
 }
 
-fn show(value: Value) -> String {
+pub fn show(value: Value) -> String {
     match value {
         Value::Number(number) => number.to_string(),
         Value::Whole(whole) => whole.to_string(),
@@ -174,6 +185,37 @@ fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Brings a vehicle's parameters to a controller; gives a row for each setting that differs.
+fn apply(client: &mut Client, file: &Path, dry_run: bool) -> anyhow::Result<Vec<[String; 2]>> {
+    let vehicle = VehicleFile::read(file)?;
+    let known = client.list()?;
+    let mut rows = Vec::new();
+    let mut changes = Vec::new();
+    for (name, value) in vehicle.settings() {
+        let setting = known.iter().find(|setting| setting.name == name);
+        let setting = setting.with_context(|| format!("the controller has no setting {name}"))?;
+        if let Some(doubt) = doubt(name, value) {
+            note(&format!("agv: {}: {doubt}", file.display()));
+        }
+        if setting.value != Value::Number(value) {
+            let change = format!("{} -> {value} {}", show(setting.value), setting.unit);
+            rows.push([name.to_owned(), change.trim_end().to_owned()]);
+            changes.push((name, value));
+        }
+    }
+    if !dry_run && !changes.is_empty() {
+        changes.iter().try_for_each(|(name, value)| client.set(name, Value::Number(*value)))?;
+        client.store()?;
+    }
+    let outcome = match (changes.is_empty(), dry_run) {
+        (true, _) => "nothing differs",
+        (false, true) => "not changed",
+        (false, false) => "changed and stored; in effect after agv ctl HOST reboot",
+    };
+    rows.push(["settings".to_owned(), outcome.to_owned()]);
+    Ok(rows)
+}
+
 impl Ctl {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
@@ -196,6 +238,7 @@ impl Ctl {
                 let like = client.get(name)?.value;
                 client.set(name, parse_value(name, value, like)?)?;
             }
+            Action::Apply { file, dry_run } => self.print(&apply(&mut client, file, *dry_run)?)?,
             Action::Store => client.store()?,
             Action::Map { action: MapAction::Upload { file } } => {
                 let landmarks = layout_file::landmarks(&layout_file::load(file)?);

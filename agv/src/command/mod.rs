@@ -3,9 +3,11 @@
 //! A subcommand is a clap `Args` structure with `run(self) -> anyhow::Result<()>`. Results go to standard output,
 //! progress and notes to standard error.
 
+pub mod accept;
 pub mod calibrate;
 pub mod campaign;
 pub mod can;
+pub mod check;
 pub mod complaint;
 pub mod completion;
 pub mod ctl;
@@ -20,6 +22,7 @@ pub mod import;
 pub mod layout;
 pub mod lidar3d;
 mod like;
+pub mod manual;
 pub mod map;
 pub mod nav350;
 pub mod output;
@@ -32,6 +35,8 @@ pub mod provision;
 pub mod record;
 pub mod replay;
 pub mod report;
+mod setting_arguments;
+pub mod settings;
 pub mod simulate;
 mod stop;
 mod summary;

@@ -3,12 +3,16 @@
 use std::path::PathBuf;
 
 use agv_host_sim::provision::flash_image;
+use agv_host_sim::setting_doubts::doubt;
 use agv_host_sim::{layout_file, log, output_file};
-use agv_settings::Settings;
-use agv_settings::leaf::{Leaf, LeafError};
-use anyhow::{Context, bail};
+use agv_settings::leaf::{Leaf, Value};
+use agv_settings::{LEAVES, Settings};
+use anyhow::Context;
+use serde_json::json;
 
-use super::ctl::{parse_value, read_key};
+use super::ctl::{read_key, show};
+use super::output::{note, print_rows};
+use super::setting_arguments::SettingArguments;
 
 const HELP: &str = "\
 The image is for the last two pages of the controller's flash, 0x081C0000 on the STM32H743:
@@ -31,12 +35,14 @@ pub struct Provision {
     /// Map, .imk or .csv.
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
-    /// A setting as NAME=VALUE; agv ctl HOST list shows the names.
-    #[arg(long = "set", value_name = "NAME=VALUE")]
-    settings: Vec<String>,
+    #[command(flatten)]
+    settings: SettingArguments,
     /// Image to write.
     #[arg(short, long)]
     output: PathBuf,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 impl Provision {
@@ -53,20 +59,47 @@ impl Provision {
         if let Some(map) = &self.map {
             landmarks = layout_file::landmarks(&layout_file::load(map)?);
         }
-        for text in &self.settings {
-            let (name, value) = text.split_once('=').with_context(|| format!("{text} is not NAME=VALUE"))?;
-            let leaf = Leaf::named(name).with_context(|| format!("there is no setting of the name {name}"))?;
-            let like = leaf.get(&settings).with_context(|| format!("the vehicle has no setting {name}"))?;
-            match leaf.set(&mut settings, parse_value(name, value, like)?) {
-                Ok(()) => {}
-                Err(LeafError::Bounds) => {
-                    let (least, most) = leaf.bounds;
-                    bail!("{name} must be from {least} to {most}");
-                }
-                Err(LeafError::Kind) => bail!("{value} is no value of {name}"),
-            }
-        }
+        self.settings.change(&mut settings)?;
+        let doubts = doubts(&settings);
+        doubts.iter().for_each(|doubt| note(&format!("agv: {doubt}")));
         let image = flash_image(&settings, &landmarks, Some(&key))?;
-        output_file::write(&self.output, image).with_context(|| self.output.display().to_string())
+        output_file::write(&self.output, &image).with_context(|| self.output.display().to_string())?;
+        let changed = changed(&settings);
+        if self.json {
+            let settings: serde_json::Map<_, _> =
+                changed.iter().map(|[name, value]| (name.clone(), value.clone().into())).collect();
+            let written = json!({
+                "bytes": image.len(), "landmarks": landmarks.len(), "settings": settings, "questions": doubts,
+            });
+            println!("{}", serde_json::to_string_pretty(&written)?);
+            return Ok(());
+        }
+        let mut rows = changed;
+        rows.push(["all other settings".to_owned(), "as agv settings shows".to_owned()]);
+        rows.push(["landmarks".to_owned(), landmarks.len().to_string()]);
+        rows.push(["key".to_owned(), self.key.display().to_string()]);
+        rows.push(["written".to_owned(), format!("{}, {} bytes", self.output.display(), image.len())]);
+        print_rows(&rows);
+        Ok(())
     }
+}
+
+/// Settings that are not as they leave the factory, with their values.
+fn changed(settings: &Settings) -> Vec<[String; 2]> {
+    let usual = Settings::default();
+    let row = |leaf: &Leaf| {
+        let value = leaf.get(settings)?;
+        (leaf.get(&usual) != Some(value))
+            .then(|| [leaf.name.to_owned(), format!("{} {}", show(value), leaf.unit).trim_end().to_owned()])
+    };
+    LEAVES.iter().filter_map(row).collect()
+}
+
+/// Values that are asked about.
+fn doubts(settings: &Settings) -> Vec<String> {
+    let number = |leaf: &Leaf| match leaf.get(settings) {
+        Some(Value::Number(number)) => doubt(leaf.name, number),
+        _ => None,
+    };
+    LEAVES.iter().filter_map(number).collect()
 }

@@ -8,16 +8,19 @@ use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::record::Damage;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
+use agv_host_sim::drive_check::{POOR, poor_share};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::{contour_file, contour_replay, map_file};
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
 use agv_host_sim::replay::{Comparisons, replay};
 use agv_host_sim::report::Page;
+use agv_host_sim::setting_doubts::doubt;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
 use super::drive_summary::DriveSummary;
 use super::lidar3d::relocalise::Relocalisation;
+use super::setting_arguments::SettingArguments;
 use super::{output, pose_argument, progress};
 
 const HELP: &str = "\
@@ -67,6 +70,8 @@ pub struct Replay {
     /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose.
     #[arg(long, value_name = "POSE", value_parser = start, allow_hyphen_values = true)]
     start: Option<Start>,
+    #[command(flatten)]
+    settings: SettingArguments,
     #[command(flatten)]
     relocalisation: Relocalisation,
     /// Print one JSON object instead of a table.
@@ -119,13 +124,18 @@ impl Replay {
             && self.landmarks.is_empty()
             && self.start.is_none()
             && self.vehicle.is_none()
+            && self.settings.is_empty()
             && !self.relocalisation.is_wanted();
         self.relocalisation.apply(&mut recording).with_context(|| self.log.display().to_string())?;
         if let Some(start) = self.start {
             set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
         }
+        self.settings.apply(&mut recording.parameters)?;
         if let Some(path) = &self.vehicle {
-            let is_tricycle = VehicleFile::read(path)?.apply(&mut recording.parameters);
+            let vehicle = VehicleFile::read(path)?;
+            let doubts = vehicle.settings().filter_map(|(name, value)| doubt(name, value));
+            doubts.for_each(|doubt| output::note(&format!("agv: {}: {doubt}", path.display())));
+            let is_tricycle = vehicle.apply(&mut recording.parameters);
             ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
         }
         let mut contours = None;
@@ -185,6 +195,11 @@ impl Replay {
         }
         let mut rows = remarks;
         rows.extend(figure_rows(&figures));
+        let poor = poor_share(&figures);
+        if poor > POOR {
+            let next = format!("for {:.0} % of the time; agv check {} says why", 100.0 * poor, self.log.display());
+            rows.push(["lost or poor".to_owned(), next]);
+        }
         if let Some(folder) = &self.report {
             rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
         }

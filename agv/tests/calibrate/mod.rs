@@ -1,6 +1,7 @@
 //! Calibration from logs: simulated drives whose truth is known, and logs that are not good enough.
 
 mod bad_logs;
+mod causes;
 mod command;
 mod counters;
 mod drives;

@@ -8,13 +8,13 @@ use super::windows::LaserPose;
 /// Time over which motions are compared, s.
 const SPAN: f64 = 0.5;
 /// The counters disagree with the laser if they explain less than this share of its motion.
-const POOR: f64 = 0.5;
+pub(super) const POOR: f64 = 0.5;
 /// Another direction of counting must explain the motion better by this factor.
 const CLEARLY_BETTER: f64 = 3.0;
 
 /// How much of the laser's motion the counters do not explain: their difference over the motion, where a radian counts as
 /// a metre. None if the laser hardly moves.
-fn unexplained(counted: &[Counted], model: &VehicleModel, poses: &[LaserPose]) -> Option<f64> {
+pub(super) fn unexplained(counted: &[Counted], model: &VehicleModel, poses: &[LaserPose]) -> Option<f64> {
     let odometry = OdometryPath::new(counted, model);
     let (mut difference, mut motion) = (0.0, 0.0);
     let mut last: Option<&LaserPose> = None;

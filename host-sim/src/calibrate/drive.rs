@@ -1,6 +1,7 @@
 //! From a log to windows.
 
 use agv_core::maps::Landmark;
+use agv_core::measurement::EncoderSample;
 use agv_core::odometry::{Tricycle, Vehicle};
 
 use super::counted::{Counted, CounterFault, count};
@@ -46,7 +47,7 @@ impl MotionSource {
     }
 }
 
-fn located_poses(tracked: &[TrackedRevolution]) -> Vec<LaserPose> {
+pub(super) fn located_poses(tracked: &[TrackedRevolution]) -> Vec<LaserPose> {
     tracked
         .iter()
         .filter(|revolution| revolution.is_located)
@@ -58,7 +59,7 @@ fn located_poses(tracked: &[TrackedRevolution]) -> Vec<LaserPose> {
 const LARGEST_NEW_SHARE: f64 = 0.05;
 
 /// Whether the reflectors kept their names from scan to scan.
-fn is_followed(tracked: &[TrackedRevolution]) -> bool {
+pub(super) fn is_followed(tracked: &[TrackedRevolution]) -> bool {
     let all: usize = tracked.iter().map(|revolution| revolution.sightings.len()).sum();
     let names = tracked.iter().flat_map(|revolution| &revolution.sightings).map(|sighting| sighting.reflector + 1);
     let at_once = tracked.iter().map(|revolution| revolution.sightings.len()).max().unwrap_or(0);
@@ -79,6 +80,8 @@ pub struct Drive {
     pub faults: Vec<CounterFault>,
     /// Whether that was mended.
     pub is_mended: bool,
+    /// Whether the log believes that the drive counter counts the wrong way; here it is turned already.
+    is_drive_turned: bool,
     /// What says how the laser moved.
     pub source: MotionSource,
     /// The windows.
@@ -89,6 +92,11 @@ pub struct Drive {
     pub poses: Vec<LaserPose>,
     /// What else there is to say.
     pub remarks: Vec<String>,
+}
+
+/// The reading of a drive counter that counts the other way.
+fn opposite(reading: u32, tricycle: &Tricycle) -> u32 {
+    (-i64::from(reading)).rem_euclid(tricycle.drive_range.values() as i64) as u32
 }
 
 /// Ways shorter than this are none, m.
@@ -117,7 +125,14 @@ impl Drive {
         if input.encoders.len() < 2 {
             return Err(Refusal::NoEncoders);
         }
-        let (counted, faults) = count(&input.encoders, &tricycle, preparation.mend);
+        let is_drive_turned = tricycle.drive_scale < 0.0;
+        let tricycle = Tricycle { drive_scale: tricycle.drive_scale.abs(), ..tricycle };
+        let turned = |sample: &EncoderSample| EncoderSample { drive: opposite(sample.drive, &tricycle), ..*sample };
+        let (counted, faults) = if is_drive_turned {
+            count(&input.encoders.iter().map(turned).collect::<Vec<_>>(), &tricycle, preparation.mend)
+        } else {
+            count(&input.encoders, &tricycle, preparation.mend)
+        };
         let shortest = SHORTEST_WAY / tricycle.drive_scale;
         let travelled: f64 = counted.windows(2).map(|pair| (pair[1].ticks - pair[0].ticks).abs()).sum();
         if travelled < shortest {
@@ -130,6 +145,7 @@ impl Drive {
             counted,
             faults,
             is_mended: preparation.mend,
+            is_drive_turned,
             source: MotionSource::ReflectorsAtStops,
             windows: Vec::new(),
             overlap: 1,
@@ -180,6 +196,20 @@ impl Drive {
         let source = if is_measured { MotionSource::LaserPoses } else { MotionSource::GivenPoses };
         drive.cut_by_poses(source, shortest);
         Ok(drive)
+    }
+
+    /// The vehicle with parameters that were found: a counter that counts the wrong way has a negative scale.
+    #[must_use]
+    pub fn vehicle(&self, model: &VehicleModel) -> Tricycle {
+        let is_wrong =
+            |is_steering| self.is_mended && self.faults.contains(&CounterFault::WrongDirection { is_steering });
+        let sign = |is_turned: bool| if is_turned { -1.0 } else { 1.0 };
+        let found = model.apply(&self.tricycle);
+        Tricycle {
+            drive_scale: sign(is_wrong(false) != self.is_drive_turned) * found.drive_scale,
+            steering_scale: sign(is_wrong(true)) * found.steering_scale,
+            ..found
+        }
     }
 
     fn cut_by_poses(&mut self, source: MotionSource, shortest: f64) {

@@ -1,11 +1,13 @@
 //! Calibration from a log: windows of motion, encoder faults, the closed forms of the core and a joint nonlinear fit.
 
+pub mod causes;
 pub mod closed_form;
 pub mod counted;
 mod counting_direction;
 pub mod design;
 pub mod drive;
 pub mod found;
+pub mod innovation_noise;
 pub mod joint;
 mod least_squares;
 pub mod log_input;

@@ -79,8 +79,10 @@ impl OfSize<'_> {
         self.sum(|outcome| outcome.available) as f64 / self.sum(|outcome| outcome.outputs).max(1) as f64
     }
 
-    fn badness(&self) -> (usize, u64, u64) {
-        (self.failures(), self.sum(|outcome| u64::from(outcome.hazards)), self.sum(|outcome| outcome.misleading))
+    /// Failures, hazards, misleading outputs, and the largest share of error over protection level, in millionths.
+    fn badness(&self) -> (usize, u64, u64, u64) {
+        let share = (1e6 * self.most(|outcome| outcome.most_over_level)) as u64;
+        (self.failures(), self.sum(|outcome| u64::from(outcome.hazards)), self.sum(|outcome| outcome.misleading), share)
     }
 }
 
@@ -98,7 +100,8 @@ pub fn by_size<'a>(rows: &'a [Row], kind: &str) -> Vec<OfSize<'a>> {
     sizes
 }
 
-/// The size of a kind at which its runs are worst: most failures, then hazards, then misleading outputs; the smallest such.
+/// The size of a kind at which its runs are worst: most failures, then hazards, then misleading outputs,
+/// then the largest share of error over protection level; the smallest such.
 #[must_use]
 pub fn worst_size(sizes: &[OfSize]) -> Option<f64> {
     let mut worst: Option<&OfSize> = None;

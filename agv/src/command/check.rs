@@ -1,0 +1,72 @@
+//! `agv check`.
+
+use std::path::PathBuf;
+
+use agv_host_sim::calibrate::causes::TRIES;
+use agv_host_sim::drive::{Figures, Track};
+use agv_host_sim::drive_check::{Finding, check, poor_share};
+use agv_host_sim::log::{self, Contents};
+use agv_host_sim::replay::replay;
+use anyhow::Context;
+use serde::Serialize;
+
+use super::progress;
+use super::setting_arguments::SettingArguments;
+
+const HELP: &str = "\
+Looks at what is missing, at times, at the encoders and the laser against each other, at the map, and at the noise.
+
+Examples:
+  agv check drive.agvlog
+  agv check drive.agvlog --json
+
+Keys of --json: poor_share, damage, findings [what, next].";
+
+/// Say in plain words what is wrong with a drive, and what to type next
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Check {
+    /// The log.
+    log: PathBuf,
+    #[command(flatten)]
+    settings: SettingArguments,
+    /// Print one JSON object instead of sentences.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Result {
+    poor_share: f64,
+    damage: Vec<String>,
+    findings: Vec<Finding>,
+}
+
+impl Check {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let Contents { mut recording, damages, .. } = log::read_contents(&self.log, |_| ())?;
+        self.settings.apply(&mut recording.parameters)?;
+        let name = self.log.display().to_string();
+        let replay = replay(&recording, |_| ()).with_context(|| name.clone())?;
+        let figures = Figures::new(&recording, &replay, &Track::new(&recording, &replay));
+        let bar = progress::bar("looking", TRIES as u64);
+        let findings = check(&recording, &figures, &name, |done| bar.set_position(done as u64));
+        bar.finish_and_clear();
+        let poor_share = poor_share(&figures);
+        let damage: Vec<String> = damages.iter().map(ToString::to_string).collect();
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&Result { poor_share, damage, findings })?);
+            return Ok(());
+        }
+        println!("{:.1} % of the drive is lost, degraded, without odometry or not localised", 100.0 * poor_share);
+        damage.iter().for_each(|damage| println!("the log is damaged: {damage}"));
+        if findings.is_empty() {
+            println!("nothing is wrong with it");
+        }
+        for Finding { what, next } in &findings {
+            println!("{what}\n  next: {next}");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,61 @@
+//! Settings on a command line.
+
+use agv_core::localizer::Parameters;
+use agv_settings::leaf::{Leaf, LeafError};
+use agv_settings::{LEAVES, Settings};
+use anyhow::{Context, bail};
+
+use super::ctl::parse_value;
+use super::settings::show_number;
+
+/// Options of the commands that take settings.
+#[derive(clap::Args)]
+pub struct SettingArguments {
+    /// A setting as NAME=VALUE; `agv settings` shows the names.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    set: Vec<String>,
+}
+
+impl SettingArguments {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.set.is_empty()
+    }
+
+    /// Changes settings.
+    pub fn change(&self, settings: &mut Settings) -> anyhow::Result<()> {
+        self.set.iter().try_for_each(|text| change(settings, text))
+    }
+
+    /// Changes what the localiser believes.
+    pub fn apply(&self, parameters: &mut Parameters) -> anyhow::Result<()> {
+        let mut settings = Settings::of(*parameters);
+        self.change(&mut settings)?;
+        *parameters = settings.parameters;
+        Ok(())
+    }
+}
+
+fn change(settings: &mut Settings, text: &str) -> anyhow::Result<()> {
+    let (name, value) = text.split_once('=').with_context(|| format!("{text} is not NAME=VALUE"))?;
+    let leaf = named(name)?;
+    let like = leaf.get(settings).with_context(|| format!("the vehicle has no setting {name}"))?;
+    match leaf.set(settings, parse_value(name, value, like)?) {
+        Ok(()) => Ok(()),
+        Err(LeafError::Bounds) => {
+            let [least, most] = [leaf.bounds.0, leaf.bounds.1].map(show_number);
+            bail!("{name} must be from {least} to {most} {}, not {value}", leaf.unit)
+        }
+        Err(LeafError::Kind) => bail!("{value} is no value of {name}"),
+    }
+}
+
+/// The setting of that name; what comes near it is suggested if there is none.
+pub fn named(name: &str) -> anyhow::Result<&'static Leaf> {
+    Leaf::named(name).with_context(|| {
+        let near = LEAVES.iter().map(|leaf| (strsim::jaro_winkler(leaf.name, name), leaf.name));
+        let nearest = near.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(likeness, _)| *likeness > 0.7);
+        let suggestion = nearest.map_or_else(String::new, |(_, name)| format!("; did you mean {name}?"));
+        format!("there is no setting of the name {name}{suggestion}")
+    })
+}

@@ -1,0 +1,99 @@
+//! `agv settings`.
+
+use agv_host_sim::setting_meanings::meaning;
+use agv_settings::leaf::{Leaf, Value};
+use agv_settings::{LEAVES, Settings as Defaults};
+use serde_json::json;
+
+use super::ctl;
+use super::setting_arguments::named;
+
+const HELP: &str = "\
+Examples:
+  agv settings
+  agv settings laser
+  agv settings vehicle.wheelbase --json
+
+Keys of --json: name, unit, default, least, most, meaning; least and most are null for switches and addresses.";
+
+/// List all settings of a controller: unit, default, bounds and meaning
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Settings {
+    /// Show one setting, or those that begin with this room; all if absent.
+    name: Option<String>,
+    /// Print a JSON array instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Settings {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let leaves = self.wanted()?;
+        let defaults = Defaults::default();
+        if self.json {
+            let entries: Vec<_> = leaves.iter().map(|leaf| entry(leaf, &defaults)).collect();
+            println!("{}", serde_json::to_string_pretty(&entries)?);
+            return Ok(());
+        }
+        println!("{:<38} {:<10} {:>14} {:>12} {:>12}  meaning", "name", "unit", "default", "least", "greatest");
+        for leaf in leaves {
+            let [least, most] =
+                bounds(leaf, &defaults).map_or(["".to_owned(), "".to_owned()], |both| both.map(show_number));
+            let value = leaf.get(&defaults).map_or_else(String::new, show);
+            println!("{:<38} {:<10} {value:>14} {least:>12} {most:>12}  {}", leaf.name, leaf.unit, meaning(leaf.name));
+        }
+        Ok(())
+    }
+
+    fn wanted(&self) -> anyhow::Result<Vec<&'static Leaf>> {
+        let Some(name) = &self.name else { return Ok(LEAVES.iter().collect()) };
+        let room = format!("{}.", name.trim_end_matches('.'));
+        let of_room: Vec<_> = LEAVES.iter().filter(|leaf| leaf.name.starts_with(&room)).collect();
+        if of_room.is_empty() { Ok(vec![named(name)?]) } else { Ok(of_room) }
+    }
+}
+
+fn entry(leaf: &Leaf, defaults: &Defaults) -> serde_json::Value {
+    let bounds = bounds(leaf, defaults);
+    let default = match leaf.get(defaults) {
+        Some(Value::Number(number)) => json!(number),
+        Some(Value::Whole(whole)) => json!(whole),
+        Some(Value::Switch(is_on)) => json!(is_on),
+        Some(value @ Value::Address(_)) => json!(show(value)),
+        None => json!(null),
+    };
+    json!({
+        "name": leaf.name,
+        "unit": leaf.unit,
+        "default": default,
+        "least": bounds.map(|[least, _]| least),
+        "most": bounds.map(|[_, most]| most),
+        "meaning": meaning(leaf.name),
+    })
+}
+
+/// Bounds, if the setting is a number.
+fn bounds(leaf: &Leaf, defaults: &Defaults) -> Option<[f64; 2]> {
+    matches!(leaf.get(defaults), Some(Value::Number(_) | Value::Whole(_))).then_some([leaf.bounds.0, leaf.bounds.1])
+}
+
+/// A number with as many digits as people read.
+pub fn show_number(value: f64) -> String {
+    let size = value.abs();
+    let is_plain = value == 0.0 || (1e-3..1e6).contains(&size);
+    if !is_plain {
+        return format!("{value:.6e}").replace("000000e", "e").replace(".e", "e");
+    }
+    let text = format!("{value:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A value as people read it.
+fn show(value: Value) -> String {
+    match value {
+        Value::Number(number) => show_number(number),
+        other => ctl::show(other),
+    }
+}

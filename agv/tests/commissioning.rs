@@ -1,0 +1,159 @@
+//! The commands that a newcomer needs: check, accept, settings, and the noise.
+
+use std::path::Path;
+
+use agv_host_sim::log;
+use agv_host_sim::replay::replay;
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+
+use crate::support::{Files, agv, refusal, text};
+
+const HALL: &str = include_str!("../../host-sim/scenarios/warehouse_hall.toml");
+
+/// The hall's drive with what the localiser answered.
+fn hall(files: &Files) -> String {
+    let recording = simulate(&Scenario::parse(HALL).unwrap()).unwrap().recording;
+    let answers = replay(&recording, |_| ()).unwrap();
+    let path = files.path("hall.agvlog");
+    log::write_with_outputs(Path::new(&path), &recording, |event| answers.output(event)).unwrap();
+    path
+}
+
+fn json(arguments: &[&str]) -> (Option<i32>, serde_json::Value) {
+    let output = agv(arguments);
+    let value = serde_json::from_slice(&output.stdout);
+    (output.status.code(), value.unwrap_or_else(|_| panic!("{arguments:?}: {}", text(&output.stderr))))
+}
+
+fn verdict<'a>(result: &'a serde_json::Value, what: &str) -> &'a str {
+    let lines = result["lines"].as_array().unwrap();
+    let line = lines.iter().find(|line| line["what"].as_str().unwrap().starts_with(what));
+    line.unwrap_or_else(|| panic!("no {what}"))["verdict"].as_str().unwrap()
+}
+
+#[test]
+fn noise_that_is_measured_makes_the_filter_honest() {
+    let files = Files::new();
+    let log = hall(&files);
+    let (code, noise) = json(&["calibrate", "noise", &log, "--json"]);
+    assert_eq!(code, Some(0));
+    let sources = noise["sources"].as_array().unwrap();
+    assert!(!sources.is_empty());
+    for source in sources {
+        let check = source["check"]["mean"].as_f64().unwrap();
+        assert!((0.75..=1.25).contains(&check) && source["good"] == true, "{source}");
+    }
+    let settings = sources.iter().flat_map(|source| source["settings"].as_array().unwrap());
+    let options: Vec<String> =
+        settings.map(|setting| format!("--set={}={}", setting["name"].as_str().unwrap(), setting["after"])).collect();
+    let mut arguments = vec!["accept", &log, "--json"];
+    arguments.extend(options.iter().map(String::as_str));
+    let (_, result) = json(&arguments);
+    assert_eq!(verdict(&result, "the filter is honest"), "pass", "{result}");
+    // The vehicle ran with other settings, so its outputs cannot be compared.
+    assert_eq!(verdict(&result, "the same bits"), "not_measured");
+}
+
+#[test]
+fn an_acceptance_tells_what_was_not_measured_by_its_code() {
+    let files = Files::new();
+    let log = hall(&files);
+    let (code, result) = json(&["accept", &log, "--json"]);
+    assert_eq!((verdict(&result, "the same bits"), verdict(&result, "repeatable")), ("pass", "not_measured"));
+    let is_failed = result["lines"].as_array().unwrap().iter().any(|line| line["verdict"] == "fail");
+    assert_eq!(code, Some(if is_failed { 3 } else { 4 }));
+    let halts = |reading: &str| format!("along_mm,across_mm,heading_deg\n{}", format!("{reading}\n").repeat(10));
+    let file = files.write("halts.csv", halts("1,2,0.01").as_bytes());
+    let (_, result) = json(&["accept", &log, "--halts", &file, "--json"]);
+    assert_eq!(verdict(&result, "repeatable"), "pass");
+    let bad = files.write("bad.csv", b"along_mm,across_mm,heading_deg\n1,2\n");
+    assert!(refusal(&["accept", &log, "--halts", &bad]).contains("bad.csv:2:"));
+}
+
+#[test]
+fn a_check_names_what_was_planted() {
+    let files = Files::new();
+    let plan = files.path("plan.toml");
+    let made =
+        agv(&["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "200", "--scenario", &plan]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let plan = std::fs::read_to_string(&plan).unwrap();
+    for (mistake, named) in [
+        ("drive_reversed", "drive counter counts the wrong way"),
+        ("steering_reversed", "steering counter counts the wrong way"),
+        ("encoders_swapped", "encoders are exchanged"),
+    ] {
+        let mut scenario = Scenario::parse(&plan).unwrap();
+        let truth = &mut scenario.vehicle.truth;
+        match mistake {
+            "drive_reversed" => truth.drive_reversed = true,
+            "steering_reversed" => truth.steering_reversed = true,
+            _ => truth.encoders_swapped = true,
+        }
+        scenario.laser.scans = false;
+        let recording = simulate(&scenario).unwrap().recording;
+        let log = files.path(&format!("{mistake}.agvlog"));
+        log::write(Path::new(&log), &recording).unwrap();
+        let (code, result) = json(&["check", &log, "--json"]);
+        assert_eq!(code, Some(0));
+        let what: String = result["findings"].to_string();
+        assert!(what.contains(named), "{mistake}: {what}");
+        let complaint = refusal(&["calibrate", &log]);
+        assert!(complaint.contains(named), "{complaint}");
+        if mistake == "encoders_swapped" {
+            continue;
+        }
+        // What is mended stays mended: the file carries the sign.
+        assert!(complaint.contains("--mend"), "{complaint}");
+        let vehicle = files.path("vehicle.toml");
+        let mended = agv(&["calibrate", &log, "--mend", "--apply", &vehicle]);
+        assert!(mended.status.success(), "{}", text(&mended.stderr));
+        let (_, replayed) = json(&["replay", &log, "--vehicle", &vehicle, "--json"]);
+        let lost = replayed["modes"].as_array().unwrap().iter().any(|mode| mode["mode"] == "lost");
+        assert!(!lost && replayed["accuracy"]["position_mm"]["p95"].as_f64().unwrap() < 100.0, "{mistake}: {replayed}");
+    }
+}
+
+#[test]
+fn settings_are_listed_and_names_are_suggested() {
+    let files = Files::new();
+    let (_, all) = json(&["settings", "--json"]);
+    for setting in all.as_array().unwrap() {
+        assert!(setting["meaning"].as_str().unwrap().len() > 5, "{setting}");
+    }
+    let (_, one) = json(&["settings", "vehicle.wheelbase", "--json"]);
+    assert_eq!((&one[0]["unit"], &one[0]["least"]), (&"m".into(), &0.05.into()));
+    assert!(refusal(&["settings", "vehicle.wheelbse"]).contains("did you mean vehicle.wheelbase?"));
+    let key = files.write("agv.key", "0".repeat(64).as_bytes());
+    let flash = files.path("flash.bin");
+    let wrong = ["provision", "--key", &key, "--output", &flash, "--set", "laser.teta=1"];
+    assert!(refusal(&wrong).contains("did you mean laser.theta?"));
+    let asked = agv(&[
+        "provision",
+        "--key",
+        &key,
+        "--output",
+        &flash,
+        "--set",
+        "vehicle.wheelbase=30",
+        "--set",
+        "laser.theta=3.0",
+    ]);
+    assert!(asked.status.success());
+    let questions = text(&asked.stderr);
+    assert!(questions.contains("vehicle.wheelbase is 30 m") && questions.contains("171.9 deg"), "{questions}");
+    let said = text(&asked.stdout);
+    assert!(said.contains("vehicle.wheelbase") && said.contains("landmarks") && said.contains("flash.bin"), "{said}");
+}
+
+#[test]
+fn the_pages_of_man_are_written() {
+    let files = Files::new();
+    let output = agv(&["manual", "--output", &files.path("man1")]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    for name in ["agv.1", "agv-replay.1", "agv-nav350-layout-download.1"] {
+        let page = std::fs::read_to_string(files.path(&format!("man1/{name}"))).unwrap();
+        assert!(page.contains(".TH") && page.contains("SYNOPSIS"), "{name}");
+    }
+}

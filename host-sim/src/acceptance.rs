@@ -1,0 +1,225 @@
+//! The acceptance test of a vehicle: one replayed drive, and halts that somebody has measured, line by line.
+
+use std::path::Path;
+
+use agv_core::localizer::Mode;
+use agv_core::maps::{Landmark, LandmarkKind};
+use serde::Serialize;
+
+use crate::drive::{Figures, kind_name, mode_name};
+use crate::replay::Comparison;
+use crate::text_file::{self, TextFileError};
+
+/// How a line ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// It is as it must be.
+    Pass,
+    /// It is not.
+    Fail,
+    /// There was nothing to compare, or too little.
+    NotMeasured,
+}
+
+/// One line of the test.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Line {
+    /// What is looked at.
+    pub what: String,
+    /// How it ended.
+    pub verdict: Verdict,
+    /// What was found.
+    pub found: String,
+    /// What must be.
+    pub must_be: &'static str,
+}
+
+/// Observations of a kind below which nothing is said of them.
+const FEWEST_OBSERVATIONS: usize = 100;
+/// Mean normalised squares of an honest filter; 2 is expected.
+const HONEST: std::ops::RangeInclusive<f64> = 1.0..=3.0;
+/// Share of the accepted among accepted and gated.
+const ACCEPTED: f64 = 0.9;
+/// Halts that are measured at least.
+const FEWEST_HALTS: usize = 10;
+/// Farthest that a halt is from the mean of all, mm and deg.
+const HALT: [f64; 2] = [20.0, 0.1];
+
+/// Modes that no drive of an accepted vehicle has.
+const BAD: [Mode; 3] = [Mode::Lost, Mode::Degraded, Mode::WithoutOdometry];
+
+/// Where a vehicle has halted, by a ruler: along its way and across, mm, and its heading, deg.
+pub type Halt = [f64; 3];
+
+/// First line of a file of halts.
+pub const HALTS: &str = "along_mm,across_mm,heading_deg";
+
+/// Reads halts, one a line.
+///
+/// # Errors
+/// See [`TextFileError`].
+pub fn read_halts(path: &Path) -> Result<Vec<Halt>, TextFileError> {
+    let text = text_file::read(path, "a table of halts")?;
+    let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
+    if lines.next().is_none_or(|(_, first)| first.trim() != HALTS) {
+        return Err(TextFileError::of_line(path, 1, format!("the first line must be {HALTS}")));
+    }
+    lines
+        .map(|(number, line)| {
+            halt(line).ok_or_else(|| TextFileError::of_line(path, number, "three numbers are wanted"))
+        })
+        .collect()
+}
+
+fn halt(line: &str) -> Option<Halt> {
+    let numbers: Option<Vec<f64>> =
+        line.split(',').map(|field| field.trim().parse().ok().filter(|number: &f64| number.is_finite())).collect();
+    numbers?.try_into().ok()
+}
+
+/// All lines of the test of a vehicle with a `map`: of kinds that are not in it nothing is asked.
+#[must_use]
+pub fn test(figures: &Figures, map: &[Landmark], outputs: Option<Comparison>, halts: &[Halt]) -> Vec<Line> {
+    let mut lines = vec![same_bits(outputs), never_lost(figures)];
+    lines.extend(honest(figures, map));
+    lines.extend(fitting(figures, map));
+    lines.push(repeatable(halts));
+    lines
+}
+
+fn verdict(is_good: bool) -> Verdict {
+    if is_good { Verdict::Pass } else { Verdict::Fail }
+}
+
+fn is_mapped(map: &[Landmark], kind: LandmarkKind) -> bool {
+    map.iter().any(|landmark| landmark.kind == kind)
+}
+
+fn same_bits(outputs: Option<Comparison>) -> Line {
+    let (verdict, found) = match outputs {
+        Some(Comparison { compared: 0, .. }) | None => {
+            (Verdict::NotMeasured, "the log holds no outputs of the vehicle".to_owned())
+        }
+        Some(Comparison { compared, first_difference: None }) => {
+            (Verdict::Pass, format!("{compared} outputs are equal, bit for bit"))
+        }
+        Some(Comparison { first_difference: Some(event), .. }) => {
+            (Verdict::Fail, format!("the outputs differ, first at event {event}"))
+        }
+    };
+    Line { what: "the same bits".to_owned(), verdict, found, must_be: "no difference" }
+}
+
+fn never_lost(figures: &Figures) -> Line {
+    let bad = figures.modes.iter().filter(|time| BAD.contains(&time.mode));
+    let bad: Vec<String> = bad.map(|time| format!("{} for {:.1} s", mode_name(time.mode), time.duration_s)).collect();
+    let (verdict, found) = if figures.poses == 0 {
+        (Verdict::NotMeasured, "the vehicle was never localised".to_owned())
+    } else if bad.is_empty() {
+        (Verdict::Pass, format!("{} poses, {:.0} m", figures.poses, figures.way_m))
+    } else {
+        (Verdict::Fail, bad.join(", "))
+    };
+    Line { what: "never lost".to_owned(), verdict, found, must_be: "never lost, degraded or without odometry" }
+}
+
+fn honest(figures: &Figures, map: &[Landmark]) -> Vec<Line> {
+    let accepted =
+        |kind| figures.observations.iter().find(|counts| counts.kind == kind).map_or(0, |counts| counts.accepted);
+    let mapped = figures.innovations.iter().filter(|innovations| is_mapped(map, innovations.kind));
+    let lines = mapped.map(|innovations| {
+        let (count, square) = (accepted(innovations.kind), innovations.mean_normalised_square);
+        let is_enough = count >= FEWEST_OBSERVATIONS && square.is_finite();
+        Line {
+            what: format!("the filter is honest: {}", kind_name(innovations.kind)),
+            verdict: if is_enough { verdict(HONEST.contains(&square)) } else { Verdict::NotMeasured },
+            found: format!("{square:.2} of {count}"),
+            must_be: "1 to 3; 2 is expected",
+        }
+    });
+    or_nothing(lines.collect(), "the filter is honest", "1 to 3; 2 is expected")
+}
+
+fn fitting(figures: &Figures, map: &[Landmark]) -> Vec<Line> {
+    let lines = figures.observations.iter().filter(|counts| is_mapped(map, counts.kind)).map(|counts| {
+        let all = counts.accepted + counts.gated;
+        let share = counts.accepted as f64 / all.max(1) as f64;
+        Line {
+            what: format!("landmarks are where the map says: {}", kind_name(counts.kind)),
+            verdict: if all >= FEWEST_OBSERVATIONS { verdict(share >= ACCEPTED) } else { Verdict::NotMeasured },
+            found: format!("{} accepted, {} gated", counts.accepted, counts.gated),
+            must_be: "at least 9 of 10 accepted",
+        }
+    });
+    or_nothing(lines.collect(), "landmarks are where the map says", "at least 9 of 10 accepted")
+}
+
+/// A line that says that there was nothing, where there was nothing.
+fn or_nothing(lines: Vec<Line>, what: &str, must_be: &'static str) -> Vec<Line> {
+    if !lines.is_empty() {
+        return lines;
+    }
+    let found = "nothing was observed".to_owned();
+    vec![Line { what: what.to_owned(), verdict: Verdict::NotMeasured, found, must_be }]
+}
+
+fn repeatable(halts: &[Halt]) -> Line {
+    let mean = |index: usize| halts.iter().map(|halt| halt[index]).sum::<f64>() / halts.len().max(1) as f64;
+    let [along, across, heading] = [0, 1, 2].map(mean);
+    let farthest = halts.iter().map(|halt| (halt[0] - along).hypot(halt[1] - across)).fold(0.0, f64::max);
+    let turned = halts.iter().map(|halt| (halt[2] - heading).abs()).fold(0.0, f64::max);
+    let (verdict, found) = if halts.len() < FEWEST_HALTS {
+        (Verdict::NotMeasured, format!("{} of {FEWEST_HALTS} halts are measured", halts.len()))
+    } else {
+        let is_good = farthest <= HALT[0] && turned <= HALT[1];
+        (verdict(is_good), format!("{} halts within {farthest:.1} mm and {turned:.3} deg of their mean", halts.len()))
+    };
+    Line { what: "repeatable".to_owned(), verdict, found, must_be: "ten halts within 20 mm and 0.1 deg" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive of which nothing is known.
+    fn nothing() -> Figures {
+        Figures {
+            duration_s: 0.0,
+            way_m: 0.0,
+            events: 0,
+            poses: 0,
+            realtime_factor: 0.0,
+            modes: Vec::new(),
+            mode_changes: Vec::new(),
+            observations: Vec::new(),
+            innovations: Vec::new(),
+            accuracy: None,
+        }
+    }
+
+    #[test]
+    fn what_was_not_compared_never_passes() {
+        for outputs in [None, Some(Comparison { compared: 0, first_difference: None })] {
+            for halts in [&[][..], &[[0.0; 3]; 9]] {
+                let lines = test(&nothing(), &[], outputs, halts);
+                assert_eq!(lines.len(), 5);
+                assert!(lines.iter().all(|line| line.verdict == Verdict::NotMeasured), "{lines:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn halts_are_compared_with_their_mean() {
+        let mut halts = [[5.0, -3.0, 0.2]; 10];
+        assert_eq!(repeatable(&halts).verdict, Verdict::Pass);
+        // The mean moves by a tenth of what one halt does.
+        halts[0][0] += 21.0;
+        assert_eq!(repeatable(&halts).verdict, Verdict::Pass);
+        halts[0][0] += 2.0;
+        assert_eq!(repeatable(&halts).verdict, Verdict::Fail);
+        let mut turned = [[0.0; 3]; 10];
+        turned[3][2] = 0.12;
+        assert_eq!(repeatable(&turned).verdict, Verdict::Fail);
+    }
+}

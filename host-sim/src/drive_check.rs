@@ -1,0 +1,194 @@
+//! What is wrong with a drive that is lost or poor, and what to do next: findings in the order in which they are to be looked at.
+
+use agv_core::localizer::Mode;
+use agv_core::measurement::Time;
+use serde::Serialize;
+
+use crate::calibrate::causes::{Cause, Explanation, explain};
+use crate::calibrate::innovation_noise::HONEST;
+use crate::calibrate::log_input::LogInput;
+use crate::drive::{Figures, kind_name};
+use crate::recording::{RecordedEvent, Recording};
+use crate::replay::{StartSearchError, find_start};
+
+/// Something that is wrong, or that could not be looked at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// In plain words.
+    pub what: String,
+    /// The command to type, or what to do.
+    pub next: String,
+}
+
+impl Finding {
+    fn new(what: impl Into<String>, next: impl Into<String>) -> Self {
+        Self { what: what.into(), next: next.into() }
+    }
+}
+
+/// Share of a drive in modes that no good drive has, from which on it is poor.
+pub const POOR: f64 = 0.02;
+/// Share that must fit the map.
+const ACCEPTED: f64 = 0.9;
+/// Observations below which nothing is said of them.
+const FEWEST: usize = 100;
+/// Longest gap of the encoders that the localiser bridges, s.
+const LONGEST_GAP: f64 = 0.1;
+
+/// Share of a drive's time that is lost, degraded, without odometry, or not localised at all.
+#[must_use]
+pub fn poor_share(figures: &Figures) -> f64 {
+    let bad = [Mode::Lost, Mode::Degraded, Mode::WithoutOdometry, Mode::NotLocalised];
+    let all: f64 = figures.modes.iter().map(|mode| mode.duration_s).sum();
+    let poor: f64 = figures.modes.iter().filter(|mode| bad.contains(&mode.mode)).map(|mode| mode.duration_s).sum();
+    // The sum of nothing is a negative zero.
+    if all > 0.0 { poor / all + 0.0 } else { 1.0 }
+}
+
+/// Everything that there is to say of a drive. `log` is how the commands name it; `progress` is called as by [`explain`].
+#[must_use]
+pub fn check(recording: &Recording, figures: &Figures, log: &str, progress: impl FnMut(usize)) -> Vec<Finding> {
+    let mut findings = what_is_missing(recording, log);
+    findings.extend(timing(recording, log));
+    let is_poor = poor_share(figures) > POOR;
+    let explanations = explain(&LogInput::of(recording), progress);
+    if is_poor || !explanations.is_empty() {
+        findings.extend(mistakes(&explanations, log));
+    }
+    let is_sound = explanations.iter().any(|explanation| explanation.causes.is_empty());
+    if is_poor {
+        findings.extend(place(recording, log));
+    }
+    findings.extend(map(recording, figures, is_sound, log));
+    findings.extend(noise(figures, log));
+    if is_poor && findings.is_empty() {
+        findings.push(Finding::new(
+            format!(
+                "{:.0} % of the drive is poor, and nothing of what is looked at is the reason",
+                100.0 * poor_share(figures)
+            ),
+            format!("agv view {log}"),
+        ));
+    }
+    findings
+}
+
+fn what_is_missing(recording: &Recording, log: &str) -> Vec<Finding> {
+    let has = |is: fn(&RecordedEvent) -> bool| recording.events.iter().any(is);
+    let mut findings = Vec::new();
+    let has_odometry = has(|event| {
+        matches!(event, RecordedEvent::Encoders(_) | RecordedEvent::Speed(_) | RecordedEvent::Increment(_))
+    });
+    if !has_odometry {
+        findings.push(Finding::new(
+            "the log has no odometry",
+            "look at the encoders on the bus: agv can monitor can0; state their nodes with --drive and --steering",
+        ));
+    }
+    if !has(|event| matches!(event, RecordedEvent::Scan(_) | RecordedEvent::Reflectors(_))) {
+        findings.push(Finding::new("the laser says nothing in this log", "agv nav350 probe HOST"));
+    }
+    if !has(|event| matches!(event, RecordedEvent::SetPose(_))) {
+        findings.push(Finding::new(
+            "nobody has told the vehicle where it starts",
+            format!("agv replay {log} --relocalise reflectors, or --start X,Y,HEADING"),
+        ));
+    }
+    if recording.landmarks.is_empty() {
+        findings
+            .push(Finding::new("the log has no map", format!("agv replay {log} --map MAP, or --landmarks dynamic")));
+    }
+    findings
+}
+
+/// Gaps of the encoders, and scans that do not come in their turn.
+fn timing(recording: &Recording, log: &str) -> Option<Finding> {
+    let encoders = recording.events.iter().filter(|event| matches!(event, RecordedEvent::Encoders(_)));
+    let times: Vec<Time> = encoders.filter_map(RecordedEvent::time).collect();
+    let gaps = || times.windows(2).map(|pair| (pair[0], pair[1].since(pair[0])));
+    let back = gaps().filter(|(_, gap)| *gap < 0.0).count();
+    let long = gaps().filter(|(_, gap)| *gap > LONGEST_GAP).count();
+    if back + long == 0 {
+        return None;
+    }
+    let longest = gaps().map(|(_, gap)| gap).fold(0.0, f64::max);
+    Some(Finding::new(
+        format!("the encoders leave {long} gaps, the longest of {longest:.2} s, and go back in time {back} times"),
+        format!("look at the bus and its load: agv view {log}"),
+    ))
+}
+
+fn mistakes(explanations: &[Explanation], log: &str) -> Vec<Finding> {
+    if explanations.is_empty() {
+        return vec![Finding::new(
+            "the drive does not tell whether encoders and laser agree: it has too few arcs or reflectors for that",
+            "agv calibrate plan --area 14x11, drive that, and check its log",
+        )];
+    }
+    if explanations.iter().any(|explanation| explanation.causes.is_empty()) {
+        return Vec::new();
+    }
+    let together = |causes: &[Cause]| causes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
+    let what: Vec<String> = explanations.iter().map(|explanation| together(&explanation.causes)).collect();
+    let mut next: Vec<String> = Vec::new();
+    for cause in explanations.iter().flat_map(|explanation| &explanation.causes) {
+        let remedy = cause.remedy().replace("LOG", log);
+        if !next.contains(&remedy) {
+            next.push(remedy);
+        }
+    }
+    vec![Finding::new(what.join("; or: "), next.join("; or: "))]
+}
+
+/// Whether the vehicle would find itself in the map by its first revolutions.
+fn place(recording: &Recording, log: &str) -> Option<Finding> {
+    let is_reflectors = |event: &RecordedEvent| matches!(event, RecordedEvent::Reflectors(_));
+    let places = recording.events.iter().enumerate().filter(|(_, event)| is_reflectors(event));
+    let end = places.map(|(index, _)| index).nth(REVOLUTIONS - 1)?;
+    let first = Recording { events: recording.events[..=end].to_vec(), ..recording.clone() };
+    match find_start(&first) {
+        Err(StartSearchError::Unknown) => Some(Finding::new(
+            "no place of the map looks like what is seen: it is the map of another place, or the reflectors were moved",
+            format!("agv map {log} --output new.csv, and compare it with the map"),
+        )),
+        Err(StartSearchError::Ambiguous) => Some(Finding::new(
+            "two places of the map look like what is seen",
+            "agv layout check MAP says where a reflector more would tell them apart",
+        )),
+        _ => None,
+    }
+}
+
+/// Revolutions by which a vehicle would have found itself.
+const REVOLUTIONS: usize = 40;
+
+fn map(recording: &Recording, figures: &Figures, is_sound: bool, log: &str) -> Vec<Finding> {
+    let is_mapped = |kind| recording.landmarks.iter().any(|landmark| landmark.kind == kind);
+    let counted = figures.observations.iter().filter(|counts| is_mapped(counts.kind)).filter_map(|counts| {
+        let all = counts.accepted + counts.gated + counts.unknown + counts.ambiguous;
+        let share = counts.accepted as f64 / all.max(1) as f64;
+        (all >= FEWEST && share < ACCEPTED).then_some((counts.kind, share))
+    });
+    let words = counted.map(|(kind, share)| {
+        let what = format!("{:.0} % of what is seen of {} is in the map", 100.0 * share, kind_name(kind));
+        let next = if is_sound && share < 0.5 {
+            format!("the map may be of another place, or the start is wrong: agv replay {log} --relocalise reflectors")
+        } else {
+            format!("agv map {log} --output new.csv, and compare")
+        };
+        Finding::new(what, next)
+    });
+    words.collect()
+}
+
+fn noise(figures: &Figures, log: &str) -> Option<Finding> {
+    let off = figures.innovations.iter().filter(|seen| !HONEST.contains(&(0.5 * seen.mean_normalised_square)));
+    let words: Vec<String> =
+        off.map(|seen| format!("{} {:.2}", kind_name(seen.kind), 0.5 * seen.mean_normalised_square)).collect();
+    (!words.is_empty()).then(|| {
+        Finding::new(
+            format!("innovations are not what the filter expects (1 is expected): {}", words.join(", ")),
+            format!("agv calibrate noise {log}"),
+        )
+    })
+}
