@@ -144,8 +144,8 @@ impl Problem<'_> {
                 let arm = if row == 2 { HEADING_ARM } else { 1.0 };
                 linearised.residuals.push(arm * value);
                 let mut line = vec![0.0; self.priors.len()];
-                for column in 0..count {
-                    line[column] = arm * residual.by_unknowns[(row, column)] * self.priors[column];
+                for (column, (entry, prior)) in line.iter_mut().zip(&self.priors).take(count).enumerate() {
+                    *entry = arm * residual.by_unknowns[(row, column)] * prior;
                 }
                 for index in (0..2).filter(|_| self.clocks) {
                     let column = count + 2 * window.drive + index;

@@ -33,6 +33,7 @@ pub struct LinearisedPath {
 
 /// Only the relation between both slips weighs: redundant wheels are believed alike.
 const NOISE: OdometryNoise = OdometryNoise {
+    turn: 0.0,
     speed: 0.0,
     steering: 0.0,
     slip: 1e-3,
