@@ -19,8 +19,8 @@ pub const EVENTS: usize = 64;
 /// Events of the bus, in order.
 pub static BUS_EVENTS: Channel<CriticalSectionRawMutex, Told, EVENTS> = Channel::new();
 
-/// Published poses that wait for the log: those of a revolution, which takes the localiser longest.
-const PUBLISHED_POSES: usize = 8;
+/// Published poses that wait for the log. Of a revolution that takes the localiser longer than this, some are left out.
+const PUBLISHED_POSES: usize = 6;
 
 /// What the bus has published, for the log.
 static PUBLISHED: Channel<CriticalSectionRawMutex, PublishedPose, PUBLISHED_POSES> = Channel::new();
