@@ -88,8 +88,9 @@ impl Bus {
 
     /// The localiser has said something.
     pub fn update(&mut self, estimate: &Estimate) {
-        // Only the search may have got further.
-        if core::mem::replace(&mut self.progress.answered, estimate.answered) != estimate.answered {
+        // Only the search may have got further. Before the first answer a vehicle without a pose is published.
+        let is_first = self.predictor.output().is_none();
+        if core::mem::replace(&mut self.progress.answered, estimate.answered) != estimate.answered || is_first {
             self.predictor.update(&estimate.pose, &estimate.bias);
         }
         self.relocalization = estimate.relocalization;

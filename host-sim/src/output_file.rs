@@ -24,7 +24,11 @@ impl OutputFile {
     /// # Errors
     /// If there is no such folder, nothing can be written there, or the older file must not be written.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let (path, has_name) = path.canonicalize().map_or_else(|_| (path.to_owned(), false), |path| (path, true));
+        // What is open and has no name any more, or never had one, has none to take.
+        if !has_name && path.metadata().is_ok() {
+            return File::create(&path).map(Self::direct);
+        }
         let old = match path.metadata() {
             Ok(old) if old.is_file() => {
                 OpenOptions::new().write(true).open(&path)?;

@@ -83,3 +83,17 @@ fn a_file_that_takes_its_name_early_sets_the_older_one_aside() {
         }
     }
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_open_file_without_a_name_is_written_where_it_is() {
+    use std::io::{Read, Seek, SeekFrom};
+    use std::os::fd::AsRawFd;
+    let mut open = tempfile::tempfile().unwrap();
+    let path = std::path::PathBuf::from(format!("/dev/fd/{}", open.as_raw_fd()));
+    output_file::write(&path, "result").unwrap();
+    let mut text = String::new();
+    open.seek(SeekFrom::Start(0)).unwrap();
+    open.read_to_string(&mut text).unwrap();
+    assert_eq!(text, "result");
+}

@@ -29,7 +29,7 @@ struct House {
 const HOUSES: [House; 7] = [
     House {
         folder: "controller",
-        floors: &[&["encoders", "laser", "localization", "standstill"], &["bus"], &["controller"]],
+        floors: &[&["encoders", "laser", "standstill"], &["progress"], &["localization"], &["bus"], &["controller"]],
     },
     House {
         folder: "core",
@@ -60,10 +60,24 @@ const HOUSES: [House; 7] = [
     House {
         folder: "host-sim",
         floors: &[
-            &["bus", "data", "file_kind", "hdl64e_packets", "left_out", "link", "provision", "recording", "report"],
+            &[
+                "bus",
+                "data",
+                "file_kind",
+                "hdl64e_packets",
+                "left_out",
+                "link",
+                "output_file",
+                "provision",
+                "recording",
+                "setting_doubts",
+                "setting_meanings",
+            ],
+            &["report"],
             &["accuracy", "log", "replay", "ros", "text_file"],
             &["drive", "simulate"],
-            &["calibrate", "import", "layout_check"],
+            &["acceptance", "calibrate", "layout_check"],
+            &["drive_check", "import"],
             &["export", "lidar3d", "live", "places"],
             &["mapping", "view"],
             &["layout_file"],
@@ -71,7 +85,7 @@ const HOUSES: [House; 7] = [
             &["emulate"],
         ],
     },
-    House { folder: "lab", floors: &[&["campaign"], &["evaluate"]] },
+    House { folder: "lab", floors: &[&["campaign"], &["evaluate", "trust"]] },
 ];
 
 /// Rust sources under a folder, as paths relative to it.

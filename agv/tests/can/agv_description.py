@@ -13,7 +13,7 @@ objects = canopen.import_od(sys.argv[2], node_id=16)
 # Every message must be a PDO of the object dictionary, with the same identifier.
 pdos = {}
 for communication, mapping in [(0x1800, 0x1A00), (0x1400, 0x1600)]:
-    for number in range(4):
+    for number in range(5):
         if communication + number in objects:
             entry = objects[mapping + number][1].default
             assert entry & 0xFF == 64, hex(entry)

@@ -20,7 +20,7 @@ pub const EVENTS: usize = 64;
 pub static BUS_EVENTS: Channel<CriticalSectionRawMutex, Told, EVENTS> = Channel::new();
 
 /// Published poses that wait for the log. Of a revolution that takes the localiser longer than this, some are left out.
-const PUBLISHED_POSES: usize = 6;
+const PUBLISHED_POSES: usize = 5;
 
 /// What the bus has published, for the log.
 static PUBLISHED: Channel<CriticalSectionRawMutex, PublishedPose, PUBLISHED_POSES> = Channel::new();

@@ -21,6 +21,8 @@ use crate::recording::{RecordedEvent, Recording};
 /// What the localiser said of a whole recording.
 #[derive(Clone, Debug, Default)]
 pub struct Replay {
+    /// The pose, and what was known of the odometry, before the first event.
+    pub start: Option<(PoseOutput, OdometryBias)>,
     /// The pose after each event.
     pub poses: Vec<PoseOutput>,
     /// What had been learnt of the odometry after each event.
@@ -79,7 +81,8 @@ pub fn replay_aided(
         MapError::Full => ReplayError::MapTooLarge,
         MapError::NotFinite => ReplayError::MapNotFinite,
     })?;
-    let mut replay = Replay { poses: Vec::with_capacity(recording.events.len()), ..Replay::default() };
+    let start = Some((localizer.outputs().pose, localizer.odometry_bias()));
+    let mut replay = Replay { start, poses: Vec::with_capacity(recording.events.len()), ..Replay::default() };
     let start = Instant::now();
     for (index, event) in recording.events.iter().enumerate() {
         let outputs = localizer.handle(&event.view());

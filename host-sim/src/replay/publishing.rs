@@ -69,11 +69,14 @@ impl<'a> Publisher<'a> {
 
     fn take_answer(&mut self, events: usize, behind: u32) {
         let answered = events.saturating_sub(behind as usize);
-        if answered != self.answered
-            && let Some(answer) = answered.checked_sub(1)
-        {
-            self.answered = answered;
+        if self.predictor.output().is_some() && answered == self.answered {
+            return;
+        }
+        self.answered = answered;
+        if let Some(answer) = answered.checked_sub(1) {
             self.predictor.update(&self.replay.poses[answer], &self.replay.biases[answer]);
+        } else if let Some((pose, bias)) = &self.replay.start {
+            self.predictor.update(pose, bias);
         }
     }
 }
