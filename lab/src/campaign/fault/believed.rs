@@ -56,9 +56,8 @@ impl Fault {
                 }
             }
             FaultKind::LayoutStretched { share } => {
-                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.x));
                 for landmark in &mut recording.landmarks {
-                    landmark.x += share * (landmark.x - middle);
+                    landmark.x *= 1.0 + share;
                 }
             }
             FaultKind::MountingWrong { deg, x, y } => {
