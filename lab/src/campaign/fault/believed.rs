@@ -56,8 +56,9 @@ impl Fault {
                 }
             }
             FaultKind::LayoutStretched { share } => {
+                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.x));
                 for landmark in &mut recording.landmarks {
-                    landmark.x *= 1.0 + share;
+                    landmark.x += share * (landmark.x - middle);
                 }
             }
             FaultKind::MountingWrong { deg, x, y } => {
