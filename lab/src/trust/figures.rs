@@ -11,8 +11,6 @@ use agv_host_sim::accuracy::Spread;
 pub struct OfKind {
     /// The kind.
     pub kind: String,
-    /// A, B or C; none as long as nobody has assigned it.
-    pub class: Option<String>,
     /// Its worst size, and what it is in.
     pub worst_size: f64,
     /// What sizes are in.
@@ -82,8 +80,6 @@ pub struct Figures {
     pub error_over_pl_max: f64,
     /// Time to the first claim without faults: 95 % mark and worst, s.
     pub first_claim_s: [f64; 2],
-    /// Kinds that cannot be found.
-    pub class_c: Vec<String>,
     /// First and last seed.
     pub seeds: [u64; 2],
     /// Each kind at its worst size, worst first.
@@ -142,7 +138,6 @@ pub fn figures(rows: &[Row], units: impl Fn(&str) -> String) -> Figures {
         pl_nominal_deg: mark(&accepted, |outcome| &outcome.nominal_cdeg).map(|hundredths| 0.01 * hundredths),
         error_over_pl_max: sound.most(|outcome| outcome.most_over_level),
         first_claim_s: [first_claims.p95, first_claims.max],
-        class_c: Vec::new(),
         seeds: [seeds.clone().min().unwrap_or_default(), seeds.max().unwrap_or_default()],
         per_fault: per_fault(rows, units),
     }
@@ -179,7 +174,6 @@ fn per_fault(rows: &[Row], units: impl Fn(&str) -> String) -> Vec<OfKind> {
         let over = of.most(|outcome| outcome.most_over_level);
         Some(OfKind {
             kind: name.to_owned(),
-            class: None,
             worst_size: worst,
             unit: units(name),
             runs,

@@ -120,7 +120,6 @@ impl Judge {
         let mut is_right = false;
         if let Some((errors, level)) = judged {
             outcome.claims += 1;
-            outcome.add_to_diagram(errors.position, level.position);
             if moment.is_nominal {
                 outcome.add_nominal(&level);
             }

@@ -5,11 +5,6 @@ use std::collections::BTreeMap;
 use agv_core::integrity::ProtectionLevel;
 use serde::{Deserialize, Serialize};
 
-/// Width of a cell of the diagram of error against protection level, m.
-pub const CELL: f64 = 0.01;
-/// Cells an axis; the last one holds all that is larger.
-pub const CELLS: usize = 41;
-
 /// What became of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
@@ -51,27 +46,13 @@ pub struct Outcome {
     pub nominal_cdeg: BTreeMap<u32, u64>,
     /// Whether the last 5 s are claims with the error within the protection level, and that within the alert limit.
     pub ends_right: bool,
-    /// Claims by position error (first) and protection level of the position, in cells; only those that are not empty.
-    pub diagram: BTreeMap<u16, u64>,
 }
 
 impl Outcome {
-    /// Counts a claim in the diagram.
-    pub(super) fn add_to_diagram(&mut self, error: f64, level: f64) {
-        let cell = |value: f64| ((value / CELL) as usize).min(CELLS - 1);
-        *self.diagram.entry((cell(error) * CELLS + cell(level)) as u16).or_default() += 1;
-    }
-
     /// Counts a protection level with enough in sight.
     pub(super) fn add_nominal(&mut self, level: &ProtectionLevel) {
         let cell = |value: f64| value.ceil().clamp(0.0, f64::from(u32::MAX)) as u32;
         *self.nominal_mm.entry(cell(1e3 * level.position - 1e-6)).or_default() += 1;
         *self.nominal_cdeg.entry(cell(100.0 * level.heading.to_degrees() - 1e-6)).or_default() += 1;
-    }
-
-    /// Distance driven, m.
-    #[must_use]
-    pub fn driven(&self) -> f64 {
-        self.driven_um as f64 * 1e-6
     }
 }

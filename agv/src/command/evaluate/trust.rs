@@ -49,7 +49,7 @@ Examples:
 Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
 continuity_per_100km, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
-[95 %, worst], class_c, seeds [first, last], per_fault [kind, class, worst_size, unit, runs, failures, bound, worst_seed,
+[95 %, worst], seeds [first, last], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, error_over_pl_max, share_claimed].";
 
 impl Trust {
