@@ -19,7 +19,7 @@ fn output(time: Time, x: f64, mode: Mode) -> PoseOutput {
         dead_reckoning_distance: 0.0,
         correction: 0.0,
         smooth: Pose::default(),
-        drift: [0.0; 2],
+        level: agv_core::integrity::ProtectionLevel { position: 0.06, heading: 0.02 },
         acceptance: 1.0,
         normalised_square: 2.0,
         resets: 0,

@@ -32,6 +32,7 @@ mod record;
 mod reflector_detection;
 mod reflector_search;
 mod second_laser;
+mod separation;
 mod slam;
 mod slip_check;
 mod slot_life;

@@ -1,11 +1,9 @@
-//! What watches over the pose: motion of the laser against the odometry, corrections, and the protection level.
+//! What watches over the pose: motion of the laser against the odometry, and corrections.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::integrity::ProtectionLevel;
 use agv_core::integrity::{MountingCheck, SlipCheck, Suspect};
 use agv_core::measurement::Time;
-use agv_core::state::{Mode, PoseOutput, Reason};
 use proptest::prelude::*;
 
 /// Reflectors of a hall, in W.
@@ -178,78 +176,5 @@ fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_fo
             check.add(&motion, &Pose::new(0.0, 0.2 * motion.theta, 0.0));
         }
         assert_eq!(check.suspect(), Some(Suspect::Laser), "{radius} m");
-    }
-}
-
-#[test]
-fn the_heading_s_trend_holds_four_times_what_the_laser_looks_askew_by() {
-    let trend = |correction: Pose| {
-        let mut check = MountingCheck::new();
-        for _ in 0..200 {
-            check.add(&Pose::new(0.15, 0.0, 0.0), &correction);
-        }
-        check.trend()
-    };
-    // Eight revolutions' corrections, and four times the angle, though the heading itself was never corrected.
-    let [position, heading] = trend(Pose::new(0.0, 0.02 * 0.15, 0.0));
-    assert!((position - 8.0 * 0.02 * 0.15).abs() < 1e-9, "{position}");
-    assert!((heading - 4.0 * 0.02).abs() < 0.1 * 4.0 * 0.02, "{heading}");
-    let [position, heading] = trend(Pose::new(0.0, 0.0, -0.001));
-    assert!(position == 0.0 && (heading - 8.0 * 0.001).abs() < 1e-9, "{heading}");
-}
-
-pub fn output(covariance: [f64; 6], normalised_square: f64, drift: [f64; 2]) -> PoseOutput {
-    PoseOutput {
-        time: Time::default(),
-        pose: Pose::default(),
-        covariance,
-        mode: Mode::Reflectors,
-        reason: Reason::None,
-        dead_reckoning_distance: 0.0,
-        correction: 0.0,
-        smooth: Pose::default(),
-        drift,
-        acceptance: 1.0,
-        normalised_square,
-        resets: 0,
-        last_reset: 0.0,
-        overflows: 0,
-    }
-}
-
-#[test]
-fn the_bounds_hold_with_the_stated_probability() {
-    let level = |deviation: f64| {
-        let variance = deviation * deviation;
-        ProtectionLevel::of(&output([variance, 0.0, variance, 0.0, 0.0, variance], 2.0, [0.0; 2]))
-    };
-    // What is added for each metre and radian of deviation.
-    let (one, two) = (level(1.0), level(2.0));
-    let (position, heading) = (two.position - one.position, two.heading - one.heading);
-    let of_position = (-0.5 * position * position).exp();
-    let of_heading = libm::erfc(heading / 2_f64.sqrt());
-    let risk = of_position + of_heading;
-    assert!((0.9..=1.1).contains(&(risk / ProtectionLevel::RISK)), "{risk}");
-}
-
-proptest! {
-    #[test]
-    fn what_is_less_sure_may_be_further_off(
-        deviation in 0.001f64..0.5, ratio in 0.0f64..1.0, direction in 0.0f64..3.0,
-        square in 0.1f64..5.0, drift in 0.0f64..0.3,
-    ) {
-        let (sine, cosine) = direction.sin_cos();
-        let (long, short) = (deviation * deviation, (ratio * deviation).powi(2));
-        let xx = cosine * cosine * long + sine * sine * short;
-        let yy = sine * sine * long + cosine * cosine * short;
-        let xy = sine * cosine * (long - short);
-        let level = |square, drift| ProtectionLevel::of(&output([xx, xy, yy, 0.0, 0.0, 1e-6], square, [drift, drift]));
-        let plain = level(2.0, 0.0);
-        // The direction in which it is least sure decides, wherever it points.
-        let across = ProtectionLevel::of(&output([long, 0.0, short, 0.0, 0.0, 1e-6], 2.0, [0.0; 2]));
-        prop_assert!((plain.position - across.position).abs() < 1e-9);
-        prop_assert!(plain.position > 5.0 * deviation);
-        prop_assert!(level(square, drift).position >= plain.position - 1e-12);
-        prop_assert!(level(square, drift).heading >= plain.heading - 1e-12);
     }
 }

@@ -12,7 +12,6 @@ struct Fit {
     rates: [Vector2<f64>; 3],
     way: f64,
     turn: f64,
-    trend: [f64; 2],
 }
 
 /// How much of a revolution remains after those that follow it: 2.5 m and 1.5 rad count by 1/e.
@@ -20,7 +19,6 @@ fn fit(revolutions: &[(Pose, Pose)]) -> Fit {
     let mut information = Matrix2::new(0.01, 0.0, 0.0, 0.003);
     let mut sums = [Vector2::zeros(); 3];
     let (mut way, mut turn) = (0.0, 0.0);
-    let (mut trend, mut heading_trend) = (Vector2::zeros(), 0.0);
     for (index, (motion, correction)) in revolutions.iter().enumerate() {
         let later = &revolutions[index + 1..];
         let gone = later.iter().map(|(motion, _)| motion.x.abs() / 2.5 + motion.theta.abs() / 1.5).sum::<f64>();
@@ -32,21 +30,17 @@ fn fit(revolutions: &[(Pose, Pose)]) -> Fit {
         }
         way += weight * motion.x.abs();
         turn += weight * motion.theta.abs();
-        let recent = 0.875_f64.powi(later.len() as i32);
-        trend += recent * Vector2::new(correction.x, correction.y);
-        heading_trend += recent * correction.theta;
     }
     let solved = information.lu();
     let rates = sums.map(|sum| solved.solve(&sum).unwrap_or_default());
-    Fit { rates, way, turn, trend: [trend.norm(), f64::abs(heading_trend)] }
+    Fit { rates, way, turn }
 }
 
-/// The verdict after the last revolution, and by how much the laser seems to look askew.
-/// `sound` is the way and the turn since the laser was last contradicted.
-fn judge(fit: &Fit, before: Option<Suspect>, askew_before: f64, sound: &mut (f64, f64)) -> (Option<Suspect>, f64) {
+/// The verdict after the last revolution. `sound` is the way and the turn since the laser was last contradicted.
+fn judge(fit: &Fit, before: Option<Suspect>, sound: &mut (f64, f64)) -> Option<Suspect> {
     let (has_way, has_turn) = (fit.way >= 0.3, fit.turn >= 0.3);
     if !has_way && !has_turn {
-        return (before, askew_before);
+        return before;
     }
     let [along, side, heading] = fit.rates;
     let bend = if has_way { heading.x.abs() } else { 0.0 };
@@ -62,14 +56,14 @@ fn judge(fit: &Fit, before: Option<Suspect>, askew_before: f64, sound: &mut (f64
     let has_turned = has_turn && (fit.turn >= 0.45 || sound.1 >= 1.35);
     let is_right = has_way && has_turned && sound.0 >= 1.2 && sound.1 >= 0.45;
     if is_wrong || (before == Some(Suspect::Laser) && !is_right) {
-        return (Some(Suspect::Laser), askew);
+        return Some(Suspect::Laser);
     }
     let is_odometry = has_way && (along.x.abs() > 0.03 + way_noise || bend > 0.01 + 0.01 / fit.way.max(0.3));
-    (is_odometry.then_some(Suspect::Odometry), askew)
+    is_odometry.then_some(Suspect::Odometry)
 }
 
 #[test]
-fn verdicts_and_trends_are_those_of_all_corrections_at_once() {
+fn verdicts_are_those_of_all_corrections_at_once() {
     let mut random = Random::new(3);
     let (mut nobody, mut odometry, mut laser, mut healed) = (0, 0, 0, 0);
     for _ in 0..900 {
@@ -79,7 +73,7 @@ fn verdicts_and_trends_are_those_of_all_corrections_at_once() {
         let which = (random.unit() * 5.0) as usize;
         wrong[which] = size * [0.02, 0.15, 0.15, 0.06, 0.03][which];
         let mut check = MountingCheck::new();
-        let (mut revolutions, mut before, mut askew) = (Vec::new(), None, 0.0);
+        let (mut revolutions, mut before) = (Vec::new(), None);
         let mut sound = (0.0, 0.0);
         let (mut way, mut turn) = (0.0, 0.0);
         for revolution in 0..60 {
@@ -104,11 +98,8 @@ fn verdicts_and_trends_are_those_of_all_corrections_at_once() {
             let fit = fit(&revolutions);
             let was = before;
             sound = (sound.0 + motion.x.abs(), sound.1 + motion.theta.abs());
-            (before, askew) = judge(&fit, before, askew, &mut sound);
+            before = judge(&fit, before, &mut sound);
             assert_eq!(check.suspect(), before, "{wrong:?} {revolution}");
-            let [trend, heading_trend] = check.trend();
-            assert!((trend - fit.trend[0]).abs() < 1e-12);
-            assert!((heading_trend - fit.trend[1] - 4.0 * askew).abs() < 1e-9, "{heading_trend} {:?}", fit.trend);
             healed += usize::from(was == Some(Suspect::Laser) && before.is_none());
             match before {
                 None => nobody += 1,
@@ -129,11 +120,9 @@ fn a_new_pose_forgets_the_corrections_and_a_suspicion_of_the_odometry_alone() {
         }
         let before = check.suspect();
         check.restart();
-        assert_eq!(check.trend(), [0.0; 2]);
         (before, check.suspect())
     };
     assert_eq!(after(Pose::new(0.01, 0.0, 0.0)), (Some(Suspect::Odometry), None));
     assert_eq!(after(Pose::new(0.0, 0.01, 0.0)), (Some(Suspect::Laser), Some(Suspect::Laser)));
     assert_eq!(MountingCheck::default().suspect(), None);
-    assert_eq!(MountingCheck::default().trend(), [0.0; 2]);
 }

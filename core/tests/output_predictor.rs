@@ -53,7 +53,8 @@ fn motions(count: u64) -> Vec<Motion> {
 }
 
 fn base(at: Time) -> PoseOutput {
-    let output = super::integrity::output([4e-4, 1e-4, 3e-4, 1e-5, -2e-5, 1e-4], 1.7, [0.1, 0.02]);
+    let output =
+        PoseOutput { normalised_square: 1.7, ..super::pose_output::sure_of([4e-4, 1e-4, 3e-4, 1e-5, -2e-5, 1e-4]) };
     let (pose, smooth) = (Pose::new(2.0, 1.0, 0.4), Pose::new(1.5, 1.2, 0.3));
     PoseOutput { time: at, pose, smooth, dead_reckoning_distance: 0.1, correction: 0.004, acceptance: 0.8, ..output }
 }
@@ -84,9 +85,17 @@ fn assert_is(said: Option<PoseOutput>, base: &PoseOutput, since: &[Motion]) {
     assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
     let way: f64 = since.iter().map(|motion| motion.distance).sum();
     assert_eq!(said.time, since.last().map_or(base.time, |motion| motion.end));
-    let PoseOutput { pose, covariance, smooth, time, dead_reckoning_distance, .. } = said;
+    // The bound grows with what is less sure, and never shrinks.
+    let larger =
+        |entries: &[f64; 6]| 0.5 * (entries[0] + entries[2]) + (0.5 * (entries[0] - entries[2])).hypot(entries[1]);
+    let [before, after] = [&base.covariance, &said.covariance].map(|entries| larger(entries).sqrt());
+    let grown = (7.45 * (after - before)).max(0.0) + base.level.heading * way;
+    assert!((said.level.position - base.level.position - grown).abs() < 1e-9, "{:?} {grown}", said.level);
+    let grown = 7.15 * (said.covariance[5].sqrt() - base.covariance[5].sqrt());
+    assert!((said.level.heading - base.level.heading - grown).abs() < 1e-9, "{:?} {grown}", said.level);
+    let PoseOutput { pose, covariance, smooth, time, dead_reckoning_distance, level, .. } = said;
     assert!((dead_reckoning_distance - 0.1 - way).abs() < 0.011, "{dead_reckoning_distance} {way}");
-    assert_eq!(said, PoseOutput { pose, covariance, smooth, time, dead_reckoning_distance, ..*base });
+    assert_eq!(said, PoseOutput { pose, covariance, smooth, time, dead_reckoning_distance, level, ..*base });
 }
 
 #[test]

@@ -2,11 +2,32 @@
 
 use agv_core::geometry::Pose;
 use agv_core::integrity::ProtectionLevel;
-use agv_core::state::{Mode, PoseOutput};
+use agv_core::measurement::Time;
+use agv_core::state::{Mode, PoseOutput, Reason};
+
+/// A pose by reflectors with that covariance.
+pub fn sure_of(covariance: [f64; 6]) -> PoseOutput {
+    PoseOutput {
+        time: Time::default(),
+        pose: Pose::default(),
+        covariance,
+        mode: Mode::Reflectors,
+        reason: Reason::None,
+        dead_reckoning_distance: 0.0,
+        correction: 0.0,
+        smooth: Pose::default(),
+        level: ProtectionLevel { position: 0.04, heading: 0.007 },
+        acceptance: 1.0,
+        normalised_square: 2.0,
+        resets: 0,
+        last_reset: 0.0,
+        overflows: 0,
+    }
+}
 
 fn output(covariance: [f64; 6]) -> PoseOutput {
     let (pose, smooth) = (Pose::new(1.0, 2.0, 0.5), Pose::new(0.5, 2.5, 0.3));
-    PoseOutput { pose, smooth, ..super::integrity::output(covariance, 2.0, [0.0; 2]) }
+    PoseOutput { pose, smooth, ..sure_of(covariance) }
 }
 
 /// Deviations of the position along and across a direction, and of the heading.
@@ -65,27 +86,4 @@ fn the_offset_leads_from_the_smooth_pose_to_the_pose() {
     let offset = output.smooth_offset();
     let off = offset.compose(&output.smooth).between(&output.pose);
     assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
-}
-
-#[test]
-fn bounds_grow_with_surprise_and_drift_as_stated() {
-    // Deviations that a distance in the plane and a heading exceed with half of the risk.
-    let position_factor = (-2.0 * (0.5 * ProtectionLevel::RISK).ln()).sqrt();
-    let heading_factor = 5.4513; // 2 (1 - Phi(k)) = 5e-8, from tables.
-    for angle in ANGLES {
-        for (square, surprise) in [(0.5, 1.0), (2.0, 1.0), (8.0, 2.0)] {
-            for (drift, heading_drift) in [(0.0, 0.0), (0.1, 0.0), (0.0, 0.05)] {
-                let output = PoseOutput {
-                    normalised_square: square,
-                    drift: [drift, heading_drift],
-                    ..output(turned(0.02, 0.01, angle, 0.003))
-                };
-                let level = ProtectionLevel::of(&output);
-                let position = position_factor * surprise * 0.02 + 0.3 * drift + 0.060;
-                let heading = heading_factor * surprise * 0.003 + 0.3 * heading_drift + 0.0175;
-                assert!((level.position - position).abs() < 1e-3, "{} {position}", level.position);
-                assert!((level.heading - heading).abs() < 2e-5, "{} {heading}", level.heading);
-            }
-        }
-    }
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::Pose;
+use agv_core::integrity::ProtectionLevel;
 use agv_core::localizer::{
     Capacities, Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
 };
@@ -144,7 +145,7 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
     let counters = (any::<u8>(), single(), any::<u8>());
     (time(), [pose(), pose()], mode, reason, numbers, counters).prop_map(
         |(time, [pose, smooth], mode, reason, numbers, (resets, last_reset, overflows))| {
-            let [a, b, c, d, e, f, g, h, i, correction, drift, heading_drift] = numbers;
+            let [a, b, c, d, e, f, g, h, i, correction, bound, heading_bound] = numbers;
             PoseOutput {
                 time,
                 pose,
@@ -154,7 +155,7 @@ fn pose_output() -> impl Strategy<Value = PoseOutput> {
                 dead_reckoning_distance: g,
                 correction,
                 smooth,
-                drift: [drift, heading_drift],
+                level: ProtectionLevel { position: bound, heading: heading_bound },
                 acceptance: h,
                 normalised_square: i,
                 resets,

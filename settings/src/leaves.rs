@@ -146,7 +146,7 @@ macro_rules! address {
 }
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 71] = [
+pub static LEAVES: [Leaf; 78] = [
     tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
     tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
     tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
@@ -207,6 +207,13 @@ pub static LEAVES: [Leaf; 71] = [
     number!(281, "alert_limits.travel.heading", "rad", parameters.alert_limits.travel.heading),
     number!(282, "alert_limits.docking.position", "m", parameters.alert_limits.docking.position),
     number!(283, "alert_limits.docking.heading", "rad", parameters.alert_limits.docking.heading),
+    switch!(289, "protection", parameters.protection),
+    number!(290, "assumed.mounting", "m", parameters.assumed.mounting),
+    number!(291, "assumed.mounting_yaw", "rad", parameters.assumed.mounting_yaw),
+    number!(292, "assumed.clock", "s", parameters.assumed.clock),
+    number!(293, "assumed.scale", "", parameters.assumed.scale),
+    number!(294, "assumed.steering", "rad", parameters.assumed.steering),
+    number!(295, "assumed.turn", "", parameters.assumed.turn),
     whole!(300, "can.controller_node", "", 1.0, 95.0, nodes.controller),
     whole!(301, "can.drive_node", "", 1.0, 127.0, nodes.drive),
     whole!(302, "can.steering_node", "", 1.0, 127.0, nodes.steering),

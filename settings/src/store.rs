@@ -148,7 +148,7 @@ impl<F: NorFlash> embedded_storage_async::nor_flash::NorFlash for Immediate<F> {
 
 /// Where the items of that many keys are, those of all leaves among them: a page that is full is moved in one pass over its
 /// items, not in one for each of them.
-const KNOWN_KEYS: usize = 80;
+const KNOWN_KEYS: usize = 88;
 const _: () = assert!(KNOWN_KEYS >= LEAVES.len() + 3, "all leaves are known, and the key, the starts and the map");
 
 type KnownKeys = Cache<Uncached, Uncached, ArrayKeyPointers<u16, KNOWN_KEYS>, u16>;

@@ -7,12 +7,15 @@
 //! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
 //! | [`MountingCheck`] | corrections with the motion since the last one | a laser mounted elsewhere, an odometry of another scale |
+//!
+//! [`separation`] finds no fault but bounds the error that one can make: the [`ProtectionLevel`].
 
 mod alert_limits;
 mod innovation_monitor;
 mod jump_check;
 mod mounting_check;
 mod protection_level;
+pub mod separation;
 mod slip_check;
 
 pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
@@ -110,11 +113,5 @@ impl Integrity {
     #[must_use]
     pub fn suspect(&self) -> Option<Suspect> {
         self.mounting.suspect()
-    }
-
-    /// See [`MountingCheck::trend`].
-    #[must_use]
-    pub fn correction_trend(&self) -> [f64; 2] {
-        self.mounting.trend()
     }
 }

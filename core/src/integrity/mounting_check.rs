@@ -12,8 +12,6 @@ use crate::geometry::Pose;
 
 /// What is remembered of the distance and the turn: this much, m and rad, counts by 1/e.
 const MEMORY: (f64, f64) = (2.5, 1.5);
-/// Corrections are summed over about this many revolutions.
-const TREND: f64 = 8.0;
 /// Distance, m, and turn, rad, within the memory that the first verdict against the laser or the odometry needs.
 const LEAST: (f64, f64) = (0.3, 0.3);
 /// Distance, m, and turn, rad, without a contradiction after which the laser is as it is believed again, however fast the memory
@@ -34,8 +32,6 @@ const HEALED: f64 = 0.9;
 const SCALE: f64 = 0.03;
 const BEND: f64 = 0.01;
 
-/// How often the yaw error counts in the trend.
-const YAW_ERROR_WEIGHT: f64 = 4.0;
 /// Distance after which the heading has been corrected, m.
 const BEND_LAG: f64 = 0.5;
 
@@ -58,10 +54,6 @@ pub struct MountingCheck {
     heading: Vector2<f64>,
     distance: f64,
     turn: f64,
-    trend: Vector2<f64>,
-    heading_trend: f64,
-    /// What the laser's yaw error seems to be, rad.
-    yaw_error: f64,
     suspect: Option<Suspect>,
     /// Distance, m, and turn, rad, since the laser was last contradicted.
     sound: (f32, f32),
@@ -93,9 +85,6 @@ impl MountingCheck {
             heading: Vector2::zeros(),
             distance: 0.0,
             turn: 0.0,
-            trend: Vector2::zeros(),
-            heading_trend: 0.0,
-            yaw_error: 0.0,
             suspect: None,
             sound: (0.0, 0.0),
         }
@@ -127,16 +116,7 @@ impl MountingCheck {
         self.turn = self.turn * remaining + libm::fabs(turn);
         self.sound.0 += libm::fabs(distance) as f32;
         self.sound.1 += libm::fabs(turn) as f32;
-        self.trend = self.trend * (1.0 - 1.0 / TREND) + Vector2::new(correction.x, correction.y);
-        self.heading_trend = self.heading_trend * (1.0 - 1.0 / TREND) + correction.theta;
         self.suspect = self.judge();
-    }
-
-    /// By how much landmarks have lately corrected the pose in one direction, m and rad: what the filter lags behind by. The
-    /// heading's has what the laser's yaw error seems to be, several times, because the pose is off by all of it.
-    #[must_use]
-    pub fn trend(&self) -> [f64; 2] {
-        [self.trend.norm(), libm::fabs(self.heading_trend) + YAW_ERROR_WEIGHT * self.yaw_error]
     }
 
     /// Which of the two is wrong, if one is.
@@ -162,7 +142,6 @@ impl MountingCheck {
         // Before the heading is corrected, a bent steering leads the vehicle aside, too.
         let bend = libm::fabs(heading.distance.unwrap_or(0.0));
         let yaw_error = side.distance.map(|yaw| (libm::fabs(yaw) - BEND_LAG * bend).max(0.0));
-        self.yaw_error = yaw_error.unwrap_or(0.0);
         let (distance_noise, turn_noise) = (NOISE.0 / self.distance.max(LEAST.0), NOISE.0 / self.turn.max(LEAST.1));
         let lever_error = LEVER_ERROR + turn_noise;
         let laser = [(yaw_error, YAW_ERROR + distance_noise), (side.turn, lever_error), (along.turn, lever_error)];

@@ -1,10 +1,12 @@
 //! How wrong a pose may be.
 
-use crate::state::PoseOutput;
+use serde::{Deserialize, Serialize};
+
+use super::separation::FAULT_FREE;
 
 /// Bounds that the errors of a pose exceed with a small probability (the protection levels of satellite navigation,
 /// RTCA DO-229, appendix J).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProtectionLevel {
     /// Of the position, m.
     pub position: f64,
@@ -12,32 +14,27 @@ pub struct ProtectionLevel {
     pub heading: f64,
 }
 
-/// Deviations in the bound of the position: a distance in the plane exceeds them with half of the risk,
-/// exp(-k^2 / 2) = risk / 2.
-const POSITION_FACTOR: f64 = 5.80;
-/// Deviations in the bound of the heading: a normal number exceeds them with half of the risk, on either side.
-const HEADING_FACTOR: f64 = 5.45;
-/// What calibration, survey and clocks may be wrong by without that any check tells it soon, m and rad.
-const POSITION_ALLOWANCE: f64 = 0.060;
-const HEADING_ALLOWANCE: f64 = 0.0175;
-/// The filter lags behind a steady drift by at most so many times what it corrects in its trend.
-const LAG: f64 = 0.3;
-
 impl ProtectionLevel {
-    /// Probability that one of the bounds is exceeded although nothing is wrong with vehicle, sensors and map.
-    pub const RISK: f64 = 1e-7;
+    /// No error is possible.
+    pub const NONE: Self = Self { position: 0.0, heading: 0.0 };
+    /// Any error is.
+    pub const UNBOUNDED: Self = Self { position: 1e9, heading: 1e9 };
 
-    /// How wrong a pose may be: from its covariance, made larger by as much as the innovations are larger
-    /// than expected, from the trend of the corrections, and from what no check tells soon.
+    /// That of a pose with this covariance in W (xx, xy, yy, x heading, y heading, heading; m and rad), if nothing is wrong with
+    /// vehicle, sensors and map, and if these have no errors that last.
     #[must_use]
-    pub fn of(output: &PoseOutput) -> Self {
-        let [xx, xy, yy, _, _, heading] = output.covariance;
-        let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);
-        let [drift, heading_drift] = output.drift;
-        let surprise = libm::sqrt((0.5 * output.normalised_square).max(1.0));
+    pub fn fault_free(covariance: &[f64; 6]) -> Self {
+        let [xx, xy, yy, _, _, heading] = covariance;
+        let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), *xy);
         Self {
-            position: POSITION_FACTOR * surprise * libm::sqrt(worst) + LAG * drift + POSITION_ALLOWANCE,
-            heading: HEADING_FACTOR * surprise * libm::sqrt(heading) + LAG * heading_drift + HEADING_ALLOWANCE,
+            position: FAULT_FREE.position * libm::sqrt(worst.max(0.0)),
+            heading: FAULT_FREE.heading * libm::sqrt(heading.max(0.0)),
         }
+    }
+
+    /// The larger one of each bound.
+    #[must_use]
+    pub fn or(&self, other: &Self) -> Self {
+        Self { position: self.position.max(other.position), heading: self.heading.max(other.heading) }
     }
 }

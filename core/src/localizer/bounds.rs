@@ -37,7 +37,7 @@ const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     }
 }
 
-const BOUNDS: [Bound; 46] = [
+const BOUNDS: [Bound; 52] = [
     Bound {
         leaf: "vehicle.wheelbase",
         least: 0.05,
@@ -256,6 +256,17 @@ const BOUNDS: [Bound; 46] = [
         most: 0.25,
         get: |parameters| Some(parameters.alert_limits.docking.heading),
     },
+    Bound { leaf: "assumed.mounting", least: SMALL, most: 0.1, get: |parameters| Some(parameters.assumed.mounting) },
+    Bound {
+        leaf: "assumed.mounting_yaw",
+        least: SMALL,
+        most: 0.1,
+        get: |parameters| Some(parameters.assumed.mounting_yaw),
+    },
+    Bound { leaf: "assumed.clock", least: SMALL, most: 0.1, get: |parameters| Some(parameters.assumed.clock) },
+    Bound { leaf: "assumed.scale", least: SMALL, most: 0.1, get: |parameters| Some(parameters.assumed.scale) },
+    Bound { leaf: "assumed.steering", least: SMALL, most: 0.1, get: |parameters| Some(parameters.assumed.steering) },
+    Bound { leaf: "assumed.turn", least: SMALL, most: 0.1, get: |parameters| Some(parameters.assumed.turn) },
     Bound {
         leaf: "dynamic_map.first_hits",
         least: 0.0,

@@ -8,7 +8,8 @@ use super::supervisor::{Support, supervise};
 use super::{Capacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
 use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
-use crate::integrity::{Estimate, Integrity, Replacement, is_sure};
+use crate::integrity::separation::SolutionSeparation;
+use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, is_sure};
 use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
 use crate::odometry::{Coasting, Motion, OdometryBias, OdometryError, VehicleOdometer};
@@ -41,6 +42,7 @@ pub struct Localizer<
     pub(super) timeline: Timeline<PAST>,
     pub(super) slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
     pub(super) integrity: Integrity,
+    pub(super) separation: SolutionSeparation,
     pub(super) lost: Option<Reason>,
     outage: Option<Outage>,
     /// Samples of the odometry in a row that were not later than the one before.
@@ -99,7 +101,7 @@ impl<
             dead_reckoning_distance: 0.0,
             correction: 0.0,
             smooth: Pose::default(),
-            drift: [0.0; 2],
+            level: ProtectionLevel::UNBOUNDED,
             acceptance: 1.0,
             normalised_square: 2.0,
             resets: 0,
@@ -116,6 +118,7 @@ impl<
             timeline: Timeline::new(parameters.limits.longest_extrapolation),
             slam: Slam::new(),
             integrity: Integrity::new(parameters.consistency),
+            separation: SolutionSeparation::new(parameters.assumed, parameters.vehicle.steering_lever()),
             lost: None,
             outage: None,
             repeated: 0,
@@ -203,6 +206,12 @@ impl<
         if self.parameters.maps.slam { self.slam.bias() } else { OdometryBias::default() }
     }
 
+    /// What bounds the error of the pose.
+    #[must_use]
+    pub fn separation(&self) -> &SolutionSeparation {
+        &self.separation
+    }
+
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {
@@ -245,6 +254,7 @@ impl<
         }
         if let Some(before) = before {
             self.check(&before, revolution_of);
+            self.separate(event.laser());
         }
         self.publish(sees);
         &self.outputs
@@ -358,7 +368,14 @@ impl<
         let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
         let replacement = self.replaced_by(fix);
         self.integrity.restart(self.parameters.consistency, replacement.as_ref());
+        if self.parameters.protection {
+            self.separation.step(self.timeline.now(), self.timeline.odometry_pose());
+        }
         self.timeline.begin(fix.time, state);
+        if self.parameters.protection {
+            let (now, state) = (self.timeline.now(), self.timeline.state());
+            self.separation.begin(now, &state.pose, &state.covariance_entries(), self.timeline.odometry_pose());
+        }
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.lost = None;
         self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
@@ -472,6 +489,9 @@ impl<
         self.distance.advance(motion.distance);
         self.keep_up();
         self.timeline.advance(motion);
+        if self.parameters.protection {
+            self.separation.travel(motion, self.timeline.odometry_pose());
+        }
     }
 
     /// Before a motion is forgotten that the filter with landmarks has not seen, as the laser is silent.
@@ -606,7 +626,7 @@ impl<
             dead_reckoning_distance: distance.any(),
             correction,
             smooth,
-            drift: self.integrity.correction_trend(),
+            level: self.separation.level(),
             acceptance: self.integrity.innovations.acceptance(),
             normalised_square: self.integrity.innovations.mean_normalised_square(),
             ..self.outputs.pose

@@ -12,6 +12,7 @@ mod machine;
 mod output;
 mod output_predictor;
 mod parameters;
+mod separate;
 mod slam;
 mod start_finder;
 mod start_search;

@@ -9,6 +9,7 @@ use nalgebra::Matrix3;
 
 use super::Parameters;
 use crate::filter::Ekf;
+use crate::integrity::ProtectionLevel;
 use crate::measurement::{EncoderFaults, EncoderSample, Time};
 use crate::odometry::{Motion, OdometryBias, VehicleOdometer};
 use crate::state::{Mode, PoseOutput, Reason};
@@ -127,11 +128,26 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             pose: self.state.pose,
             smooth: base.smooth.compose(&base.pose.between(&self.state.pose)),
             covariance: self.state.covariance_entries(),
+            level: self.level(&base, travelled),
             mode,
             reason,
             dead_reckoning_distance: distance,
             ..base
         })
+    }
+}
+
+impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
+    /// That of the localiser's pose, grown with what the pose is less sure of, and with the heading's share in the distance since.
+    fn level(&self, base: &PoseOutput, travelled: f64) -> ProtectionLevel {
+        let now = ProtectionLevel::fault_free(&self.state.covariance_entries());
+        let then = ProtectionLevel::fault_free(&base.covariance);
+        ProtectionLevel {
+            position: base.level.position
+                + (now.position - then.position).max(0.0)
+                + base.level.heading.min(1.0) * travelled,
+            heading: base.level.heading + (now.heading - then.heading).max(0.0),
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Lasers;
 use crate::geometry::Pose;
+use crate::integrity::separation::AssumedDeviations;
 use crate::integrity::{AlertLimits, InnovationMonitorParameters};
 use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
@@ -42,6 +43,10 @@ pub struct Parameters {
     pub consistency: InnovationMonitorParameters,
     /// When the vehicle is dead reckoning, and when it is lost.
     pub limits: Limits,
+    /// Whether the error of the pose is bounded by solution separation. Without it the protection level is unbounded.
+    pub protection: bool,
+    /// What is unknown of a vehicle in order.
+    pub assumed: AssumedDeviations,
     /// What the vehicle can live with.
     pub alert_limits: AlertLimits,
 }
@@ -64,6 +69,8 @@ impl Parameters {
             slam: SlamParameters::default(),
             consistency: InnovationMonitorParameters::default(),
             limits: Limits::default(),
+            protection: true,
+            assumed: AssumedDeviations::default(),
             alert_limits: AlertLimits::default(),
         }
     }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Mode, Reason};
 use crate::geometry::Pose;
+use crate::integrity::ProtectionLevel;
 use crate::measurement::Time;
 
 /// The pose with its truth.
@@ -27,10 +28,8 @@ pub struct PoseOutput {
     pub smooth: Pose,
     /// Share of the observations of fixed landmarks that were accepted lately, 0 to 1.
     pub acceptance: f64,
-    /// What the pose may lag behind by, for the [protection level](super::ProtectionLevel), which counts 30 per cent of it:
-    /// the sum of the position's corrections of about eight revolutions, m; that of the heading's plus four times what the
-    /// laser seems to be turned by, rad, as the pose is off by all of the latter.
-    pub drift: [f64; 2],
+    /// What bounds the errors of position and heading.
+    pub level: ProtectionLevel,
     /// Mean normalised squared innovation of the accepted observations lately; 2 is expected.
     pub normalised_square: f64,
     /// How often the position has been reset, wrapping: by a pose that was given, or by a correction that

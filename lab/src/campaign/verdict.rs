@@ -141,7 +141,7 @@ impl Judge {
         self.seconds += step;
         let judged = output.and_then(|output| {
             let error = error(output, &truth(output.time)?);
-            Some((self.claim(now, output), error, ProtectionLevel::of(output)))
+            Some((self.claim(now, output), error, output.level))
         });
         let (claim, (position, heading), level) =
             judged.unwrap_or((Claim::Degraded, (0.0, 0.0), ProtectionLevel { position: 0.0, heading: 0.0 }));
@@ -171,7 +171,7 @@ impl Judge {
     }
 
     fn claim(&self, now: Time, output: &PoseOutput) -> Claim {
-        let level = ProtectionLevel::of(output);
+        let level = output.level;
         // In dead reckoning nothing watches over the odometry.
         let is_localised = matches!(output.mode, Mode::Reflectors | Mode::Features | Mode::Mixed);
         let is_fresh = now.since(output.time) <= STALE;

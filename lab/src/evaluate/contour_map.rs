@@ -161,9 +161,7 @@ fn run(
     let numbered = claims.iter().zip(first..);
     Some(Run {
         poses: numbered.clone().map(|(claim, scan)| WindowPose { window: number, scan, pose: claim.pose }).collect(),
-        by_contours: numbered
-            .map(|(claim, scan)| compared(scan, &claim.pose, Some(ProtectionLevel::of(claim))))
-            .collect(),
+        by_contours: numbered.map(|(claim, scan)| compared(scan, &claim.pose, Some(claim.level))).collect(),
         by_odometry,
     })
 }
@@ -213,16 +211,17 @@ fn corrected(predicted: Matrix3<f64>, found: Option<&ContourMatch>) -> Matrix3<f
 /// A pose as the vehicle tells it.
 fn claim(pose: &Pose, covariance: &Matrix3<f64>) -> PoseOutput {
     let [xx, xy, yy] = [covariance.m11, covariance.m12, covariance.m22];
+    let entries = [xx, xy, yy, covariance.m13, covariance.m23, covariance.m33];
     PoseOutput {
         time: agv_core::measurement::Time::default(),
         pose: *pose,
-        covariance: [xx, xy, yy, covariance.m13, covariance.m23, covariance.m33],
+        covariance: entries,
         mode: Mode::Features,
         reason: Reason::None,
         dead_reckoning_distance: 0.0,
         correction: 0.0,
         smooth: *pose,
-        drift: [0.0; 2],
+        level: ProtectionLevel::fault_free(&entries),
         acceptance: 1.0,
         normalised_square: 2.0,
         resets: 0,

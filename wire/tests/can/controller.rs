@@ -29,7 +29,7 @@ fn pose() -> PoseOutput {
         dead_reckoning_distance: 1.234,
         correction: 0.002,
         smooth: Pose { x: 12.3, y: -7.1, theta: -1.23 },
-        drift: [0.001, 0.0002],
+        level: ProtectionLevel { position: 0.0412, heading: 0.0061 },
         acceptance: 0.87,
         normalised_square: 2.15,
         resets: 0xA7,

@@ -1,6 +1,5 @@
 //! What holds after every event, whatever it was.
 
-use agv_core::integrity::ProtectionLevel;
 use agv_core::localizer::{LandmarkUse, Limits, Outputs};
 use agv_core::maps::Verdict;
 use agv_core::state::{Mode, PoseOutput, Reason};
@@ -31,9 +30,9 @@ fn pose(output: &PoseOutput, limits: &Limits) -> Option<String> {
     if !((0.0..=1.0).contains(&output.acceptance) && (0.0..=f64::MAX).contains(&output.normalised_square)) {
         return Some(format!("acceptance {}, normalised square {}", output.acceptance, output.normalised_square));
     }
-    let level = ProtectionLevel::of(output);
+    let level = output.level;
     if !(0.0..f64::INFINITY).contains(&level.position) || !(0.0..f64::INFINITY).contains(&level.heading) {
-        return Some(format!("{level:?}, drift {:?}", output.drift));
+        return Some(format!("{level:?}"));
     }
     if !fits(*mode, *reason) {
         return Some(format!("{mode:?} because of {reason:?}"));

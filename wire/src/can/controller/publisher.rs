@@ -1,6 +1,6 @@
 //! The pose, as it is said again and again.
 
-use agv_core::integrity::{AlertLimits, ProtectionLevel};
+use agv_core::integrity::AlertLimits;
 use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
 
@@ -53,7 +53,7 @@ impl PosePublisher {
 /// What is said of a pose: position, heading, covariance, status, integrity.
 #[must_use]
 pub fn contents(pose: &PoseOutput, health: &Health, limits: &AlertLimits) -> [Content; 5] {
-    let level = ProtectionLevel::of(pose);
+    let level = pose.level;
     let [xx, xy, yy, x_heading, y_heading, heading] = pose.covariance;
     let deviations = [xx, yy, heading].map(libm::sqrt);
     let [x, y, turn] = deviations;

@@ -4,7 +4,6 @@ use core::hint::black_box;
 
 use agv_controller::{BusEvent, Progress, PublishedPose, Told};
 use agv_core::geometry::Pose;
-use agv_core::integrity::ProtectionLevel;
 use agv_core::localizer::{self, Event, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
@@ -102,6 +101,6 @@ impl Localization {
 fn log(frame: &mut [u8], record: &Record) {
     let _ = black_box(encode(record, any(0), frame));
     if let Record::Output(output) = record {
-        black_box(ProtectionLevel::of(&output.pose));
+        black_box(output.pose.level);
     }
 }

@@ -1,0 +1,124 @@
+//! What may be wrong, each with the solution that holds if it is.
+
+use heapless::Vec;
+
+use super::sensor_information::SensorInformation;
+use super::solution::Solution;
+use crate::measurement::Time;
+
+/// Landmarks that one solution leaves out.
+pub const LEFT_OUT: usize = 8;
+
+/// What may be wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Assumption {
+    /// Nothing.
+    Nothing,
+    /// Some landmarks are not where the map has them.
+    Landmark,
+    /// The laser was knocked, or the vehicle slid or was carried, in some second.
+    Knock,
+    /// The laser is mounted elsewhere, or its clock is off.
+    Mounting,
+    /// The laser is turned.
+    Yaw,
+    /// The laser creeps.
+    Creep,
+    /// Scale, steering or turn of the odometry are not as believed.
+    Odometry,
+}
+
+/// What is left out together: each reflector alone, and all natural features, which one map and one detector tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LandmarkKey {
+    /// A reflector of the fixed map.
+    Reflector(u16),
+    /// All natural features.
+    Features,
+}
+
+/// Some landmarks are not where the map has them: a solution that has not used them since they came in sight.
+#[derive(Clone, Debug)]
+pub struct LeftOut {
+    /// Which.
+    pub keys: Vec<LandmarkKey, LEFT_OUT>,
+    /// What they tell in the present event.
+    pub told: SensorInformation,
+    /// Distance since one of them was seen, m.
+    pub unseen: f64,
+    /// The solution without them.
+    pub solution: Solution,
+}
+
+/// The laser was knocked, or the vehicle was carried or has slid, in an interval: its mounting is free then, and stays as it
+/// is found.
+#[derive(Clone, Debug)]
+pub struct Knock {
+    /// When the interval began.
+    pub from: Time,
+    /// Whether the interval has ended.
+    pub is_over: bool,
+    /// The solution.
+    pub solution: Solution,
+}
+
+/// Something was not as believed before a time: it is free then, and nothing that was known is used.
+#[derive(Clone, Debug)]
+pub struct FreeSince {
+    /// That time.
+    pub since: Time,
+    /// Turned while landmarks were in sight, rad.
+    pub turned: f64,
+    /// Driven while landmarks were in sight, m.
+    pub driven: f64,
+    /// Whether what was known before does not hold, so that its bound counts before it has found anything.
+    pub is_needed: bool,
+    /// How well it fits.
+    pub fit: Fit,
+    /// The solution.
+    pub solution: Solution,
+}
+
+/// How well a solution has fitted lately.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Fit {
+    /// Mean of the normalised squared innovations of some events; 3 is expected at most.
+    mean: f64,
+}
+
+/// Events over which the fit is averaged.
+const EVENTS: f64 = 32.0;
+/// A solution does not hold whose innovation is larger in one event, or in the mean of many. The sum over 32 events of three
+/// degrees of freedom each exceeds 32 times the latter once in 1e10 times.
+const REFUTED: (f64, f64) = (40.0, 6.5);
+
+impl Fit {
+    /// Takes one event; true if the solution does not hold.
+    pub fn refutes(&mut self, normalised_square: f64) -> bool {
+        self.mean += (normalised_square.min(REFUTED.0) - self.mean) / EVENTS;
+        normalised_square > REFUTED.0 || self.mean > REFUTED.1
+    }
+}
+
+/// What a turn shows of the place of the laser, and a drive of its yaw, is enough from here on, rad and m.
+const ENOUGH: (f64, f64) = (core::f64::consts::FRAC_PI_2, 5.0);
+
+impl FreeSince {
+    /// Begins at `since`.
+    #[must_use]
+    pub const fn new(since: Time, solution: Solution) -> Self {
+        Self { since, turned: 0.0, driven: 0.0, is_needed: false, fit: Fit { mean: 0.0 }, solution }
+    }
+
+    /// Whether a free place and yaw of the laser have been found.
+    #[must_use]
+    pub fn has_found_mounting(&self) -> bool {
+        self.turned >= ENOUGH.0 && self.has_found_yaw()
+    }
+
+    /// Whether a free yaw of the laser has been found.
+    #[must_use]
+    pub fn has_found_yaw(&self) -> bool {
+        self.driven >= ENOUGH.1
+    }
+}

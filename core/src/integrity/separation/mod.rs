@@ -1,0 +1,507 @@
+//! Solution separation, as in advanced receiver autonomous integrity monitoring (ARAIM): beside the solution from all that is
+//! measured there is one for each thing that may be wrong, which does not rest on it. However large the fault is, that solution
+//! holds; so what lies between it and the published pose, and its own bound, bound the error.
+//!
+//! What one event's landmarks say is summed up as information about the pose of the laser, from which single landmarks can be
+//! left out again. So each solution costs the same however many landmarks are seen.
+
+mod assumed;
+mod hypothesis;
+mod sensor_information;
+mod solution;
+
+use heapless::Vec;
+use nalgebra::{Matrix3, Vector3};
+
+pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT};
+pub use hypothesis::{Assumption, LandmarkKey};
+use hypothesis::{FreeSince, Knock, LeftOut};
+pub use sensor_information::{Seen, SensorInformation};
+pub use solution::{Laser, Solution, Step};
+
+use super::ProtectionLevel;
+use crate::geometry::Pose;
+use crate::measurement::Time;
+use crate::odometry::{BiasJacobian, Motion};
+
+/// Solutions without landmarks, and with a knock in an interval.
+const LEAVE_OUTS: usize = 16;
+const KNOCKS: usize = 12;
+/// How long the interval of a knock is at least, s: two revolutions.
+const INTERVAL: f64 = 0.1;
+/// A solution without a landmark is kept for this distance after it was seen, m.
+const REMEMBERED: f64 = 10.0;
+/// A solution whose normalised squared innovation, of three degrees of freedom, is larger does not hold: a right one is
+/// refused once in 1e8 events.
+const REFUTED: f64 = 40.0;
+/// The solution with a laser that creeps so fast that it is found: its place, m, and yaw, rad, for a square root of a metre, or of
+/// two seconds.
+const FAST_CREEP: (f64, f64) = (3e-2, 1.7e-2);
+/// It is found where the solutions lie further apart than so many deviations of what lies between them: once in 100 km
+/// without a fault, if 50 statistics are looked at in each of 8e5 revolutions.
+const FOUND: f64 = 5.9;
+/// Over this distance, m, a contradiction is forgotten by 1/e.
+const CONTRADICTION_MEMORY: f64 = 5.0;
+/// A laser is not knocked further than this, m, or turned by more, rad: it is the vehicle that was carried.
+const FURTHEST_KNOCK: (f64, f64) = (1.5, 0.6);
+/// The solution with a laser that creeps: its place, m, and yaw, rad, for a square root of a metre, or of two seconds.
+const CREEP: (f64, f64) = (1e-3, 5.2e-4);
+/// What all others allow for wear.
+const WEAR: (f64, f64) = (6e-5, 1e-5);
+/// The solution with an odometry that changes: scale, steering and turn for a square root of a metre.
+const CHANGE: [f64; 3] = [0.02, 0.01, 0.02];
+/// More than this share of what is seen contradicts the pose, if it is so many at least; fewer may be false reflectors.
+const CONTRADICTED: f64 = 0.25;
+const LEAST_CONTRADICTING: f64 = 2.5;
+/// What they count from one event to the next.
+const FADING: f64 = 0.8;
+/// The errors of the map are found from events that tell the position this well, m; others hardly move the solutions.
+const WELL_SEEN: f64 = 0.03;
+/// Covariance of a pose of which it is known only about where it is: 1 m and 20 deg.
+const UNKNOWN_POSE: [f64; 6] = [1.0, 0.0, 1.0, 0.0, 0.0, 0.122];
+/// Solutions go on at least once in this distance, m.
+const LONGEST_STEP: f64 = 0.3;
+
+/// Motion since the solutions went on.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    covariance: Matrix3<f64>,
+    distance: f64,
+    /// Turn of the last motion, and its duration.
+    last: Option<Motion>,
+}
+
+impl Pending {
+    const NONE: Self =
+        Self { covariance: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), distance: 0.0, last: None };
+}
+
+/// What of one event, or of the last ones, fits the pose and contradicts it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contradiction {
+    fitting: f64,
+    contradicting: f64,
+    /// Sum of how far the latter are from where they should be, m, and of that over their distance, rad.
+    by: (f64, f64),
+}
+
+impl Contradiction {
+    fn share(&self) -> f64 {
+        self.contradicting / (self.fitting + self.contradicting).max(1e-3)
+    }
+
+    fn mean(&self) -> ProtectionLevel {
+        let count = self.contradicting.max(1e-3);
+        ProtectionLevel { position: self.by.0 / count, heading: self.by.1 / count }
+    }
+
+    /// Adds an event to those before, which count by less and less.
+    fn add(&mut self, event: &Self) {
+        let add = |sum: f64, value: f64| FADING * sum + value;
+        *self = Self {
+            fitting: add(self.fitting, event.fitting),
+            contradicting: add(self.contradicting, event.contradicting),
+            by: (add(self.by.0, event.by.0), add(self.by.1, event.by.1)),
+        };
+    }
+}
+
+/// The solutions, and the protection level that they give.
+#[derive(Clone, Debug)]
+pub struct SolutionSeparation {
+    assumed: AssumedDeviations,
+    steering_lever: Option<f64>,
+    has_begun: bool,
+    time: Time,
+    odometry_pose: Pose,
+    pending: Pending,
+    /// Distance and turn since landmarks were last seen, m and rad.
+    unseen: (f64, f64),
+    all: Solution,
+    leave_outs: Vec<LeftOut, LEAVE_OUTS>,
+    knocks: Vec<Knock, KNOCKS>,
+    mounting: Option<FreeSince>,
+    next_mounting: Option<FreeSince>,
+    yaw: Option<FreeSince>,
+    creeping: Solution,
+    fast_creeping: Solution,
+    /// Whether the laser was found to creep fast.
+    creeps_fast: bool,
+    odometry: Solution,
+    told: SensorInformation,
+    contradiction: Contradiction,
+    lately: Contradiction,
+    contradicted: ProtectionLevel,
+    map_variances: (f64, f64),
+    /// The pose that is bounded, how much larger innovations are than expected, and the bound, all at the last step.
+    pose: Pose,
+    surprise: f64,
+    level: ProtectionLevel,
+}
+
+impl SolutionSeparation {
+    /// Solutions of a vehicle that does not know where it is; its steered wheel stands `steering_lever` before the axle, m, if it has
+    /// one.
+    #[must_use]
+    pub fn new(assumed: AssumedDeviations, steering_lever: Option<f64>) -> Self {
+        let nowhere = Solution::new(Pose::default(), &[0.0; 6], &assumed);
+        Self {
+            assumed,
+            steering_lever,
+            has_begun: false,
+            time: Time::default(),
+            odometry_pose: Pose::default(),
+            pending: Pending::NONE,
+            unseen: (0.0, 0.0),
+            all: nowhere.clone(),
+            leave_outs: Vec::new(),
+            knocks: Vec::new(),
+            mounting: None,
+            next_mounting: None,
+            yaw: None,
+            creeping: nowhere.clone(),
+            fast_creeping: nowhere.clone(),
+            creeps_fast: false,
+            odometry: nowhere,
+            told: SensorInformation::NONE,
+            contradiction: Contradiction::default(),
+            lately: Contradiction::default(),
+            contradicted: ProtectionLevel::NONE,
+            map_variances: (0.0, 0.0),
+            pose: Pose::default(),
+            surprise: 1.0,
+            level: ProtectionLevel::UNBOUNDED,
+        }
+    }
+
+    /// Begins at a pose of W that was given, with that covariance, or begins anew: who was carried is where the given pose has
+    /// it, but if the laser was knocked instead, the solutions that allow for a knock still hold. `odometry_pose` is where the
+    /// odometry has the vehicle now.
+    pub fn begin(&mut self, time: Time, pose: &Pose, covariance: &[f64; 6], odometry_pose: &Pose) {
+        self.all = Solution::new(*pose, covariance, &self.assumed);
+        self.creeping = self.all.clone();
+        if !self.creeps_fast {
+            self.fast_creeping = self.all.clone();
+        }
+        self.odometry = self.all.clone();
+        self.odometry.free_odometry();
+        self.leave_outs.clear();
+        if !self.has_begun {
+            self.mounting = Some(self.free_mounting(time));
+            let mut turned = self.all.clone();
+            turned.free_yaw();
+            self.yaw = Some(FreeSince::new(time, turned));
+            self.has_begun = true;
+            self.unseen = (0.0, 0.0);
+        }
+        self.time = time;
+        self.odometry_pose = *odometry_pose;
+        self.pending = Pending::NONE;
+        self.map_variances = (0.0, 0.0);
+        self.contradicted = ProtectionLevel::NONE;
+        self.lately = Contradiction::default();
+        self.rest_on(pose, 1.0);
+    }
+
+    /// What was wrong before may have been learnt as something else; so nothing is kept but about where the vehicle is.
+    fn free_mounting(&self, since: Time) -> FreeSince {
+        let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
+        solution.free_mounting();
+        solution.free_clock();
+        FreeSince::new(since, solution)
+    }
+
+    /// Takes a motion of the odometry; `odometry_pose` is where it has led to.
+    pub fn travel(&mut self, motion: &Motion, odometry_pose: &Pose) {
+        self.pending.covariance += motion.covariance;
+        self.pending.distance += motion.distance;
+        self.pending.last = Some(*motion);
+        if self.pending.distance > LONGEST_STEP {
+            self.step(motion.end, odometry_pose);
+        }
+    }
+
+    /// Lets all solutions go on to where the odometry is now.
+    pub fn step(&mut self, now: Time, odometry_pose: &Pose) {
+        let displacement = self.odometry_pose.between(odometry_pose);
+        let distance = self.pending.distance;
+        let step = Step {
+            displacement,
+            covariance: self.pending.covariance,
+            distance,
+            by_bias: BiasJacobian::of(&displacement, self.steering_lever),
+        };
+        let lasted = distance.max(0.5 * now.since(self.time).max(0.0));
+        let wear = [WEAR.0, WEAR.1].map(|deviation| deviation * deviation * lasted);
+        let creep = [CREEP.0, CREEP.1].map(|deviation| deviation * deviation * lasted);
+        for solution in self.solutions() {
+            solution.predict(&step);
+            let [place, yaw] = wear;
+            solution.loosen_mounting(place, yaw);
+        }
+        let [place, yaw] = creep;
+        self.creeping.loosen_mounting(place, yaw);
+        let [place, yaw] = [FAST_CREEP.0, FAST_CREEP.1].map(|deviation| deviation * deviation * lasted);
+        self.fast_creeping.loosen_mounting(place, yaw);
+        let remaining = libm::exp(-distance / CONTRADICTION_MEMORY);
+        self.contradicted.position *= remaining;
+        self.contradicted.heading *= remaining;
+        for one in &mut self.leave_outs {
+            one.unseen += distance;
+        }
+        self.leave_outs.retain(|one| one.unseen <= REMEMBERED);
+        self.unseen = (self.unseen.0 + distance, self.unseen.1 + libm::fabs(displacement.theta));
+        self.time = now;
+        self.odometry_pose = *odometry_pose;
+        self.pending = Pending { last: self.pending.last, ..Pending::NONE };
+        self.rest_on(&self.pose.compose(&displacement), self.surprise);
+    }
+
+    /// All solutions.
+    fn solutions(&mut self) -> impl Iterator<Item = &mut Solution> {
+        let free = [&mut self.mounting, &mut self.next_mounting, &mut self.yaw];
+        [&mut self.all, &mut self.creeping, &mut self.fast_creeping, &mut self.odometry]
+            .into_iter()
+            .chain(self.leave_outs.iter_mut().map(|one| &mut one.solution))
+            .chain(self.knocks.iter_mut().map(|one| &mut one.solution))
+            .chain(free.into_iter().flatten().map(|one| &mut one.solution))
+    }
+
+    /// The laser, of which what follows is told, if it is at `mount` in R and R at `pose`.
+    #[must_use]
+    pub fn laser(&self, mount: &Pose, pose: &Pose) -> Laser {
+        let (speed_x, speed_y, turn) = self.pending.last.map_or((0.0, 0.0, 0.0), |motion| {
+            let duration = motion.end.since(motion.start).max(1e-3);
+            let Pose { x, y, theta } = motion.displacement;
+            (x / duration, y / duration, theta / duration)
+        });
+        let (sine, cosine) = libm::sincos(pose.theta);
+        let (x, y) = (speed_x - turn * mount.y, speed_y + turn * mount.x);
+        Laser {
+            mount: *mount,
+            sensor: pose.compose(mount),
+            velocity: Vector3::new(cosine * x - sine * y, sine * x + cosine * y, turn),
+        }
+    }
+
+    /// Begins to take what one event tells; the solutions have gone on to its time.
+    pub fn begin_event(&mut self) {
+        self.told = SensorInformation::NONE;
+        self.contradiction = Contradiction::default();
+        for one in &mut self.leave_outs {
+            one.told = SensorInformation::NONE;
+        }
+    }
+
+    /// Takes a landmark that fits the pose.
+    pub fn see(&mut self, key: LandmarkKey, seen: &Seen, laser: &Laser) {
+        let Some(place) = self.place_of(key) else { return };
+        let told = SensorInformation::of(seen, &laser.sensor);
+        self.contradiction.fitting += 1.0;
+        self.told = self.told.with(&told);
+        if let Some(one) = self.leave_outs.get_mut(place) {
+            one.told = one.told.with(&told);
+            one.unseen = 0.0;
+        }
+    }
+
+    /// Takes one that is so far from where it should be, m, and so far from the laser, m.
+    pub fn contradict(&mut self, by: f64, range: f64) {
+        let Contradiction { contradicting, by: sum, .. } = &mut self.contradiction;
+        *contradicting += 1.0;
+        sum.0 += by;
+        sum.1 += by / range.max(1.0);
+    }
+
+    /// Which solution leaves the landmark out. None has used one that was not in sight: so one that comes in sight can be left
+    /// out together with others. None if there is no room; it is not used then.
+    fn place_of(&mut self, key: LandmarkKey) -> Option<usize> {
+        let known = self.leave_outs.iter().position(|one| one.keys.contains(&key));
+        if known.is_some() {
+            return known;
+        }
+        if !self.leave_outs.is_full() {
+            let mut keys = Vec::new();
+            // There is room.
+            let _ = keys.push(key);
+            let one = LeftOut { keys, told: SensorInformation::NONE, unseen: 0.0, solution: self.all.clone() };
+            let _ = self.leave_outs.push(one);
+            return Some(self.leave_outs.len() - 1);
+        }
+        let (place, one) = self.leave_outs.iter_mut().enumerate().min_by_key(|(_, one)| one.keys.len())?;
+        one.keys.push(key).ok()?;
+        Some(place)
+    }
+
+    /// Ends the event: all solutions are corrected, and the protection level of `pose` is found. Innovations are `surprise` times as large
+    /// as the filter expects, or as it expects them (1).
+    pub fn end_event(&mut self, pose: &Pose, laser: &Laser, surprise: f64) {
+        let now = self.contradiction;
+        self.lately.add(&now);
+        for evidence in [&now, &self.lately] {
+            if evidence.share() > CONTRADICTED && evidence.contradicting >= LEAST_CONTRADICTING {
+                self.contradicted = self.contradicted.or(&evidence.mean());
+            }
+        }
+        let is_contradicted = now.share() > CONTRADICTED;
+        if self.told.is_any() && !is_contradicted {
+            self.correct(laser);
+            self.map_variances = self.told.map_variances(WELL_SEEN * WELL_SEEN).unwrap_or(self.map_variances);
+        }
+        self.rest_on(pose, surprise);
+    }
+
+    fn rest_on(&mut self, pose: &Pose, surprise: f64) {
+        self.pose = *pose;
+        self.surprise = surprise;
+        self.level = self.bound(pose, surprise);
+    }
+
+    fn correct(&mut self, laser: &Laser) {
+        let (told, now) = (self.told, self.time);
+        self.begin_knock(now);
+        let all_before = self.all.clone();
+        self.all.correct(&told, laser);
+        for one in &mut self.leave_outs {
+            if one.solution.correct(&told.without(&one.told), laser) > REFUTED {
+                one.solution = all_before.clone();
+            }
+        }
+        self.creeping.correct(&told, laser);
+        self.correct_fast_creeping(&told, laser);
+        self.odometry.loosen_odometry(&CHANGE.map(|deviation| deviation * deviation * self.unseen.0));
+        if self.odometry.correct(&told, laser) > REFUTED {
+            self.odometry = self.all.clone();
+            self.odometry.free_odometry();
+        }
+        self.knocks.retain_mut(|knock| {
+            if !knock.is_over {
+                knock.solution.free_mounting();
+            }
+            let square = knock.solution.correct(&told, laser);
+            knock.is_over |= now.since(knock.from) >= INTERVAL;
+            let (place, yaw) = knock.solution.mounting_error();
+            square <= REFUTED && place <= FURTHEST_KNOCK.0 && yaw <= FURTHEST_KNOCK.1
+        });
+        self.correct_free(&told, laser);
+        self.unseen = (0.0, 0.0);
+    }
+
+    /// Opens the next interval if none is open.
+    fn begin_knock(&mut self, now: Time) {
+        if self.knocks.iter().any(|knock| !knock.is_over) {
+            return;
+        }
+        let knock = Knock { from: now, is_over: false, solution: self.all.clone() };
+        if !self.knocks.is_full() {
+            let _ = self.knocks.push(knock);
+            return;
+        }
+        // The one that says least makes room.
+        let pose = *self.all.pose();
+        let position = |knock: &Knock| knock.solution.bound(&pose, &ONE_FAULT, (0.0, 0.0)).position;
+        if let Some(least) = self.knocks.iter_mut().min_by(|a, b| position(a).total_cmp(&position(b))) {
+            *least = knock;
+        }
+    }
+
+    fn correct_fast_creeping(&mut self, told: &SensorInformation, laser: &Laser) {
+        if self.fast_creeping.correct(told, laser) > REFUTED {
+            self.fast_creeping = self.all.clone();
+        }
+        let bound = self.fast_creeping.bound(self.all.pose(), &Factors { position: 0.0, heading: 0.0 }, (0.0, 0.0));
+        let (position, heading) = self.fast_creeping.variances();
+        let (known, known_heading) = self.all.variances();
+        let apart = |by: f64, variance: f64, known: f64| by / libm::sqrt((variance - known).max(0.25 * variance));
+        let most = apart(bound.position, position, known).max(apart(bound.heading, heading, known_heading));
+        self.creeps_fast = most > if self.creeps_fast { 0.5 * FOUND } else { FOUND };
+    }
+
+    fn correct_free(&mut self, told: &SensorInformation, laser: &Laser) {
+        let now = self.time;
+        let (driven, turned) = if self.unseen.0 <= 1.0 { self.unseen } else { (0.0, 0.0) };
+        let go_on = |one: &mut Option<FreeSince>| {
+            let Some(free) = one else { return false };
+            free.driven += driven;
+            free.turned += turned;
+            let square = free.solution.correct(told, laser);
+            let is_refuted = free.fit.refutes(square);
+            if is_refuted {
+                *one = None;
+            }
+            is_refuted
+        };
+        let is_refuted = go_on(&mut self.mounting);
+        go_on(&mut self.next_mounting);
+        go_on(&mut self.yaw);
+        if self.mounting.is_none() {
+            // It may have been knocked since the next one began, too.
+            self.next_mounting = None;
+            self.mounting = Some(FreeSince { is_needed: is_refuted, ..self.free_mounting(now) });
+        }
+        if self.mounting.as_ref().is_some_and(FreeSince::has_found_mounting) && self.next_mounting.is_none() {
+            self.yaw = None;
+            self.next_mounting = Some(self.free_mounting(now));
+        }
+        if let Some(found) = self.next_mounting.take_if(|next| next.has_found_mounting()) {
+            // Whatever was knocked before is free in it.
+            self.knocks.retain(|knock| !knock.is_over || knock.from >= found.since);
+            self.mounting = Some(found);
+            self.next_mounting = Some(self.free_mounting(now));
+        }
+    }
+
+    /// The largest of all bounds of a pose.
+    fn bound(&self, pose: &Pose, surprise: f64) -> ProtectionLevel {
+        let level = self.bounds(pose, surprise).fold(ProtectionLevel::NONE, |level, (_, bound)| level.or(&bound));
+        ProtectionLevel {
+            position: level.position + self.contradicted.position,
+            heading: level.heading + self.contradicted.heading,
+        }
+    }
+
+    /// The bound of the pose at the last step, by each assumption that may be wrong.
+    pub fn bounds_of_last(&self) -> impl Iterator<Item = (Assumption, ProtectionLevel)> + '_ {
+        self.bounds(&self.pose, self.surprise)
+    }
+
+    fn bounds(&self, pose: &Pose, surprise: f64) -> impl Iterator<Item = (Assumption, ProtectionLevel)> + '_ {
+        let larger =
+            |factors: &Factors| Factors { position: surprise * factors.position, heading: surprise * factors.heading };
+        let (fault_free, one_fault) = (larger(&FAULT_FREE), larger(&ONE_FAULT));
+        let found_mounting = self.mounting.as_ref().filter(|free| free.is_needed || free.has_found_mounting());
+        let fast_creep = self.creeps_fast.then_some((Assumption::Creep, &self.fast_creeping));
+        let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
+        let pose = *pose;
+        let all = self.all.bound(&pose, &fault_free, self.map_variances);
+        let one = [(Assumption::Creep, &self.creeping), (Assumption::Odometry, &self.odometry)]
+            .into_iter()
+            .chain(self.leave_outs.iter().map(|one| (Assumption::Landmark, &one.solution)))
+            .chain(self.knocks.iter().map(|one| (Assumption::Knock, &one.solution)))
+            .chain(fast_creep)
+            .chain(found_mounting.map(|one| (Assumption::Mounting, &one.solution)))
+            .chain(found_yaw.map(|one| (Assumption::Yaw, &one.solution)));
+        core::iter::once((Assumption::Nothing, all)).chain(
+            one.map(move |(assumption, solution)| (assumption, solution.bound(&pose, &one_fault, self.map_variances))),
+        )
+    }
+
+    /// The protection level of the pose that the odometry has led on to since the last step.
+    #[must_use]
+    pub fn level(&self) -> ProtectionLevel {
+        let Pending { covariance, distance, .. } = &self.pending;
+        let AssumedDeviations { scale, steering, turn, .. } = self.assumed;
+        let grown = |variance: f64, by: f64| libm::sqrt(variance + by) - libm::sqrt(variance);
+        let (position, heading) = self.all.variances();
+        let along = scale * distance;
+        let by_turn = steering.max(turn) * distance;
+        let larger = sensor_information::larger_axis(covariance.m11, covariance.m12, covariance.m22);
+        ProtectionLevel {
+            position: self.level.position
+                + FAULT_FREE.position * grown(position, larger + along * along)
+                + self.level.heading.min(1.0) * distance,
+            heading: self.level.heading
+                + FAULT_FREE.heading * grown(heading, covariance.m33.max(0.0) + by_turn * by_turn),
+        }
+    }
+}

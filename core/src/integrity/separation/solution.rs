@@ -1,0 +1,309 @@
+//! One solution: the pose and what lasts, by those measurements and under those assumptions that are its own.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::assumed::{AssumedDeviations, Factors};
+use super::sensor_information::{SensorInformation, larger_axis};
+use crate::geometry::{Pose, difference};
+use crate::integrity::ProtectionLevel;
+use crate::odometry::BiasJacobian;
+
+/// The pose, the place and yaw of the laser beside those believed, its clock, and scale, steering and turn of the odometry.
+pub const STATES: usize = 10;
+
+type Covariance = SMatrix<f64, STATES, STATES>;
+type States = SVector<f64, STATES>;
+
+/// A motion since the last step, and what lasting errors of the odometry make of it: the same for all solutions.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Displacement in R at its start.
+    pub displacement: Pose,
+    /// Covariance of the displacement.
+    pub covariance: Matrix3<f64>,
+    /// Distance travelled, m.
+    pub distance: f64,
+    /// How the displacement changes with scale and steering.
+    pub by_bias: BiasJacobian,
+}
+
+/// How the laser is mounted and moves: the same for all solutions.
+#[derive(Clone, Copy, Debug)]
+pub struct Laser {
+    /// Pose of S in R, as it is believed.
+    pub mount: Pose,
+    /// Pose of S in W at which the information is linearised.
+    pub sensor: Pose,
+    /// Velocity of S in W, m/s, m/s and rad/s.
+    pub velocity: Vector3<f64>,
+}
+
+/// Pose and what lasts, with their covariance.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    pose: Pose,
+    /// The states behind the pose.
+    lasting: Lasting,
+    covariance: Covariance,
+}
+
+/// What lasts: as it is believed to be, or beside that.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lasting {
+    /// Place of the laser in R beside that believed, m.
+    lever: [f64; 2],
+    yaw: f64,
+    clock: f64,
+    scale: f64,
+    steering: f64,
+    turn: f64,
+}
+
+/// The first state of what lasts, and how many there are: of the laser with its clock, and of the odometry.
+const LASER: (usize, usize) = (3, 4);
+const ODOMETRY: (usize, usize) = (7, 3);
+
+/// A free mounting: place, m, yaw, rad, and clock, s.
+pub const FREE_MOUNTING: [f64; 4] = [0.6, 0.6, 0.175, 0.2];
+/// A free odometry: scale, steering, rad, and turn.
+pub const FREE_ODOMETRY: [f64; 3] = [0.2, 0.1, 0.2];
+
+/// The model is linear within this change of the heading, rad; how often it is linearised at most.
+const LINEAR_WITHIN: f64 = 0.01;
+const MOST_LINEARISATIONS: usize = 4;
+
+impl Solution {
+    /// A solution at a pose with that covariance, which assumes what lasts to be as it is believed.
+    #[must_use]
+    pub fn new(pose: Pose, entries: &[f64; 6], assumed: &AssumedDeviations) -> Self {
+        let mut solution = Self { pose, lasting: Lasting::default(), covariance: Covariance::zeros() };
+        let [xx, xy, yy, x_heading, y_heading, heading] = *entries;
+        for (row, column, entry) in
+            [(0, 0, xx), (0, 1, xy), (1, 1, yy), (0, 2, x_heading), (1, 2, y_heading), (2, 2, heading)]
+        {
+            solution.set(row, column, entry);
+        }
+        let AssumedDeviations { mounting, mounting_yaw, clock, scale, steering, turn } = *assumed;
+        for (state, deviation) in (LASER.0..).zip([mounting, mounting, mounting_yaw, clock, scale, steering, turn]) {
+            solution.set(state, state, deviation * deviation);
+        }
+        solution
+    }
+
+    fn set(&mut self, row: usize, column: usize, value: f64) {
+        for place in [(row, column), (column, row)] {
+            if let Some(entry) = self.covariance.get_mut(place) {
+                *entry = value;
+            }
+        }
+    }
+
+    /// Pose of R in W.
+    #[must_use]
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// Where the laser is beside where it is believed to be, m and rad.
+    #[must_use]
+    pub fn mounting_error(&self) -> (f64, f64) {
+        let [x, y] = self.lasting.lever;
+        (libm::hypot(x, y), libm::fabs(self.lasting.yaw))
+    }
+
+    /// Forgets some states: they are independent of all others from now on, with these deviations.
+    fn forget<const COUNT: usize>(&mut self, first: usize, deviations: &[f64; COUNT]) {
+        for (state, deviation) in (first..).zip(deviations) {
+            for other in 0..STATES {
+                self.set(state, other, 0.0);
+            }
+            self.set(state, state, deviation * deviation);
+        }
+    }
+
+    /// The laser may be anywhere within what a knock can do.
+    pub fn free_mounting(&mut self) {
+        let [x, y, yaw, _] = FREE_MOUNTING;
+        self.forget(LASER.0, &[x, y, yaw]);
+    }
+
+    /// The clock of the laser may be off.
+    pub fn free_clock(&mut self) {
+        let [.., clock] = FREE_MOUNTING;
+        self.forget(LASER.0 + LASER.1 - 1, &[clock]);
+    }
+
+    /// The laser may be turned.
+    pub fn free_yaw(&mut self) {
+        self.forget(LASER.0 + 2, &[0.175]);
+    }
+
+    /// Scale, steering and turn may be anything.
+    pub fn free_odometry(&mut self) {
+        self.forget(ODOMETRY.0, &FREE_ODOMETRY);
+    }
+
+    /// The laser may have moved by so much, m^2 and rad^2.
+    pub fn loosen_mounting(&mut self, place: f64, yaw: f64) {
+        self.loosen(LASER.0, &[place, place, yaw]);
+    }
+
+    /// Scale, steering and turn may have changed by so much; variances.
+    pub fn loosen_odometry(&mut self, variances: &[f64; ODOMETRY.1]) {
+        self.loosen(ODOMETRY.0, variances);
+    }
+
+    fn loosen<const COUNT: usize>(&mut self, first: usize, variances: &[f64; COUNT]) {
+        for (state, variance) in (first..).zip(variances) {
+            if let Some(entry) = self.covariance.get_mut((state, state)) {
+                *entry += variance;
+            }
+        }
+    }
+
+    /// Goes on by a motion.
+    pub fn predict(&mut self, step: &Step) {
+        let Lasting { scale, steering, turn, .. } = self.lasting;
+        let d = &step.displacement;
+        let by_scale = Vector3::from(step.by_bias.scale);
+        let by_steering = Vector3::from(step.by_bias.steering);
+        let by_turn = Vector3::new(0.0, 0.5 * d.x * d.theta, d.theta);
+        let error = by_scale * scale + by_steering * steering + by_turn * turn;
+        let displacement = Pose::new(d.x + error.x, d.y + error.y, d.theta + error.z);
+        let first = self.pose.compose_jacobian_first(&displacement);
+        let rotation = self.pose.compose_jacobian_second();
+        let by_odometry = [by_scale, by_steering, by_turn].map(|by| rotation * by);
+        let noise = rotation * step.covariance * rotation.transpose();
+        self.pose = self.pose.compose(&displacement);
+        self.propagate((first.m13, first.m23), &by_odometry, &noise);
+    }
+
+    /// Propagates the covariance: the position changes with the heading and the pose with the odometry's errors.
+    fn propagate(&mut self, by_heading: (f64, f64), by_odometry: &[Vector3<f64>; 3], noise: &Matrix3<f64>) {
+        let columns = &mut self.covariance.data.0;
+        let [x, y, heading, _, _, _, _, scale, steering, turn] = columns.map(States::from);
+        let [by_scale, by_steering, by_turn] = by_odometry;
+        // The pose's rows of F P, then its own block of F P F'.
+        let x = x + heading * by_heading.0 + scale * by_scale.x + steering * by_steering.x + turn * by_turn.x;
+        let y = y + heading * by_heading.1 + scale * by_scale.y + steering * by_steering.y + turn * by_turn.y;
+        let heading = heading + scale * by_scale.z + steering * by_steering.z + turn * by_turn.z;
+        let block = |row: &States| {
+            let [[x, y, heading, _, _, _, _, scale, steering, turn]] = row.data.0;
+            let errors = by_scale * scale + by_steering * steering + by_turn * turn;
+            Vector3::new(x + heading * by_heading.0, y + heading * by_heading.1, heading) + errors
+        };
+        let [of_x, of_y, of_heading] = [block(&x), block(&y), block(&heading)];
+        let ([x], [y], [heading]) = (x.data.0, y.data.0, heading.data.0);
+        for (column, ((x, y), heading)) in columns.iter_mut().zip(x.iter().zip(&y).zip(&heading)).skip(3) {
+            let [of_x, of_y, of_heading, ..] = column;
+            (*of_x, *of_y, *of_heading) = (*x, *y, *heading);
+        }
+        let [first, second, third, ..] = columns;
+        (*first, *second, *third) = (x, y, heading);
+        let [xx, xy, xh, ..] = first;
+        (*xx, *xy, *xh) = (of_x.x + noise.m11, of_x.y + noise.m12, of_x.z + noise.m13);
+        let [xy, yy, yh, ..] = second;
+        (*xy, *yy, *yh) = (of_x.y + noise.m12, of_y.y + noise.m22, of_y.z + noise.m23);
+        let [xh, yh, hh, ..] = third;
+        (*xh, *yh, *hh) = (of_x.z + noise.m13, of_y.z + noise.m23, of_heading.z + noise.m33);
+    }
+
+    /// Takes what landmarks say of the pose of the laser. Returns the normalised squared innovation, of up to three degrees of
+    /// freedom. Where the heading is changed by much, the model is linearised again behind the change (Gauss-Newton).
+    pub fn correct(&mut self, information: &SensorInformation, laser: &Laser) -> f64 {
+        let mut change = States::zeros();
+        let mut covariance = self.covariance;
+        let mut normalised_square = 0.0;
+        for _ in 0..MOST_LINEARISATIONS {
+            let from = change;
+            covariance = self.covariance;
+            (change, normalised_square) = self.change_by(information, laser, &from, &mut covariance);
+            let [[_, _, turned, ..]] = (change - from).data.0;
+            if libm::fabs(turned) < LINEAR_WITHIN {
+                break;
+            }
+        }
+        self.covariance = covariance;
+        (self.pose, self.lasting) = self.shifted(&change);
+        normalised_square
+    }
+
+    /// How the information changes the states if the model is linearised at `from` beside them; `covariance` is theirs, and
+    /// becomes that behind the change.
+    fn change_by(
+        &self,
+        information: &SensorInformation,
+        laser: &Laser,
+        from: &States,
+        covariance: &mut Covariance,
+    ) -> (States, f64) {
+        let Laser { mount, sensor, velocity } = laser;
+        let (pose, lasting) = self.shifted(from);
+        let (sine, cosine) = libm::sincos(pose.theta);
+        let [lever_x, lever_y] = lasting.lever;
+        let (arm_x, arm_y) = (mount.x + lever_x, mount.y + lever_y);
+        let (arm_x, arm_y) = (cosine * arm_x - sine * arm_y, sine * arm_x + cosine * arm_y);
+        let clock = lasting.clock;
+        let beside = Vector3::new(
+            pose.x + arm_x - velocity.x * clock - sensor.x,
+            pose.y + arm_y - velocity.y * clock - sensor.y,
+            difference(pose.theta + mount.theta + lasting.yaw, sensor.theta) - velocity.z * clock,
+        );
+        let mut change = States::zeros();
+        let mut normalised_square = 0.0;
+        for (row, value, variance) in information.told().into_iter().flatten() {
+            let (x, y, heading) = (row.x, row.y, row.z);
+            let by_heading = heading - x * arm_y + y * arm_x;
+            let (along, across) = (cosine * x + sine * y, cosine * y - sine * x);
+            let by_clock = -row.dot(velocity);
+            let expected = States::from([x, y, by_heading, along, across, heading, by_clock, 0.0, 0.0, 0.0]);
+            let shares = *covariance * expected;
+            let innovation_variance = expected.dot(&shares) + variance;
+            if innovation_variance <= 0.0 {
+                continue;
+            }
+            let innovation = value - row.dot(&beside) - expected.dot(&(change - from));
+            normalised_square += innovation * innovation / innovation_variance;
+            change += shares * (innovation / innovation_variance);
+            *covariance -= shares * shares.transpose() / innovation_variance;
+        }
+        (change, normalised_square)
+    }
+
+    /// Pose and what lasts, changed by so much.
+    fn shifted(&self, change: &States) -> (Pose, Lasting) {
+        let [[x, y, heading, lever_x, lever_y, yaw, clock, scale, steering, turn]] = change.data.0;
+        let before = self.lasting;
+        let [before_x, before_y] = before.lever;
+        let lasting = Lasting {
+            lever: [before_x + lever_x, before_y + lever_y],
+            yaw: before.yaw + yaw,
+            clock: before.clock + clock,
+            scale: before.scale + scale,
+            steering: before.steering + steering,
+            turn: before.turn + turn,
+        };
+        (Pose::new(self.pose.x + x, self.pose.y + y, self.pose.theta + heading), lasting)
+    }
+
+    /// Variances of the position's larger axis, m^2, and of the heading, rad^2.
+    #[must_use]
+    pub fn variances(&self) -> (f64, f64) {
+        let at = |row: usize, column: usize| self.covariance.get((row, column)).map_or(0.0, |entry: &f64| *entry);
+        (larger_axis(at(0, 0), at(0, 1), at(1, 1)), at(2, 2).max(0.0))
+    }
+
+    /// How far a pose may be off if this solution is right: by what lies between them, and by the solution's own bound.
+    /// `map_variances` are what the errors of the map add.
+    #[must_use]
+    pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> ProtectionLevel {
+        let (position, heading) = self.variances();
+        let (by_map, heading_by_map) = map_variances;
+        ProtectionLevel {
+            position: libm::hypot(pose.x - self.pose.x, pose.y - self.pose.y)
+                + factors.position * libm::sqrt(position + by_map),
+            heading: libm::fabs(difference(pose.theta, self.pose.theta))
+                + factors.heading * libm::sqrt(heading + heading_by_map),
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What an event's landmarks say, for the solutions that bound the error of the pose.
+
+use nalgebra::Matrix2;
+
+use super::Localizer;
+use crate::filter::RangeBearing;
+use crate::geometry::Point;
+use crate::integrity::separation::{LandmarkKey, Laser, Seen};
+use crate::maps::{Landmark, LandmarkKind, Verdict};
+use crate::measurement::LaserId;
+use crate::state::{LandmarkSource, LandmarkUse};
+
+impl<
+    const BEAMS: usize,
+    const REFLECTORS: usize,
+    const FEATURES: usize,
+    const DYNAMIC: usize,
+    const KEYS: usize,
+    const LANDMARKS: usize,
+    const STATES: usize,
+    const ENTRIES: usize,
+> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
+{
+    /// Tells the solutions what the event has seen, at the time of the newest motion. Of two lasers the first one is judged; what
+    /// the other has corrected is part of the separation.
+    #[inline(never)]
+    pub(super) fn separate(&mut self, laser: Option<LaserId>) {
+        if self.timeline.begun().is_none() || !self.parameters.protection {
+            return;
+        }
+        let now = self.timeline.now();
+        let pose = self.timeline.state().pose;
+        self.separation.step(now, self.timeline.odometry_pose());
+        let mount = *self.parameters.lasers.first();
+        let from = self.separation.laser(&mount, &pose);
+        self.separation.begin_event();
+        let first = self.outputs.uses.iter().map(|seen| seen.time).min();
+        if let Some(first) = first.filter(|_| laser == Some(LaserId::FIRST) && self.lost.is_none()) {
+            self.workspace.path.set(first, &mount, self.timeline.relative_path(first, now));
+            for index in 0..self.outputs.uses.len() {
+                let Some(seen) = self.outputs.uses.get(index).copied() else { break };
+                self.tell(&seen, first, &from);
+            }
+        }
+        let square = self.integrity.innovations.mean_normalised_square();
+        self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));
+    }
+
+    fn tell(&mut self, seen: &LandmarkUse, first: crate::measurement::Time, from: &Laser) {
+        let [x, y] = seen.position.map(f64::from);
+        let range = libm::hypot(x, y);
+        let is_reflector = seen.kind == LandmarkKind::Reflector;
+        let radius = self.parameters.association.reflector_radius;
+        let landmark = match seen.landmark {
+            Some((LandmarkSource::Fixed, id)) => self.fixed_landmark(seen, id),
+            Some((LandmarkSource::Dynamic, _)) => return,
+            None => None,
+        };
+        match (landmark, seen.verdict) {
+            (Some(landmark), Verdict::Accepted) => {
+                let key = if is_reflector { LandmarkKey::Reflector(landmark.id) } else { LandmarkKey::Features };
+                let path = &self.workspace.path;
+                let at_first = path.to_start(seen.time.since(first), &Point::new(x, y));
+                let position = path.from_start(self.timeline.now().since(first), &at_first);
+                let deviation = f64::from(landmark.deviation);
+                let seen = Seen {
+                    position,
+                    covariance: self.covariance_of(&position, is_reflector),
+                    landmark: landmark.position(),
+                    landmark_variance: deviation * deviation,
+                    shared: 1.0,
+                };
+                self.separation.see(key, &seen, from);
+            }
+            (Some(landmark), Verdict::Gated) if is_reflector => {
+                let [x, y] = seen.located;
+                let place = landmark.position();
+                self.separation.contradict(libm::hypot(place.x - x, place.y - y), range);
+            }
+            (None, Verdict::Unknown) if is_reflector && self.has_reflectors() => {
+                self.separation.contradict(radius, range);
+            }
+            _ => {}
+        }
+    }
+
+    fn has_reflectors(&self) -> bool {
+        !self.maps.reflectors.landmarks().is_empty()
+    }
+
+    /// The landmark of a fixed map that something was compared with.
+    fn fixed_landmark(&self, seen: &LandmarkUse, id: u16) -> Option<Landmark> {
+        let at = Point::from(seen.located);
+        let association = &self.parameters.association;
+        let is_it = |landmark: &&Landmark| landmark.id == id && landmark.kind == seen.kind;
+        if seen.kind == LandmarkKind::Reflector {
+            self.maps.reflectors.near(at, association.reflector_radius).find(is_it).copied()
+        } else {
+            self.maps.features.near(at, association.feature_radius).find(is_it).copied()
+        }
+    }
+
+    /// How exactly something is seen at a position in S, m^2.
+    fn covariance_of(&self, position: &Point, is_reflector: bool) -> Matrix2<f64> {
+        if !is_reflector {
+            let deviation = self.parameters.features.added_deviation;
+            return Matrix2::identity() * (2.0 * deviation * deviation);
+        }
+        let reflectors = &self.parameters.reflectors;
+        RangeBearing {
+            range: libm::hypot(position.x, position.y),
+            bearing: libm::atan2(position.y, position.x),
+            range_variance: reflectors.range_deviation * reflectors.range_deviation,
+            bearing_variance: reflectors.bearing_deviation * reflectors.bearing_deviation,
+        }
+        .cartesian()
+        .covariance
+    }
+}

@@ -1,0 +1,390 @@
+//! The solutions that bound the error of a pose, against dense algebra with numerical derivatives.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use agv_core::geometry::{Point, Pose, difference};
+use agv_core::integrity::separation::{
+    AssumedDeviations, FAULT_FREE, LandmarkKey, Laser, ONE_FAULT, Seen, SensorInformation, Solution,
+    SolutionSeparation, Step,
+};
+use agv_core::measurement::Time;
+use agv_core::odometry::{BiasJacobian, Motion};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
+
+use super::falko::scene::Random;
+
+const STATES: usize = 10;
+
+fn landmark(random: &mut Random, sensor: &Pose, noise: f64) -> Seen {
+    let landmark = Point::new(random.uniform(-15.0, 15.0), random.uniform(-15.0, 15.0));
+    let seen = sensor.inverse_transform(&landmark);
+    let position = Point::new(seen.x + noise * random.normal(), seen.y + noise * random.normal());
+    let (a, b, c) = (random.uniform(0.5, 2.0), random.uniform(-0.4, 0.4), random.uniform(0.5, 2.0));
+    let covariance = Matrix2::new(a, b, b, c) * 1e-4;
+    Seen { position, covariance, landmark, landmark_variance: 4e-6, shared: 1.0 }
+}
+
+/// Where the landmark seems to be minus where it is, if the sensor is so far beside the pose.
+fn miss(seen: &Seen, sensor: &Pose, beside: &[f64]) -> [f64; 2] {
+    let at = Pose::new(sensor.x + beside[0], sensor.y + beside[1], sensor.theta + beside[2]);
+    let located = at.transform(&seen.position);
+    [located.x - seen.landmark.x, located.y - seen.landmark.y]
+}
+
+/// Normal equations of least squares, with numerical derivatives.
+fn normal_equations(all: &[Seen], sensor: &Pose) -> (Matrix3<f64>, Vector3<f64>) {
+    let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
+    for seen in all {
+        let rotation = nalgebra::Rotation2::new(sensor.theta).matrix().to_owned();
+        let covariance = rotation * seen.covariance * rotation.transpose() + Matrix2::identity() * 4e-6;
+        let weight = covariance.try_inverse().unwrap();
+        let zero = miss(seen, sensor, &[0.0; 3]);
+        let mut jacobian = Matrix2x3::zeros();
+        for axis in 0..3 {
+            let mut beside = [0.0; 3];
+            beside[axis] = 1e-6;
+            let moved = miss(seen, sensor, &beside);
+            for row in 0..2 {
+                jacobian[(row, axis)] = (moved[row] - zero[row]) / 1e-6;
+            }
+        }
+        matrix += jacobian.transpose() * weight * jacobian;
+        vector -= jacobian.transpose() * weight * Vector2::from(zero);
+    }
+    (matrix, vector)
+}
+
+fn sum(all: &[Seen], sensor: &Pose) -> SensorInformation {
+    all.iter().fold(SensorInformation::NONE, |sum, seen| sum.with(&SensorInformation::of(seen, sensor)))
+}
+
+#[test]
+fn what_is_told_is_the_least_squares_fit_and_its_covariance() {
+    let mut random = Random::new(1);
+    for count in 1..8 {
+        let sensor = Pose::new(random.uniform(-3.0, 3.0), 1.0, random.uniform(-3.0, 3.0));
+        let all: Vec<Seen> = (0..count).map(|_| landmark(&mut random, &sensor, 0.01)).collect();
+        let (matrix, vector) = normal_equations(&all, &sensor);
+        let (mut again, mut told_vector) = (Matrix3::zeros(), Vector3::zeros());
+        let told: Vec<_> = sum(&all, &sensor).told().into_iter().flatten().collect();
+        assert_eq!(told.len(), if count == 1 { 2 } else { 3 }, "one landmark leaves a circle");
+        for (row, value, variance) in told {
+            again += row * row.transpose() / variance;
+            told_vector += row * (value / variance);
+        }
+        assert!((again - matrix).norm() < 1e-4 * matrix.norm(), "{again} {matrix}");
+        assert!((told_vector - vector).norm() < 1e-4 * vector.norm().max(1.0), "{told_vector} {vector}");
+    }
+}
+
+#[test]
+fn what_is_left_out_was_never_added() {
+    let mut random = Random::new(2);
+    let sensor = Pose::new(2.0, 1.0, 0.7);
+    let all: Vec<Seen> = (0..6).map(|_| landmark(&mut random, &sensor, 0.01)).collect();
+    let left = sum(&all, &sensor).without(&SensorInformation::of(&all[2], &sensor));
+    let others: Vec<Seen> = all.iter().enumerate().filter(|(index, _)| *index != 2).map(|(_, seen)| *seen).collect();
+    for (one, other) in left.told().iter().zip(sum(&others, &sensor).told()) {
+        let (one, other) = (one.unwrap(), other.unwrap());
+        assert!((one.0 - other.0).norm() < 1e-9 && (one.1 - other.1).abs() < 1e-9, "{one:?} {other:?}");
+        assert!((one.2 / other.2 - 1.0).abs() < 1e-9);
+    }
+}
+
+/// The errors of a map that stay are those of weighted least squares: drawn, not computed.
+#[test]
+fn the_map_s_share_is_the_scatter_of_fits_in_wrong_maps() {
+    let mut random = Random::new(3);
+    let sensor = Pose::new(2.0, 1.0, 0.7);
+    let all: Vec<Seen> = (0..4).map(|_| landmark(&mut random, &sensor, 0.0)).collect();
+    assert_eq!(sum(&all[..1], &sensor).map_variances(1.0), None, "one landmark leaves a circle");
+    let (position, heading) = sum(&all, &sensor).map_variances(1.0).unwrap();
+    let (mut scatter, mut of_heading) = (Matrix2::zeros(), 0.0);
+    const DRAWS: u32 = 20_000;
+    for _ in 0..DRAWS {
+        let wrong: Vec<Seen> = all
+            .iter()
+            .map(|seen| Seen {
+                landmark: Point::new(
+                    seen.landmark.x + 2e-3 * random.normal(),
+                    seen.landmark.y + 2e-3 * random.normal(),
+                ),
+                ..*seen
+            })
+            .collect();
+        let (matrix, vector) = normal_equations(&wrong, &sensor);
+        let found = matrix.try_inverse().unwrap() * vector;
+        let shift = nalgebra::Vector2::new(found[0], found[1]);
+        scatter += shift * shift.transpose() / f64::from(DRAWS);
+        of_heading += found[2] * found[2] / f64::from(DRAWS);
+    }
+    let largest = scatter.symmetric_eigenvalues().max();
+    assert!((position / largest - 1.0).abs() < 0.05, "{position} {largest}");
+    assert!((heading / of_heading - 1.0).abs() < 0.05, "{heading} {of_heading}");
+}
+
+/// The model of a solution, written down once more: where R goes, and where the laser is when it sees.
+struct Model {
+    displacement: Pose,
+    by_bias: BiasJacobian,
+    mount: Pose,
+    velocity: Vector3<f64>,
+}
+
+impl Model {
+    fn go(&self, state: &[f64]) -> Vec<f64> {
+        let d = &self.displacement;
+        let by_turn = [0.0, 0.5 * d.x * d.theta, d.theta];
+        let of = |axis: usize| {
+            self.by_bias.scale[axis] * state[7] + self.by_bias.steering[axis] * state[8] + by_turn[axis] * state[9]
+        };
+        let displacement = Pose::new(d.x + of(0), d.y + of(1), d.theta + of(2));
+        let pose = Pose::new(state[0], state[1], state[2]).compose(&displacement);
+        let mut next = state.to_vec();
+        next[..3].copy_from_slice(&[pose.x, pose.y, pose.theta]);
+        next
+    }
+
+    fn sensor(&self, state: &[f64]) -> [f64; 3] {
+        let mount = Pose::new(self.mount.x + state[3], self.mount.y + state[4], self.mount.theta + state[5]);
+        let pose = Pose::new(state[0], state[1], state[2]).compose(&mount);
+        let late = self.velocity * state[6];
+        [pose.x - late.x, pose.y - late.y, pose.theta - late.z]
+    }
+}
+
+fn derivative<const ROWS: usize>(function: impl Fn(&[f64]) -> Vec<f64>, at: &[f64]) -> SMatrix<f64, ROWS, STATES> {
+    let base = function(at);
+    SMatrix::from_fn(|row, column| {
+        let mut moved = at.to_vec();
+        moved[column] += 1e-6;
+        (function(&moved)[row] - base[row]) / 1e-6
+    })
+}
+
+#[test]
+fn a_solution_is_a_kalman_filter_of_all_ten_states() {
+    let mut random = Random::new(4);
+    let assumed = AssumedDeviations::default();
+    let start = Pose::new(1.0, 2.0, 0.5);
+    let mut solution = Solution::new(start, &[4e-4, 1e-5, 3e-4, 2e-6, 1e-6, 1e-4], &assumed);
+    solution.free_mounting();
+    solution.free_odometry();
+    let mut state = vec![start.x, start.y, start.theta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let mut covariance = SMatrix::<f64, STATES, STATES>::zeros();
+    for (row, column, value) in [(0, 0, 4e-4), (0, 1, 1e-5), (1, 1, 3e-4), (0, 2, 2e-6), (1, 2, 1e-6), (2, 2, 1e-4)] {
+        covariance[(row, column)] = value;
+        covariance[(column, row)] = value;
+    }
+    let deviations = [0.6, 0.6, 0.175, assumed.clock, 0.2, 0.1, 0.2];
+    for (place, deviation) in (3..).zip(deviations) {
+        covariance[(place, place)] = deviation * deviation;
+    }
+    let mount = Pose::new(0.9, 0.1, 0.2);
+    for _ in 0..30 {
+        let displacement = Pose::new(random.uniform(0.05, 0.2), 0.002, random.uniform(-0.1, 0.1));
+        let by_bias = BiasJacobian::of(&displacement, Some(1.4));
+        let noise = Matrix3::from_diagonal(&Vector3::new(4e-6, 1e-7, 2e-7));
+        let velocity = Vector3::new(0.8, 0.5, 0.3);
+        solution.predict(&Step { displacement, covariance: noise, distance: displacement.x, by_bias });
+        let model = Model { displacement, by_bias, mount, velocity };
+        let forward = derivative::<STATES>(|state| model.go(state), &state);
+        let turned = nalgebra::Rotation2::new(state[2]).matrix().to_owned();
+        let mut rotated = Matrix3::zeros();
+        rotated.fixed_view_mut::<2, 2>(0, 0).copy_from(&turned);
+        rotated[(2, 2)] = 1.0;
+        covariance = forward * covariance * forward.transpose();
+        let mut block = covariance.fixed_view_mut::<3, 3>(0, 0);
+        block += rotated * noise * rotated.transpose();
+        state = model.go(&state);
+
+        let expected = model.sensor(&state);
+        let sensor = Pose::new(
+            expected[0] + random.uniform(-0.003, 0.003),
+            expected[1] + random.uniform(-0.003, 0.003),
+            expected[2] + random.uniform(-0.001, 0.001),
+        );
+        let all: Vec<Seen> = (0..3).map(|_| landmark(&mut random, &sensor, 0.01)).collect();
+        let square = solution.correct(&sum(&all, &sensor), &Laser { mount, sensor, velocity });
+
+        let (matrix, vector) = normal_equations(&all, &sensor);
+        let noise = matrix.try_inverse().unwrap();
+        let fit = noise * vector;
+        let by_state = derivative::<3>(|state| model.sensor(state).to_vec(), &state);
+        let residual = SVector::<f64, 3>::from_fn(|axis, _| {
+            let is = if axis == 2 {
+                difference(expected[2], sensor.theta)
+            } else {
+                expected[axis] - [sensor.x, sensor.y][axis]
+            };
+            fit[axis] - is
+        });
+        let innovation = by_state * covariance * by_state.transpose() + noise;
+        let inverse = innovation.try_inverse().unwrap();
+        let gain = covariance * by_state.transpose() * inverse;
+        let change = gain * residual;
+        for (value, change) in state.iter_mut().zip(change.iter()) {
+            *value += change;
+        }
+        covariance -= gain * by_state * covariance;
+        let reference = (residual.transpose() * inverse * residual)[0];
+        assert!((square - reference).abs() < 1e-3 * reference.max(1.0), "{square} {reference}");
+        let off = solution.pose().between(&Pose::new(state[0], state[1], state[2]));
+        assert!(off.x.hypot(off.y) < 1e-5 && off.theta.abs() < 1e-5, "{off:?}");
+        let (position, heading) = solution.variances();
+        let block = Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 0)], covariance[(1, 1)]);
+        let largest = block.symmetric_eigenvalues().max();
+        assert!((position / largest - 1.0).abs() < 1e-2, "{position} {largest}");
+        assert!((heading / covariance[(2, 2)] - 1.0).abs() < 1e-2, "{heading} {}", covariance[(2, 2)]);
+    }
+}
+
+#[test]
+fn the_factors_are_those_of_the_stated_risks() {
+    // Half of 5e-8 an hour for position and heading each, at 28,800 revolutions.
+    let risk = 2.5e-8 / 28_800.0;
+    let plane = |factor: f64| (-0.5 * factor * factor).exp();
+    let axis = |factor: f64| libm::erfc(factor / 2_f64.sqrt());
+    assert!((plane(FAULT_FREE.position) / risk - 1.0).abs() < 0.05, "{}", plane(FAULT_FREE.position) / risk);
+    assert!((axis(FAULT_FREE.heading) / risk - 1.0).abs() < 0.1, "{}", axis(FAULT_FREE.heading) / risk);
+    // 1.25e-8 over 1e-4 an hour and 60 looks.
+    let risk = 1.25e-8 / (1e-4 * 60.0);
+    assert!((plane(ONE_FAULT.position) / risk - 1.0).abs() < 0.1, "{}", plane(ONE_FAULT.position) / risk);
+    assert!((axis(ONE_FAULT.heading) / risk - 1.0).abs() < 0.3, "{}", axis(ONE_FAULT.heading) / risk);
+}
+
+/// A vehicle among reflectors, whose monitor is told what is seen from a laser that may be elsewhere.
+struct Drive {
+    monitor: SolutionSeparation,
+    reflectors: Vec<Point>,
+    truth: Pose,
+    odometry: Pose,
+    time: Time,
+    random: Random,
+    mount: Pose,
+    true_mount: Pose,
+    /// The pose that is published, here that of the laser as it is believed to be mounted.
+    published: Pose,
+}
+
+impl Drive {
+    fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let reflectors =
+            (0..14).map(|_| Point::new(random.uniform(-12.0, 12.0), random.uniform(-12.0, 12.0))).collect();
+        let truth = Pose::new(-4.0, 0.0, 0.0);
+        let mount = Pose::new(0.8, 0.0, 0.0);
+        let mut monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
+        monitor.begin(Time::from_seconds(1.0), &truth, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &truth);
+        let time = Time::from_seconds(1.0);
+        Self { monitor, reflectors, truth, odometry: truth, time, random, mount, true_mount: mount, published: truth }
+    }
+
+    /// One revolution later.
+    fn revolve(&mut self, step: &Pose) {
+        let end = self.time.offset(0.125);
+        let slip = 1e-3 * self.random.normal();
+        let told = Pose::new(step.x + slip, step.y, step.theta + 1e-4 * self.random.normal());
+        let motion = Motion {
+            start: self.time,
+            end,
+            displacement: told,
+            covariance: Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-8, 4e-8)),
+            distance: told.x.abs(),
+        };
+        self.time = end;
+        self.truth = self.truth.compose(step);
+        self.odometry = self.odometry.compose(&told);
+        self.monitor.travel(&motion, &self.odometry);
+        self.monitor.step(end, &self.odometry);
+        let sensor = self.truth.compose(&self.true_mount);
+        self.published = sensor.compose(&self.mount.inverse());
+        let laser = self.monitor.laser(&self.mount, &self.published);
+        self.monitor.begin_event();
+        for (id, landmark) in self.reflectors.clone().into_iter().enumerate().take(6) {
+            let seen = sensor.inverse_transform(&landmark);
+            let mut noise = || 0.008 * self.random.normal();
+            let position = Point::new(seen.x + noise(), seen.y + noise());
+            let covariance = Matrix2::identity() * 1e-4;
+            let seen = Seen { position, covariance, landmark, landmark_variance: 4e-6, shared: 1.0 };
+            self.monitor.see(LandmarkKey::Reflector(id as u16), &seen, &laser);
+        }
+        self.monitor.end_event(&self.published, &laser, 1.0);
+    }
+
+    fn error(&self) -> (f64, f64) {
+        let off = self.truth.between(&self.published);
+        (off.x.hypot(off.y), off.theta.abs())
+    }
+}
+
+/// The published pose is off by all of the knock from then on; the level must hold it at once and for ever.
+#[test]
+fn a_knock_of_any_size_is_held_at_once_and_after_a_turn() {
+    let straight = Pose::new(0.125, 0.0, 0.0);
+    let bend = Pose::new(0.1, 0.002, 0.04);
+    for (seed, size) in [(1, 0.03), (2, 0.1), (3, 0.15), (4, 0.3), (5, 0.6)] {
+        for direction in [0.0, 1.6, 3.1, 4.7] {
+            let mut drive = Drive::new(seed);
+            let parts = [(8, straight), (60, bend), (30, straight), (60, bend), (40, straight)];
+            for _ in 0..12 {
+                drive.revolve(&straight);
+            }
+            let before = drive.monitor.level();
+            assert!(before.position < 0.08, "{before:?}");
+            drive.true_mount.x += size * f64::cos(direction);
+            drive.true_mount.y += size * f64::sin(direction);
+            for (count, step) in parts {
+                for _ in 0..count {
+                    drive.revolve(&step);
+                    let (position, heading) = drive.error();
+                    let level = drive.monitor.level();
+                    assert!(
+                        position <= level.position && heading <= level.heading,
+                        "{size} m to {direction}: {position} m, {heading} rad, {level:?} at {:?}",
+                        drive.time
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn without_a_fault_the_level_is_small_and_says_of_no_fault() {
+    let mut drive = Drive::new(9);
+    let straight = Pose::new(0.125, 0.0, 0.0);
+    let bend = Pose::new(0.1, 0.002, 0.04);
+    let mut levels = Vec::new();
+    for (count, step) in [(20, straight), (60, bend), (30, straight), (60, bend), (40, straight)] {
+        for _ in 0..count {
+            drive.revolve(&step);
+            levels.push(drive.monitor.level().position);
+        }
+    }
+    let settled = &levels[100..];
+    assert!(settled.iter().all(|level| (0.005..0.06).contains(level)), "{settled:?}");
+}
+
+/// Half of what is seen lies elsewhere: nobody can tell which half, so the bound must be as large as what contradicts.
+#[test]
+fn what_contradicts_widens_the_bound_by_its_size() {
+    let mut drive = Drive::new(6);
+    for _ in 0..12 {
+        drive.revolve(&Pose::new(0.125, 0.0, 0.0));
+    }
+    let laser = drive.monitor.laser(&drive.mount, &drive.published);
+    // One alone may be a false reflector.
+    drive.monitor.begin_event();
+    drive.monitor.contradict(0.4, 8.0);
+    drive.monitor.end_event(&drive.published, &laser, 1.0);
+    let before = drive.monitor.level();
+    assert!(before.position < 0.1, "{before:?}");
+    drive.monitor.begin_event();
+    for _ in 0..3 {
+        drive.monitor.contradict(0.4, 8.0);
+    }
+    drive.monitor.end_event(&drive.published, &laser, 1.0);
+    let level = drive.monitor.level();
+    assert!((level.position - before.position - 0.4).abs() < 0.01, "{level:?} {before:?}");
+    assert!((level.heading - before.heading - 0.05).abs() < 0.005, "{level:?} {before:?}");
+}
