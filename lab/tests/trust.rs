@@ -53,6 +53,8 @@ fn judge(spans: &[(usize, PublishedPose, f64)]) -> Outcome {
                 driven: STEP,
                 docks: true,
                 is_nominal: true,
+                is_bare: false,
+                is_hidden: false,
             });
         }
     }
@@ -124,7 +126,16 @@ fn who_says_nothing_claims_nothing() {
         let now = Time::from_seconds(10.0 + f64::from(step) * STEP);
         let stated = now.offset(-0.11);
         let truth = Some(Pose::new(9.0, 0.0, 0.0));
-        judge.hear(&Moment { now, heard: Some((&old, stated)), truth, driven: 0.0, docks: false, is_nominal: false });
+        judge.hear(&Moment {
+            now,
+            heard: Some((&old, stated)),
+            truth,
+            driven: 0.0,
+            docks: false,
+            is_nominal: false,
+            is_bare: false,
+            is_hidden: false,
+        });
     }
     assert_eq!(judge.outcome().claims, 0);
 }
@@ -170,4 +181,60 @@ fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
     // The same run is the same row.
     let parts = [0, 1].map(|number| sweep::run(&sweep::sweep(&sound, 2, 1), Shard { number, of: 2 }, || ()).unwrap());
     assert_eq!(parts.concat(), rows);
+}
+
+#[test]
+fn a_loss_where_no_reflectors_are_is_no_loss_of_continuity() {
+    let losses = |is_bare: bool| {
+        let mut judge = Judge::new(AlertLimits::default());
+        for step in 0..200_u32 {
+            let now = Time::from_seconds(1.0 + 0.01 * f64::from(step));
+            let level = ProtectionLevel { position: if step < 100 { 0.1 } else { 0.2 }, heading: 0.01 };
+            let heard = PublishedPose { level, ..pose() };
+            let truth = Some(heard.pose);
+            let moment = Moment {
+                now,
+                heard: Some((&heard, now)),
+                truth,
+                driven: 0.01,
+                docks: false,
+                is_nominal: false,
+                is_bare,
+                is_hidden: false,
+            };
+            judge.hear(&moment);
+        }
+        let outcome = judge.outcome();
+        (outcome.losses, outcome.available, outcome.judged)
+    };
+    // It is not available, though.
+    assert_eq!((losses(false), losses(true)), ((1, 100, 200), (0, 100, 200)));
+}
+
+#[test]
+fn what_nobody_can_tell_yet_counts_apart() {
+    let outcome = |is_hidden: bool| {
+        let mut judge = Judge::new(AlertLimits::default());
+        for step in 0..100_u32 {
+            let now = Time::from_seconds(1.0 + 0.01 * f64::from(step));
+            let level = ProtectionLevel { position: 0.04, heading: 0.005 };
+            let heard = PublishedPose { level, ..pose() };
+            let truth = Some(Pose::new(heard.pose.x + 0.3, heard.pose.y, heard.pose.theta));
+            let (driven, docks, is_nominal, is_bare) = (0.01, false, false, false);
+            judge.hear(&Moment {
+                now,
+                heard: Some((&heard, now)),
+                truth,
+                driven,
+                docks,
+                is_nominal,
+                is_bare,
+                is_hidden,
+            });
+        }
+        let outcome = judge.outcome();
+        (outcome.failures, outcome.hidden_hazardous, outcome.misleading)
+    };
+    // One event for each alert limit; what is misleading is so in either case.
+    assert_eq!((outcome(false), outcome(true)), ((2, 0, 100), (0, 100, 100)));
 }

@@ -27,6 +27,8 @@ pub struct OfKind {
     pub worst_hmi_s: f64,
     /// Longest distance in hazardous outputs, m.
     pub worst_hmi_m: f64,
+    /// Hazardous outputs, s, while no sensor of the vehicle could tell the fault (class C); in none of the other figures.
+    pub hidden_s: f64,
     /// Largest share of error over protection level; none if there was no claim.
     pub error_over_pl_max: Option<f64>,
     /// Share of the time in claims with a protection level within the alert limit of travelling.
@@ -182,6 +184,7 @@ fn per_fault(rows: &[Row], units: impl Fn(&str) -> String) -> Vec<OfKind> {
             worst_seed: of.worst()?.seed,
             worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
             worst_hmi_m: of.most(|outcome| outcome.worst_hazard_m),
+            hidden_s: of.sum(|outcome| outcome.hidden_hazardous) as f64 * super::judge::STEP,
             error_over_pl_max: over.is_finite().then_some(over),
             share_claimed: of.share_claimed(),
         })

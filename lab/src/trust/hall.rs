@@ -1,6 +1,7 @@
 //! Halls and drives that are drawn by a seed: size, racks, spacing of the reflectors, near-symmetry, clutter.
 //!
-//! A vehicle drives through three aisles with bends to both sides. The middle aisle has no reflectors. In the third one it
+//! A vehicle drives through three aisles with bends to both sides. In the middle one no reflector is in sight for about 10 m:
+//! its flat reflectors, at both ends, are seen from in front of them only. In the third one it
 //! stops, reverses and stands; then it docks at a station on the wall, stands, and reverses out.
 
 use std::f64::consts::FRAC_PI_2;
@@ -21,7 +22,9 @@ pub struct Hall {
     pub scenario: Scenario,
     /// Where the vehicle docks, W, m.
     pub station: Point,
-    /// Whether the commissioning check accepts it: outside of the middle aisle, nowhere on more than
+    /// Corners of where the middle aisle has no reflectors, W, m: losing availability there is no loss of continuity.
+    pub bare: [Point; 2],
+    /// Whether the commissioning check accepts it: outside of the bare part of the middle aisle, nowhere on more than
     /// [`LONGEST_BLIND`] m in a row are fewer than three reflectors within [`CHECKED_RANGE`] m in sight.
     pub is_accepted: bool,
 }
@@ -30,6 +33,11 @@ pub struct Hall {
 pub const LONGEST_BLIND: f64 = 3.0;
 /// Reflectors farther away than this do not count for the commissioning check, m.
 pub const CHECKED_RANGE: f64 = 25.0;
+
+/// From the middle of the middle aisle to the first reflector, m; one on a rack is seen from 2 m before it.
+const HALF_BARE: f64 = 6.8;
+/// A flat reflector is seen from within this of the direction that it faces, deg.
+const FLAT: f64 = 45.0;
 
 const RACK_DEPTH: f64 = 2.2;
 const BAY: f64 = 2.75;
@@ -70,8 +78,13 @@ impl Plan {
     }
 
     /// Whether something at that height belongs to the middle aisle.
-    fn is_bare(&self, y: f64) -> bool {
+    fn is_middle(&self, y: f64) -> bool {
         (y - self.aisle(1)).abs() < 0.5 * self.pitch
+    }
+
+    /// Middle of the aisles.
+    fn middle(&self) -> f64 {
+        0.5 * (self.racks.0 + self.racks.1)
     }
 }
 
@@ -99,7 +112,9 @@ pub fn draw(seed: u64) -> Hall {
         ..Scenario::default()
     };
     let is_accepted = is_accepted(&scenario, &plan);
-    Hall { scenario, station, is_accepted }
+    let bare =
+        [-1.0, 1.0].map(|side| Point::new(plan.middle() + side * HALF_BARE, plan.aisle(1) + side * 0.5 * plan.pitch));
+    Hall { scenario, station, bare, is_accepted }
 }
 
 fn add(shapes: &mut Shapes, x: f64, y: f64) {
@@ -111,6 +126,14 @@ fn add(shapes: &mut Shapes, x: f64, y: f64) {
         facing_deg: None,
         half_width_deg: 60.0,
     });
+}
+
+/// One that is seen from in front of it only.
+fn add_flat(shapes: &mut Shapes, x: f64, y: f64, facing_deg: f64) {
+    add(shapes, x, y);
+    if let Some(added) = shapes.reflectors.last_mut() {
+        *added = ReflectorShape { facing_deg: Some(facing_deg), half_width_deg: FLAT, ..*added };
+    }
 }
 
 fn add_box(shapes: &mut Shapes, pose: Pose, length: f64, width: f64) {
@@ -129,7 +152,11 @@ fn add_racks(plan: &Plan, shapes: &mut Shapes, random: &mut Random) {
                 let is_end = bay == 0 || bay == plan.bays;
                 let has_reflector = random.happens(if is_end { 0.9 } else { reflected });
                 let y = face + side * PROUD;
-                if has_reflector && !plan.is_bare(y) {
+                if plan.is_middle(y) {
+                    if (x - plan.middle()).abs() > HALF_BARE {
+                        add_flat(shapes, x, y, 90.0 * side);
+                    }
+                } else if has_reflector {
                     add(shapes, x, y);
                 }
                 for place in [0.28, 0.72] {
@@ -169,7 +196,7 @@ fn add_wall_reflectors(plan: &Plan, shapes: &mut Shapes, random: &mut Random) {
                 match (is_long, is_far) {
                     (true, false) => add(shapes, place, PROUD),
                     (true, true) => add(shapes, place, plan.width - PROUD),
-                    (false, _) if plan.is_bare(place) => {}
+                    (false, _) if plan.is_middle(place) => {}
                     (false, false) => add(shapes, PROUD, place),
                     (false, true) => add(shapes, plan.length - PROUD, place),
                 }
@@ -238,7 +265,7 @@ fn is_accepted(scenario: &Scenario, plan: &Plan) -> bool {
                     .first_hit(&laser, &(offset / distance), CHECKED_RANGE)
                     .is_some_and(|hit| hit.surface == Surface::Reflector(*index))
         });
-        let is_bare = plan.is_bare(laser.y) && laser.x > plan.racks.0 - 2.0 && laser.x < plan.racks.1 + 2.0;
+        let is_bare = plan.is_middle(laser.y) && (laser.x - plan.middle()).abs() < HALF_BARE;
         blind = if is_bare || in_sight.count() >= 3 { 0.0 } else { blind + STEP };
         if blind > LONGEST_BLIND {
             return false;

@@ -10,7 +10,7 @@
 //! | event | hazardous outputs less than 1 s apart |
 //! | integrity failure | an event with more than 0.3 s, or more than 0.5 m driven, in hazardous outputs |
 //! | available | a claim with a protection level within the alert limit, from the first claim on |
-//! | loss | the end of availability; losses within 10 s are one |
+//! | loss | the end of availability, but where no reflectors are; losses within 10 s are one |
 //!
 //! Of position and heading, one above its bound counts as above; to be within, both must be.
 
@@ -51,6 +51,10 @@ pub struct Moment<'a> {
     pub docks: bool,
     /// Whether 90 deg were turned, and four reflectors were in sight in each of the last 16 revolutions.
     pub is_nominal: bool,
+    /// Whether the vehicle is where there are no reflectors: losing availability there is no loss of continuity.
+    pub is_bare: bool,
+    /// Whether the fault is one that no sensor of the vehicle can tell yet: what is hazardous counts apart.
+    pub is_hidden: bool,
 }
 
 /// Hazardous outputs that belong together.
@@ -111,7 +115,7 @@ impl Judge {
             outcome.docking += u64::from(moment.docks);
             outcome.docking_available += u64::from(moment.docks && is_within);
         }
-        if self.was_available && !is_available {
+        if self.was_available && !is_available && !moment.is_bare {
             outcome.losses += u32::from(self.last_loss.is_none_or(|last| time - last > SAME_LOSS));
             self.last_loss = Some(time);
         }
@@ -128,6 +132,10 @@ impl Judge {
             outcome.misleading += u64::from(share > 1.0);
             hazards =
                 [self.limits.travel, self.limits.docking].map(|limit| errors.exceed(&limit) && limit.holds(&level));
+            if moment.is_hidden {
+                outcome.hidden_hazardous += u64::from(hazards.contains(&true));
+                hazards = [false; 2];
+            }
             is_right = share <= 1.0 && is_available;
         }
         self.right_since = if is_right { self.right_since.or(Some(time)) } else { None };

@@ -58,6 +58,16 @@ pub enum Lasts {
     Size(TheSize),
 }
 
+/// What reveals a fault that was there before the vehicle was switched on: until then no sensor of the vehicle can tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Revealed {
+    /// 90 degrees turned, with three reflectors in sight.
+    Turn,
+    /// 5 m driven, with three reflectors in sight.
+    Drive,
+}
+
 /// The word for the size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -86,6 +96,9 @@ pub struct Kind {
     pub what: Option<toml::Table>,
     /// How the laser moves on its mounting.
     pub knock: Option<toml::Table>,
+    /// What reveals it; until then the fault is of class C.
+    #[serde(default)]
+    pub revealed: Option<Revealed>,
     /// Whether the start is told, as it is what is tested.
     #[serde(default)]
     pub tells_start: bool,

@@ -28,6 +28,8 @@ pub struct Outcome {
     pub claims: u64,
     /// Claims with an error above the protection level.
     pub misleading: u64,
+    /// Hazardous outputs while no sensor of the vehicle could tell the fault; they are in none of the events.
+    pub hidden_hazardous: u64,
     /// Events of hazardous outputs, by either alert limit.
     pub hazards: u32,
     /// Longest time in hazardous outputs of one event, s.

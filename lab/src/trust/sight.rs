@@ -1,5 +1,6 @@
 //! What is in sight along a drive, and when docking, nominal protection and recovery may be asked for.
 
+use super::kinds::Revealed;
 use agv_core::geometry::difference;
 use agv_core::measurement::Time;
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
@@ -14,6 +15,8 @@ const NOMINAL_SIGHT: (usize, usize) = (4, 16);
 const RECOVERY_SIGHT: usize = 3;
 /// How far the vehicle must have turned for a nominal protection level, and for a recovery, rad.
 const TURNED: f64 = std::f64::consts::FRAC_PI_2;
+/// How far it must have driven for a turned laser to be revealed, m.
+const DRIVEN: f64 = 5.0;
 /// How long before the end of the run a fault must end for a recovery, s.
 const RECOVERY_TIME: f64 = 20.0;
 
@@ -95,6 +98,22 @@ impl Sight {
         lately.len() == revolutions
             && lately.iter().all(|look| look.seen >= fewest)
             && lately.last().is_some_and(|look| look.turned >= TURNED)
+    }
+
+    /// Whether what was wrong before the drive is revealed `time` s after it began.
+    #[must_use]
+    pub fn reveals(&self, by: Revealed, time: f64) -> bool {
+        let measure = |look: &Look| match by {
+            Revealed::Turn => look.turned / TURNED,
+            Revealed::Drive => look.driven / DRIVEN,
+        };
+        let shown: f64 = self
+            .until(time)
+            .windows(2)
+            .filter(|pair| pair[1].seen >= RECOVERY_SIGHT)
+            .map(|pair| measure(&pair[1]) - measure(&pair[0]))
+            .sum();
+        shown >= 1.0
     }
 
     /// Whether a recovery may be asked for of a fault that ends `until` s after the drive began.

@@ -43,7 +43,7 @@ impl Trial<'_> {
     /// # Errors
     /// See [`CampaignError`].
     pub fn run(&self) -> Result<Tried, CampaignError> {
-        let Hall { mut scenario, station, is_accepted } = draw(self.seed);
+        let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
         let mut random = Random::new(self.seed, Stream::Faults);
         // The drive alone says how long it takes.
         let seconds = duration(&scenario)?;
@@ -65,6 +65,7 @@ impl Trial<'_> {
         }
         let mut judge = Judge::new(AlertLimits::default());
         let mut before = None;
+        let mut is_hidden = self.kind.revealed.is_some();
         let options = RigOptions { seconds, seed: self.seed, is_told: self.kind.tells_start };
         rig::drive(&recording, &faults, &options, |heard| {
             let here = (heard.truth)(heard.now);
@@ -74,6 +75,10 @@ impl Trial<'_> {
                 if step > CARRIED { 0.0 } else { step }
             });
             before = here.or(before);
+            is_hidden = is_hidden && !self.kind.revealed.is_some_and(|by| sight.reveals(by, heard.time));
+            let [least, most] = bare;
+            let is_bare =
+                before.is_some_and(|here| (least.x..=most.x).contains(&here.x) && (least.y..=most.y).contains(&here.y));
             judge.hear(&Moment {
                 now: heard.now,
                 heard: heard.published,
@@ -81,6 +86,8 @@ impl Trial<'_> {
                 driven,
                 docks: sight.docks(heard.time),
                 is_nominal: sight.is_nominal(heard.time),
+                is_bare,
+                is_hidden,
             });
         })?;
         let can_recover = faults.iter().filter_map(|fault| fault.until).any(|until| sight.can_recover(until));
