@@ -42,6 +42,7 @@ mod state_slots;
 mod support;
 mod timeline;
 mod uncertain_motion;
+mod wheel_vehicle;
 mod wheels;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
