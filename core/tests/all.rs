@@ -1,14 +1,17 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
+mod alert_limits;
 mod calibration;
 mod contours;
 mod covariance_repair;
+mod event;
 mod examples;
 mod falko;
 mod filter;
 mod geometry;
 mod innovation_monitor;
 mod integrity;
+mod jump_check;
 mod key_scans;
 mod landmark_observation;
 mod landmark_use;
