@@ -9,6 +9,7 @@ mod examples;
 mod falko;
 mod filter;
 mod geometry;
+mod given_pose;
 mod innovation_monitor;
 mod integrity;
 mod jump_check;
