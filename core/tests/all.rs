@@ -1,14 +1,18 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
+mod alert_limits;
 mod calibration;
 mod contours;
 mod covariance_repair;
+mod event;
 mod examples;
 mod falko;
 mod filter;
 mod geometry;
+mod given_pose;
 mod innovation_monitor;
 mod integrity;
+mod jump_check;
 mod key_scans;
 mod landmark_observation;
 mod landmark_use;
@@ -43,6 +47,7 @@ mod state_slots;
 mod support;
 mod timeline;
 mod uncertain_motion;
+mod wheel_vehicle;
 mod wheels;
 
 /// A file that is no module of this program would be no test, and nobody would notice.

@@ -180,3 +180,30 @@ fn features_found_while_driving_are_where_they_are_seen() {
     stage.tell(stage.truth, 0.01, 0.01);
     assert!(stage.localizer.dynamic_landmarks().is_empty(), "a new pose needs new landmarks");
 }
+
+/// A map that is surveyed while the vehicle drives replaces what the vehicle has found itself: the surveyed places are surer.
+#[test]
+fn a_feature_that_was_given_is_used_where_one_was_found_on_the_way() {
+    let mut parameters = parameters();
+    parameters.maps.dynamic = true;
+    let mut stage = Stage::new(parameters);
+    assert_eq!(stage.localizer.replace_landmarks(&reflectors()), Ok(()));
+    stage.tell(stage.truth, POSITION, HEADING);
+    stage.look();
+    let sources = |stage: &mut Stage| {
+        stage.scan();
+        let uses = stage.localizer.outputs().uses.iter().filter(|used| used.verdict == Verdict::Accepted);
+        let is_at_corner = |used: &&agv_core::localizer::LandmarkUse| {
+            features().iter().any(|corner| (corner.position() - Point::from(used.located)).norm() < 0.1)
+        };
+        uses.filter(is_at_corner).filter_map(|used| Some(used.landmark?.0)).collect::<Vec<_>>()
+    };
+    for _ in 0..3 {
+        sources(&mut stage);
+    }
+    let found = sources(&mut stage);
+    assert!(found.len() > 4 && found.iter().all(|source| *source == LandmarkSource::Dynamic), "{found:?}");
+    assert_eq!(stage.localizer.replace_landmarks(&[reflectors(), features()].concat()), Ok(()));
+    let given = sources(&mut stage);
+    assert!(given.len() > 4 && given.iter().all(|source| *source == LandmarkSource::Fixed), "{given:?}");
+}

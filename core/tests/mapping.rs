@@ -359,3 +359,18 @@ fn features_that_no_map_has_are_no_evidence() {
     }
     assert!(fixed > 8, "{fixed}");
 }
+
+#[test]
+fn a_revolution_from_before_what_was_used_last_is_out_of_time() {
+    let mut stage = Stage::told(mapping());
+    let first = stage.revolve(0.5, 0.1);
+    let second = stage.revolve(0.5, 0.1);
+    stage.glimpse(&second);
+    assert!(accepted(&stage, LandmarkSource::Fixed) >= 8, "{:?}", stage.localizer.outputs().uses);
+    let before = stage.said();
+    stage.glimpse(&first);
+    let uses = &stage.localizer.outputs().uses;
+    assert_eq!(uses.len(), reflectors().len());
+    assert!(uses.iter().all(|used| used.verdict == Verdict::OutOfTime), "{uses:?}");
+    assert_eq!((stage.said().pose, stage.said().covariance), (before.pose, before.covariance));
+}

@@ -10,8 +10,8 @@ use agv_core::filter::Ekf;
 use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
-    Ackermann, Control, CounterRange, Integration, Motion, OdometerParameters, OdometryBias, OdometryError,
-    OdometryNoise, Tricycle, Vehicle, VehicleOdometer,
+    Ackermann, Believed, Control, CounterRange, Increments, Integration, Kinematics, Motion, OdometerParameters,
+    OdometryBias, OdometryError, OdometryNoise, Tricycle, Vehicle, VehicleOdometer,
 };
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -156,6 +156,14 @@ fn tricycle_odometer() -> VehicleOdometer {
             longest_interval: 0.25,
         },
     )
+}
+
+#[test]
+fn a_range_that_no_counter_has_is_refused_with_the_ranges_that_counters_have() {
+    for values in [0, 1, (1 << 32) + 1] {
+        let error = CounterRange::try_from(values).unwrap_err();
+        assert_eq!(error.to_string(), "a counter takes 2 to 2^32 values");
+    }
 }
 
 /// Error of the end pose after a drive of 2 m whose steering angle is `rate * way`, in `steps` steps, against the
@@ -324,6 +332,17 @@ fn a_turn_that_is_not_reported_moves_no_vehicle_that_turns_in_place() {
         let arc = |theta: f64| Pose::exp(&Twist { x: way, y: 0.0, theta });
         let corrected = increment(arc(turn)).corrected(&bias, lever).displacement;
         assert!(same(&corrected, &arc(turn + 4e-3 * way), 1e-6), "{corrected:?} for {way} m and {turn} rad");
+    }
+}
+
+#[test]
+fn only_increments_that_lead_back_are_backward() {
+    let believed =
+        Believed { noise: OdometryNoise::default(), integration: Integration::default(), was_backward: false };
+    for (x, is_backward) in [(0.1, false), (0.0, false), (-0.1, true)] {
+        let report = |micros, displacement| PoseIncrement { time: Time::from_micros(micros), displacement };
+        let (from, to) = (report(0, Pose::default()), report(10_000, Pose::new(x, 0.0, 0.02)));
+        assert_eq!(Increments.step(&from, &to, 0.01, &believed).is_backward, is_backward, "{x} m");
     }
 }
 

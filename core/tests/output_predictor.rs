@@ -183,3 +183,24 @@ fn a_fault_of_an_encoder_is_said_until_the_next_sample() {
     predictor.encoders(&sample(5));
     assert_is(predictor.output(), &base, &motions(5)[4..]);
 }
+
+#[test]
+fn a_pose_that_rests_on_landmarks_is_dead_reckoning_from_half_a_metre_on() {
+    let mut parameters = parameters();
+    parameters.limits.dead_reckoning_from = 0.5;
+    for mode in [Mode::Reflectors, Mode::Features, Mode::Mixed, Mode::Degraded, Mode::Lost] {
+        let mut predictor: OutputPredictor = OutputPredictor::new(&parameters);
+        predictor.encoders(&sample(0));
+        let base = PoseOutput { mode, dead_reckoning_distance: 0.45, ..base(sample(0).time) };
+        predictor.update(&base, &OdometryBias::default());
+        // 5 cm more are 500 ticks: sample 5 is at 475, and sample 6 at 576.
+        for step in 1..=12 {
+            predictor.encoders(&sample(step));
+            let rests = matches!(mode, Mode::Reflectors | Mode::Features | Mode::Mixed);
+            let expected =
+                if rests && step > 5 { (Mode::DeadReckoning, Reason::NoLandmarks) } else { (mode, Reason::None) };
+            let said = predictor.output().map(|output| (output.mode, output.reason));
+            assert_eq!(said, Some(expected), "sample {step}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Parameters with which nothing can be computed are named.
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{ParameterError, Parameters, bounds};
+use agv_core::localizer::{Limits, ParameterError, Parameters, bounds};
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 
 const TRICYCLE: Tricycle = Tricycle {
@@ -75,4 +75,12 @@ fn a_wheel_without_a_scale_and_ranges_that_exclude_each_other_are_named() {
     let error = changed.check().err();
     assert_eq!(error, Some(ParameterError { leaf: "features.nearest" }));
     assert_eq!(error.map(|error| error.to_string()).as_deref(), Some("features.nearest is out of its bounds"));
+}
+
+#[test]
+fn samples_may_be_two_and_a_half_times_as_far_apart_as_is_extrapolated_and_a_quarter_of_a_second_in_any_case() {
+    for (longest_extrapolation, expected) in [(0.0, 0.25), (0.08, 0.25), (0.1, 0.25), (0.2, 0.5), (1.0, 2.5)] {
+        let limits = Limits { longest_extrapolation, ..Limits::default() };
+        assert!((limits.longest_interval() - expected).abs() < 1e-12, "{longest_extrapolation} s: {limits:?}");
+    }
 }

@@ -1,12 +1,15 @@
 //! Sources: each has its switch, and says what became of it; a model from outside corrects like any other.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use agv_core::contours::ContourMatch;
 use agv_core::filter::{Ekf, Linearisation, Slots};
 use agv_core::geometry::Pose;
-use agv_core::localizer::{MapUse, Parameters};
+use agv_core::localizer::{MapUse, Mode, Parameters};
 use agv_core::maps::Verdict;
 use agv_core::measurement::Time;
-use agv_core::sources::{Aid, Source, Switches};
-use nalgebra::{Matrix1, Vector1};
+use agv_core::sources::{Aid, ContourFix, Source, Switches};
+use nalgebra::{Matrix1, Matrix3, Vector1, Vector3};
 
 use super::support::stage::{Stage, parameters};
 
@@ -108,6 +111,66 @@ fn an_aid_moves_the_pose_by_its_weight_and_is_gated_beyond_three_deviations() {
     assert!((after.covariance[0] - 0.0016 * 9.0 / 25.0).abs() < 1e-12, "{after:?}");
     let status = stage.localizer.outputs().sources.aids;
     assert_eq!((status.used, status.accepted, status.observations), (Some(time), 1, 1));
+}
+
+#[test]
+fn an_aid_that_is_not_wanted_moves_nothing() {
+    let of = |change: fn(&mut Parameters)| {
+        let mut wanted = parameters();
+        change(&mut wanted);
+        Stage::told(wanted)
+    };
+    let mut lost = of(|_| {});
+    // Two metres are more than the deviation above which a vehicle is lost.
+    assert_eq!(lost.tell(lost.truth, 2.0, 0.01).mode, Mode::Lost);
+    for mut stage in [of(|wanted| wanted.sources.aids = false), of(|wanted| wanted.maps.slam = true), lost] {
+        let before = stage.said();
+        let told = Told { time: stage.time(), state: 0, value: before.pose.x + 0.001, deviation: 0.03 };
+        assert_eq!(stage.localizer.aid(&told).verdict, Verdict::OutOfTime);
+        stage.report(&Pose::default());
+        assert_eq!((stage.said().pose, stage.said().covariance), (before.pose, before.covariance));
+        assert_eq!(stage.localizer.outputs().sources.aids.used, None);
+    }
+}
+
+#[test]
+fn one_kind_of_features_is_used_without_the_other() {
+    for (kind, other) in [(Source::Corners, Source::EndPoints), (Source::EndPoints, Source::Corners)] {
+        let statuses = driven(without(other), false).localizer.outputs().sources;
+        assert!(statuses.of(kind).used.is_some(), "{kind:?} without {other:?}: {:?}", statuses.of(kind));
+        assert_eq!(statuses.of(other).observations, 0, "{other:?}");
+    }
+}
+
+#[test]
+fn key_scans_are_compared_where_the_vehicle_was_in_the_middle_of_the_scan() {
+    let mut wanted = parameters();
+    wanted.maps.slam = true;
+    wanted.reflectors.detection = None;
+    let mut stage = Stage::told(wanted);
+    let start = stage.time();
+    // Twelve samples of 10 ms.
+    let revolution = stage.revolve(0.5, 0.1);
+    stage.sweep(&revolution);
+    assert_eq!(stage.localizer.outputs().sources.key_scans.told, Some(start.offset(0.06)));
+}
+
+#[test]
+fn a_match_of_contours_says_how_far_it_is_from_the_pose() {
+    let share = 0.6;
+    let found = |pose| ContourMatch { pose, information: Matrix3::identity() * 1e4, free_axis: None, share };
+    // A laser half a metre in front and turned by a quarter, seen at (2, 3) looking back along x, belongs to a vehicle that
+    // looks down along y from (2, 3.5).
+    let mount = Pose::new(0.5, 0.0, -FRAC_PI_2);
+    let fix = ContourFix::new(Time::default(), &found(Pose::new(2.0, 3.0, -PI)), &mount).unwrap();
+    for (pose, expected) in [
+        (Pose::new(2.0, 3.5, -FRAC_PI_2), [0.0, 0.0, 0.0]),
+        (Pose::new(1.9, 3.3, -FRAC_PI_2 - 0.1), [0.1, 0.2, 0.1]),
+        (Pose::new(-5.0, 8.0, FRAC_PI_2 + 0.2), [7.0, -4.5, PI - 0.2]),
+    ] {
+        let residual = fix.linearise(&Ekf::new(pose, 0.1, 0.1)).unwrap().residual;
+        assert!((residual - Vector3::from(expected)).norm() < 1e-9, "{pose:?}: {residual}");
+    }
 }
 
 #[test]

@@ -291,6 +291,7 @@ proptest! {
             prop_assert!((state.pose.position() - Point::new(dense.mean[0], dense.mean[1])).norm() < 1e-7);
             prop_assert!(wrap(state.pose.theta - dense.mean[2]).abs() < 1e-8);
             prop_assert!((filter.bias().scale - dense.mean[3]).abs() < 1e-7);
+            prop_assert!((filter.bias().steering - dense.mean[4]).abs() < 1e-7);
             prop_assert!((filter.laser_yaw() - dense.mean[YAW]).abs() < 1e-7);
             let free = Square::identity() * 1e-12;
             prop_assert!((covariance + free).cholesky().is_some(), "{step:?}: not positive");

@@ -268,3 +268,54 @@ fn a_timeline_that_begins_anew_knows_nothing_of_what_was() {
     let off = timeline.state().pose.between(&expected);
     assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
 }
+
+/// One metre a second, straight on.
+fn straight(step: u64) -> Motion {
+    Motion { displacement: Pose::new(0.01, 0.0, 0.0), distance: 0.01, ..motion(step) }
+}
+
+#[test]
+fn a_pose_for_a_time_between_two_samples_goes_on_by_the_rest_of_the_motion() {
+    let mut timeline: Timeline<40> = Timeline::new(0.1);
+    timeline.begin(time(0, 0), start().1);
+    for step in 0..10 {
+        timeline.advance(&straight(step));
+    }
+    // 57 ms before the newest sample, which is as many millimetres and 5.7 steps' variance.
+    timeline.begin(time(4, 3_000), Ekf::new(Pose::new(5.0, 7.0, 0.0), 0.0, 0.0));
+    assert_eq!((timeline.start(), timeline.now()), (time(4, 3_000), time(10, 0)));
+    let state = timeline.state();
+    for pose in [state.pose, *timeline.odometry_pose()] {
+        assert!((pose.x - 5.057).abs() < 1e-12 && (pose.y - 7.0).abs() < 1e-12 && pose.theta == 0.0, "{pose:?}");
+    }
+    assert!((state.covariance().m11 - 5.7e-6).abs() < 1e-15, "{}", state.covariance());
+    let middle = timeline.state_at(time(4, 8_000));
+    assert!(middle.is_ok_and(|state| (state.pose.x - 5.005).abs() < 1e-12), "{middle:?}");
+}
+
+#[test]
+fn a_time_is_reached_from_the_beginning_to_as_far_ahead_as_is_extrapolated() {
+    let mut timeline: Timeline<40> = Timeline::new(0.5);
+    timeline.begin(time(0, 0), start().1);
+    timeline.advance(&motion(0));
+    let before = Time::from_micros(time(0, 0).micros() - 1);
+    assert_eq!(timeline.reaches(before), Err(TimelineError::TooLate));
+    for within in [time(0, 0), time(0, 4_000), time(1, 0), time(1, 1), time(1, 500_000)] {
+        assert_eq!(timeline.reaches(within), Ok(()), "{within:?}");
+    }
+    assert_eq!(timeline.reaches(time(1, 500_001)), Err(TimelineError::TooEarly));
+}
+
+/// What is left of the past was only assumed: the last motion that was reported is all that tells the velocity.
+#[test]
+fn a_vehicle_whose_pose_is_given_behind_the_last_sample_keeps_the_velocity_of_that() {
+    let mut timeline: Timeline<40> = Timeline::new(0.1);
+    timeline.begin(time(0, 0), start().1);
+    for step in 0..10 {
+        timeline.advance(&motion(step));
+    }
+    timeline.assume(&Motion { start: time(10, 0), end: time(13, 0), ..motion(9) });
+    timeline.begin(time(11, 0), start().1);
+    assert_eq!(timeline.now(), time(13, 0));
+    assert_eq!(timeline.recent_motion(0.05), motion(9));
+}

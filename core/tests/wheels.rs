@@ -4,9 +4,9 @@
 use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::measurement::{Time, WheelReading, WheelSample};
 use agv_core::odometry::{
-    AckermannWheels, AngleEncoder, BiSteerable, Contact, Control, CounterRange, Differential, DrivenWheel, Integration,
-    Mecanum, Odometer, OdometerParameters, OdometryError, OdometryNoise, Omnidirectional, SteeredWheel, Tricycle,
-    Wheel, WheelBased, WheelMotion, WheelParameter, WheelPath,
+    AckermannWheels, AngleEncoder, Believed, BiSteerable, Contact, Control, CounterRange, Differential, DrivenWheel,
+    Integration, Kinematics, Mecanum, Odometer, OdometerParameters, OdometryError, OdometryNoise, Omnidirectional,
+    SteeredWheel, Tricycle, Wheel, WheelBased, WheelMotion, WheelParameter, WheelPath, Wheels,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -267,4 +267,115 @@ fn wheels_that_do_not_determine_the_motion_give_none() {
     let [wheel, _] = tricycle().wheels();
     let motions = [WheelMotion { turn: 1.0, ..WheelMotion::default() }];
     assert!(WheelPath::new(&[wheel], &motions, &OdometryNoise::default(), Integration::Arc).is_none());
+}
+
+/// Wheels that all roll the same way on rollers tell nothing of the way across, wherever they stand. Rounding makes the
+/// determinant of their equations some small number of either sign.
+#[test]
+fn parallel_wheels_that_may_move_across_do_not_determine_the_motion() {
+    let noise = OdometryNoise::default();
+    for degree in 0..180 {
+        let heading = f64::from(degree).to_radians();
+        let wheels = [(0.31, 0.27), (-0.43, 0.19), (0.17, -0.37), (-0.29, -0.23)]
+            .map(|(x, y)| DRIVEN.at(x, y, heading, Contact::Rollers(0.0)));
+        let motions = [WheelMotion { turn: 1.0, ..WheelMotion::default() }; 4];
+        let path = WheelPath::new(&wheels, &motions, &noise, Integration::Arc);
+        assert!(path.is_none(), "toward {degree} deg they moved by {:?}", path.unwrap().displacement());
+    }
+}
+
+/// The end of an arc is an integral along it, `x' = s cos(tu)`, `y' = s sin(tu)` over u from 0 to 1: so is its derivative.
+#[test]
+fn the_derivative_of_a_flat_arc_is_that_of_its_integral() {
+    let vehicle = Differential { track: 0.5, left: DRIVEN, right: DRIVEN };
+    let wheels = vehicle.wheels();
+    let noise = OdometryNoise::default();
+    for turn in [1e-4, -3e-3, 5e-3, -9.9e-3, 9.99e-3, 1.01e-2, -0.02, 0.3] {
+        let (middle, half_track) = (1.2, 0.25);
+        let motions = [middle - half_track * turn, middle + half_track * turn]
+            .map(|way| WheelMotion { turn: way / 0.1, ..WheelMotion::default() });
+        let path = WheelPath::new(wheels.as_ref(), &motions, &noise, Integration::Arc).unwrap();
+        let found = path.derivative(1, WheelParameter::Turn) / 0.1;
+        // A way of the right wheel is half as much of the middle, and turns by its share of the track.
+        let integral = |of: &dyn Fn(f64) -> f64| {
+            let steps = 200;
+            let at = |step: u32| of(f64::from(step) / f64::from(steps));
+            let sum = (0..steps / 2).map(|pair| at(2 * pair) + 4.0 * at(2 * pair + 1) + at(2 * pair + 2)).sum::<f64>();
+            sum / (3.0 * f64::from(steps))
+        };
+        let (by_way, by_turn) = (0.5, 1.0 / 0.5);
+        let expected = Vector3::new(
+            integral(&|u| by_way * (turn * u).cos() - by_turn * middle * u * (turn * u).sin()),
+            integral(&|u| by_way * (turn * u).sin() + by_turn * middle * u * (turn * u).cos()),
+            by_turn,
+        );
+        assert!((found - expected).norm() < 1e-11, "{turn} rad: {found} {expected}");
+    }
+}
+
+/// Each wheel is wrong for itself by its speed's noise over the time: variances by hand.
+#[test]
+fn noise_of_each_wheels_speed_is_the_covariance() {
+    let noise = OdometryNoise { speed: 0.2, slip: 0.0, yaw: 0.0, ..OdometryNoise::default() };
+    let mut odometer = odometer(Differential { right: DRIVEN, ..differential() }, noise);
+    let [first, second] = samples([2.0, 2.0, 0.0, 0.0], [0.0; 4]);
+    odometer.report(&first).unwrap_err();
+    let covariance = odometer.report(&second).unwrap().covariance;
+    // 0.2 m/s for 0.1 s.
+    let variance = 0.02 * 0.02;
+    assert!((covariance[(0, 0)] - 0.5 * variance).abs() < 1e-9, "{covariance}");
+    assert!((covariance[(2, 2)] - 2.0 * variance / 0.25).abs() < 1e-9, "{covariance}");
+}
+
+/// A wheel without a radius says that nothing moves along it, whatever its counter does: no noise of its turn is any way.
+#[test]
+fn a_counted_wheel_without_a_radius_adds_no_noise_of_its_speed() {
+    let noise = OdometryNoise { speed: 0.2, slip: 0.0, yaw: 0.0, ..OdometryNoise::default() };
+    let across = DrivenWheel { radius: 0.0, ..DRIVEN }.at(0.0, 0.0, std::f64::consts::FRAC_PI_2, Contact::Rollers(0.0));
+    let [left, right] = [0.25, -0.25].map(|y| DRIVEN.at(0.0, y, 0.0, Contact::Rollers(0.0)));
+    let [first, second] = samples([2.0, 2.0, 1.0, 0.0], [0.0; 4]);
+    let believed = Believed { noise, integration: Integration::Arc, was_backward: false };
+    let step = Wheels([left, right, across]).step(&first, &second, 0.1, &believed);
+    assert!(same(&step.displacement, &Pose::new(0.2, 0.0, 0.0), 1e-9), "{step:?}");
+    let variance = 0.02 * 0.02;
+    assert!((step.covariance[(0, 0)] - 0.5 * variance).abs() < 1e-9, "{}", step.covariance);
+    // An arc leads to the side by half of its way for each radian of its turn.
+    let side = 0.1 * 0.1 * 2.0 * variance / 0.25;
+    assert!((step.covariance[(1, 1)] - side).abs() < 1e-9, "{}", step.covariance);
+}
+
+#[test]
+fn wheels_of_which_the_fastest_may_go_half_its_counters_range_are_not_believed() {
+    // Half of 16 bits are 0.328 m at 0.1 m radius, which 5 m/s are in 65.5 ms.
+    let short = AngleEncoder { scale: 1e-4, range: CounterRange::BITS_16 };
+    let wheel = DrivenWheel { turn: short, ..DRIVEN };
+    for (micros, is_told) in [(60_000, true), (65_000, true), (66_000, false), (130_000, false)] {
+        // The other wheel's counter is long enough for any time.
+        let mut odometer = odometer(Differential { track: 0.5, left: DRIVEN, right: wheel }, OdometryNoise::default());
+        let way = f64::from(micros) * 4.9e-6;
+        let count = |encoder: &AngleEncoder, share: f64| {
+            encoder.range.wrap((share * way / (0.1 * encoder.scale)).round() as i64)
+        };
+        let sample = |time, share| {
+            let [left, right] = [ENCODER, short].map(|encoder| count(&encoder, share));
+            let reading = |count| WheelReading { count, steering: 0 };
+            WheelSample { time: Time::from_micros(time), wheels: [left, right, 0, 0].map(reading) }
+        };
+        assert_eq!(odometer.report(&sample(0, 0.0)), Err(OdometryError::First));
+        let told = odometer.report(&sample(micros as u64, 1.0));
+        if is_told {
+            assert!((told.unwrap().displacement.x - way).abs() < 2e-5, "{micros} us: {told:?}");
+        } else {
+            assert_eq!(told, Err(OdometryError::Pause), "{micros} us");
+        }
+    }
+}
+
+#[test]
+fn a_steering_ratio_of_two_per_cent_more_makes_the_encoders_angle_that_much_larger() {
+    let steered = bi_steerable().wheels().as_ref()[0];
+    let scale = |change| steered.changed(WheelParameter::SteeringRatio, change).steering.unwrap().scale;
+    assert!((scale(0.02) - 1.02e-6).abs() < 1e-18 && (scale(-0.5) - 0.5e-6).abs() < 1e-18);
+    let fixed = DRIVEN.at(0.0, 0.25, 0.0, Contact::Tyre);
+    assert_eq!(fixed.changed(WheelParameter::SteeringRatio, 0.02), fixed);
 }
