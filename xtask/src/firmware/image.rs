@@ -43,7 +43,7 @@ impl Region {
 pub const AN500: Board = Board {
     feature: "an500",
     images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
-    ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 320 * 1024 }],
+    ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 368 * 1024 }],
 };
 
 /// The vehicle's board, a Nucleo-H743ZI. The stack has the DTCM for itself.
