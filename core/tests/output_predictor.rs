@@ -90,7 +90,9 @@ fn assert_is(said: Option<PoseOutput>, base: &PoseOutput, since: &[Motion]) {
         |entries: &[f64; 6]| 0.5 * (entries[0] + entries[2]) + (0.5 * (entries[0] - entries[2])).hypot(entries[1]);
     let [before, after] = [&base.covariance, &said.covariance].map(|entries| larger(entries).sqrt());
     let grown = (7.45 * (after - before)).max(0.0) + base.level.heading * way;
-    assert!((said.level.position - base.level.position - grown).abs() < 1e-9, "{:?} {grown}", said.level);
+    // Of a motion that is partly known all of the distance counts.
+    let more = said.level.position - base.level.position - grown;
+    assert!((-1e-9..0.011 * base.level.heading).contains(&more), "{:?} {grown}", said.level);
     let grown = 7.15 * (said.covariance[5].sqrt() - base.covariance[5].sqrt());
     assert!((said.level.heading - base.level.heading - grown).abs() < 1e-9, "{:?} {grown}", said.level);
     let PoseOutput { pose, covariance, smooth, time, dead_reckoning_distance, level, .. } = said;

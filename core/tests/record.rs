@@ -471,7 +471,7 @@ fn missing_and_repeated_frames_are_reported() {
 #[test]
 fn another_version_is_told_apart_from_damage() {
     let (frames, _) = small_log();
-    for (version, is_read) in [(8, false), (9, true), (10, false)] {
+    for (version, is_read) in [(9, false), (10, true), (11, false)] {
         let mut frame = frames[2].clone();
         frame[4] = version;
         let end = frame.len() - 4;
@@ -506,7 +506,7 @@ fn the_header_of_a_localiser_s_log_states_its_room() {
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 9, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 10, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }
