@@ -299,5 +299,5 @@ fn a_log_of_another_version_is_refused() {
     let path = folder.path().join("drive.agvlog");
     std::fs::write(&path, [&body[..], &checksum.to_le_bytes()].concat()).unwrap();
     let message = log::read(&path).unwrap_err().to_string();
-    assert!(message.ends_with(": the log has format version 1, this program reads 9"), "{message}");
+    assert!(message.ends_with(": the log has format version 1, this program reads 10"), "{message}");
 }

@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ProtectionLevel;
-use crate::state::Mode;
+use crate::state::{Mode, ProtectionLevel};
 
 /// Largest errors that a use of the pose can live with (the alert limits of satellite navigation, RTCA DO-229).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -14,7 +14,6 @@ mod alert_limits;
 mod innovation_monitor;
 mod jump_check;
 mod mounting_check;
-mod protection_level;
 pub mod separation;
 mod slip_check;
 
@@ -22,13 +21,13 @@ pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
 pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
 pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
 pub use mounting_check::{MountingCheck, Suspect};
-pub use protection_level::ProtectionLevel;
 pub use slip_check::SlipCheck;
 
 use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::{LASERS, LaserId, Time};
 use crate::state::LandmarkUse;
+pub use crate::state::ProtectionLevel;
 
 /// All checks of one vehicle.
 #[derive(Clone, Debug)]

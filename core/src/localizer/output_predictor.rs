@@ -9,10 +9,10 @@ use nalgebra::Matrix3;
 
 use super::Parameters;
 use crate::filter::Ekf;
-use crate::integrity::ProtectionLevel;
+use crate::integrity::separation::fault_free;
 use crate::measurement::{EncoderFaults, EncoderSample, Time};
 use crate::odometry::{Motion, OdometryBias, VehicleOdometer};
-use crate::state::{Mode, PoseOutput, Reason};
+use crate::state::{Mode, PoseOutput, ProtectionLevel, Reason};
 
 /// Longest time, s, for which a localiser that says nothing is merely busy: the longest scan, twice.
 const LONGEST_BUSY: f64 = 0.25;
@@ -140,8 +140,8 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
 impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
     /// That of the localiser's pose, grown with what the pose is less sure of, and with the heading's share in the distance since.
     fn level(&self, base: &PoseOutput, travelled: f64) -> ProtectionLevel {
-        let now = ProtectionLevel::fault_free(&self.state.covariance_entries());
-        let then = ProtectionLevel::fault_free(&base.covariance);
+        let now = fault_free(&self.state.covariance_entries());
+        let then = fault_free(&base.covariance);
         ProtectionLevel {
             position: base.level.position
                 + (now.position - then.position).max(0.0)

@@ -2,9 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Mode, Reason};
+use super::{Mode, ProtectionLevel, Reason};
 use crate::geometry::Pose;
-use crate::integrity::ProtectionLevel;
 use crate::measurement::Time;
 
 /// The pose with its truth.

@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use agv_core::contours::{ContourMatch, Prediction, SurfacePoint, Surroundings, align, find_surface_points};
 use agv_core::geometry::{Point, Pose, difference};
 use agv_core::integrity::ProtectionLevel;
+use agv_core::integrity::separation::fault_free;
 use agv_core::localizer::PoseOutput;
 use agv_core::sensing::PointScan;
 use agv_core::state::{Mode, Reason};
@@ -221,7 +222,7 @@ fn claim(pose: &Pose, covariance: &Matrix3<f64>) -> PoseOutput {
         dead_reckoning_distance: 0.0,
         correction: 0.0,
         smooth: *pose,
-        level: ProtectionLevel::fault_free(&entries),
+        level: fault_free(&entries),
         acceptance: 1.0,
         normalised_square: 2.0,
         resets: 0,

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::sensor_information::larger_axis;
+use crate::state::ProtectionLevel;
+
 /// Standard deviations of what stays as it is for the whole drive, beside the noise of the odometry and of the sensors. They
 /// are what calibration and clocks leave; each has the source that its default is from.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,4 +47,15 @@ pub struct Factors {
     pub position: f64,
     /// Of the heading.
     pub heading: f64,
+}
+
+/// The protection level of a pose with this covariance in W (xx, xy, yy, x heading, y heading, heading; m and rad), if nothing is wrong
+/// with vehicle, sensors and map, and if these have no errors that last.
+#[must_use]
+pub fn fault_free(covariance: &[f64; 6]) -> ProtectionLevel {
+    let [xx, xy, yy, _, _, heading] = *covariance;
+    ProtectionLevel {
+        position: FAULT_FREE.position * libm::sqrt(larger_axis(xx, xy, yy)),
+        heading: FAULT_FREE.heading * libm::sqrt(heading.max(0.0)),
+    }
 }

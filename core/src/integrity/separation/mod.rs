@@ -13,16 +13,16 @@ mod solution;
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
-pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT};
+pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, fault_free};
 pub use hypothesis::{Assumption, LandmarkKey};
 use hypothesis::{FreeSince, Knock, LeftOut};
 pub use sensor_information::{Seen, SensorInformation};
 pub use solution::{Laser, Solution, Step};
 
-use super::ProtectionLevel;
 use crate::geometry::Pose;
 use crate::measurement::Time;
 use crate::odometry::{BiasJacobian, Motion};
+use crate::state::ProtectionLevel;
 
 /// Solutions without landmarks, and with a knock in an interval.
 const LEAVE_OUTS: usize = 16;

@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::assumed::{AssumedDeviations, Factors};
 use super::sensor_information::{SensorInformation, larger_axis};
 use crate::geometry::{Pose, difference};
-use crate::integrity::ProtectionLevel;
 use crate::odometry::BiasJacobian;
+use crate::state::ProtectionLevel;
 
 /// The pose, the place and yaw of the laser beside those believed, its clock, and scale, steering and turn of the odometry.
 pub const STATES: usize = 10;
