@@ -388,3 +388,13 @@ fn what_contradicts_widens_the_bound_by_its_size() {
     assert!((level.position - before.position - 0.4).abs() < 0.01, "{level:?} {before:?}");
     assert!((level.heading - before.heading - 0.05).abs() < 0.005, "{level:?} {before:?}");
 }
+
+#[test]
+fn a_solution_that_is_not_a_number_bounds_nothing() {
+    let assumed = AssumedDeviations::default();
+    for covariance in [[f64::NAN, 0.0, 1e-4, 0.0, 0.0, 1e-5], [1e-4, 0.0, 1e-4, 0.0, 0.0, f64::NAN]] {
+        let solution = Solution::new(Pose::default(), &covariance, &assumed);
+        let level = solution.bound(&Pose::default(), &FAULT_FREE, (0.0, 0.0));
+        assert!(level.position > 1e6 && level.heading > 1e6, "{level:?}");
+    }
+}

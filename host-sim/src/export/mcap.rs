@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
+use agv_core::integrity::{Alarm, AlertLimits};
 use agv_core::localizer::{LandmarkUse, Mode, PoseOutput, Reason};
 use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::{EncoderFault, EncoderFaults, PoseFix, Time};
@@ -278,7 +279,8 @@ struct Exporter {
     now: Time,
     scan_start: Option<Time>,
     faults: EncoderFaults,
-    diagnosed: Option<(Time, Mode, Reason, EncoderFaults)>,
+    diagnosed: Option<(Time, Mode, Reason, Alarm, EncoderFaults)>,
+    limits: AlertLimits,
 }
 
 impl Exporter {
@@ -291,6 +293,7 @@ impl Exporter {
             scan_start: None,
             faults: EncoderFaults::default(),
             diagnosed: None,
+            limits: parameters.alert_limits,
         }
     }
 
@@ -370,9 +373,10 @@ impl Exporter {
     }
 
     fn diagnose(&mut self, writer: &mut Writer, output: &PoseOutput) -> Result<(), McapExportError> {
-        let state = (self.now, output.mode, output.reason, self.faults);
-        let is_known = self.diagnosed.is_some_and(|(time, mode, reason, faults)| {
-            (mode, reason) == (output.mode, output.reason)
+        let alarm = self.limits.alarm(output.mode, &output.level);
+        let state = (self.now, output.mode, output.reason, alarm, self.faults);
+        let is_known = self.diagnosed.is_some_and(|(time, mode, reason, last, faults)| {
+            (mode, reason, last) == (output.mode, output.reason, alarm)
                 && (faults.drive, faults.steering) == (self.faults.drive, self.faults.steering)
                 && self.now.since(time) < DIAGNOSTIC_INTERVAL
         });
@@ -380,7 +384,7 @@ impl Exporter {
             return Ok(());
         }
         self.diagnosed = Some(state);
-        writer.write(Topic::Diagnostics, self.now, &diagnostics(self.now, output, &self.faults))
+        writer.write(Topic::Diagnostics, self.now, &diagnostics(self.now, output, alarm, &self.faults))
     }
 }
 
@@ -459,7 +463,7 @@ fn observations(now: Time, uses: &[LandmarkUse]) -> Markers {
     }
 }
 
-fn diagnostics(now: Time, output: &PoseOutput, faults: &EncoderFaults) -> Diagnostics {
+fn diagnostics(now: Time, output: &PoseOutput, alarm: Alarm, faults: &EncoderFaults) -> Diagnostics {
     let value = |key: &str, value: String| KeyValue { key: key.to_owned(), value };
     let level = match output.mode {
         Mode::Reflectors | Mode::Features | Mode::Mixed => Level::Ok,
@@ -473,6 +477,9 @@ fn diagnostics(now: Time, output: &PoseOutput, faults: &EncoderFaults) -> Diagno
         hardware_id: String::new(),
         values: vec![
             value("dead reckoning distance, m", output.dead_reckoning_distance.to_string()),
+            value("protection level of the position, m", output.level.position.to_string()),
+            value("protection level of the heading, rad", output.level.heading.to_string()),
+            value("alarm", format!("{alarm:?}").to_lowercase()),
             value("acceptance", output.acceptance.to_string()),
             value("normalised square", output.normalised_square.to_string()),
         ],

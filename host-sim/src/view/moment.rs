@@ -1,6 +1,7 @@
 //! Everything about one instant.
 
 use agv_core::geometry::{Point, Pose};
+use agv_core::integrity::Alarm;
 use agv_core::localizer::{LandmarkUse, Mode, PoseOutput, Reason};
 use agv_core::measurement::{EncoderFault, Time};
 use serde::Serialize;
@@ -30,6 +31,10 @@ pub struct PoseMoment {
     pub pose: [f64; 3],
     /// Covariance: xx, xy, yy, x heading, y heading, heading.
     pub covariance: [f64; 6],
+    /// Protection level of the position, m, and of the heading, rad.
+    pub level: [f64; 2],
+    /// What the pose must not be used for.
+    pub alarm: Alarm,
     /// Mode.
     pub mode: Mode,
     /// Mode in words.
@@ -118,6 +123,8 @@ impl Timeline {
                 time_s: output.time.seconds(),
                 pose: numbers(&output.pose),
                 covariance: output.covariance,
+                level: [output.level.position, output.level.heading],
+                alarm: self.parameters.alert_limits.alarm(output.mode, &output.level),
                 mode: output.mode,
                 mode_name: mode_name(output.mode),
                 reason: output.reason,

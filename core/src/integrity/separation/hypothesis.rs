@@ -96,7 +96,7 @@ impl Fit {
     /// Takes one event; true if the solution does not hold.
     pub fn refutes(&mut self, normalised_square: f64) -> bool {
         self.mean += (normalised_square.min(REFUTED.0) - self.mean) / EVENTS;
-        normalised_square > REFUTED.0 || self.mean > REFUTED.1
+        normalised_square.is_nan() || normalised_square > REFUTED.0 || self.mean > REFUTED.1
     }
 }
 

@@ -106,6 +106,11 @@ impl Contradiction {
     }
 }
 
+/// Whether a solution does not hold; one that is not a number does not.
+fn is_refuted(normalised_square: f64) -> bool {
+    normalised_square.is_nan() || normalised_square > REFUTED
+}
+
 /// The solutions, and the protection level that they give.
 #[derive(Clone, Debug)]
 pub struct SolutionSeparation {
@@ -363,14 +368,14 @@ impl SolutionSeparation {
         let all_before = self.all.clone();
         self.all.correct(&told, laser);
         for one in &mut self.leave_outs {
-            if one.solution.correct(&told.without(&one.told), laser) > REFUTED {
+            if is_refuted(one.solution.correct(&told.without(&one.told), laser)) {
                 one.solution = all_before.clone();
             }
         }
         self.creeping.correct(&told, laser);
         self.correct_fast_creeping(&told, laser);
         self.odometry.loosen_odometry(&CHANGE.map(|deviation| deviation * deviation * self.unseen.0));
-        if self.odometry.correct(&told, laser) > REFUTED {
+        if is_refuted(self.odometry.correct(&told, laser)) {
             self.odometry = self.all.clone();
             self.odometry.free_odometry();
         }
@@ -381,7 +386,7 @@ impl SolutionSeparation {
             let square = knock.solution.correct(&told, laser);
             knock.is_over |= now.since(knock.from) >= INTERVAL;
             let (place, yaw) = knock.solution.mounting_error();
-            square <= REFUTED && place <= FURTHEST_KNOCK.0 && yaw <= FURTHEST_KNOCK.1
+            !is_refuted(square) && place <= FURTHEST_KNOCK.0 && yaw <= FURTHEST_KNOCK.1
         });
         self.correct_free(&told, laser);
         self.unseen = (0.0, 0.0);
@@ -406,7 +411,7 @@ impl SolutionSeparation {
     }
 
     fn correct_fast_creeping(&mut self, told: &SensorInformation, laser: &Laser) {
-        if self.fast_creeping.correct(told, laser) > REFUTED {
+        if is_refuted(self.fast_creeping.correct(told, laser)) {
             self.fast_creeping = self.all.clone();
         }
         let bound = self.fast_creeping.bound(self.all.pose(), &Factors { position: 0.0, heading: 0.0 }, (0.0, 0.0));

@@ -124,10 +124,16 @@ impl SensorInformation {
 
 const ZERO: Matrix3<f64> = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
+/// What rounding has made negative is zero; what is not a number stays so.
+#[must_use]
+pub fn not_negative(variance: f64) -> f64 {
+    if variance < 0.0 { 0.0 } else { variance }
+}
+
 /// Variance along the larger axis of a covariance of two numbers.
 #[must_use]
 pub fn larger_axis(xx: f64, xy: f64, yy: f64) -> f64 {
-    (0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy)).max(0.0)
+    not_negative(0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy))
 }
 
 struct Matrix3Parts {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::assumed::{AssumedDeviations, Factors};
-use super::sensor_information::{SensorInformation, larger_axis};
+use super::sensor_information::{SensorInformation, larger_axis, not_negative};
 use crate::geometry::{Pose, difference};
 use crate::odometry::BiasJacobian;
 use crate::state::ProtectionLevel;
@@ -290,7 +290,7 @@ impl Solution {
     #[must_use]
     pub fn variances(&self) -> (f64, f64) {
         let at = |row: usize, column: usize| self.covariance.get((row, column)).map_or(0.0, |entry: &f64| *entry);
-        (larger_axis(at(0, 0), at(0, 1), at(1, 1)), at(2, 2).max(0.0))
+        (larger_axis(at(0, 0), at(0, 1), at(1, 1)), not_negative(at(2, 2)))
     }
 
     /// How far a pose may be off if this solution is right: by what lies between them, and by the solution's own bound.
@@ -299,11 +299,13 @@ impl Solution {
     pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> ProtectionLevel {
         let (position, heading) = self.variances();
         let (by_map, heading_by_map) = map_variances;
-        ProtectionLevel {
+        let level = ProtectionLevel {
             position: libm::hypot(pose.x - self.pose.x, pose.y - self.pose.y)
                 + factors.position * libm::sqrt(position + by_map),
             heading: libm::fabs(difference(pose.theta, self.pose.theta))
                 + factors.heading * libm::sqrt(heading + heading_by_map),
-        }
+        };
+        // What is not a number bounds nothing.
+        if level.position.is_finite() && level.heading.is_finite() { level } else { ProtectionLevel::UNBOUNDED }
     }
 }

@@ -79,6 +79,7 @@ class MapView {
     this.observations(c, moment.observations, sx, sy);
     if (moment.truth) this.outline(c, moment.truth, sx, sy, scale, "#000", [5, 4]);
     if (moment.pose) {
+      this.level(c, moment.pose, sx, sy, scale);
       this.ellipse(c, moment.pose, sx, sy, scale);
       this.vehicle(c, moment.pose.pose, sx, sy, scale, MODE_COLOURS[moment.pose.mode_name]);
       this.drawn.vehicle = { x: moment.pose.pose[0], y: moment.pose.pose[1], heading: moment.pose.pose[2],
@@ -146,6 +147,16 @@ class MapView {
       MARKS[VERDICT_MARKS[verdict]](c, sx(x), sy(y), 5);
       this.drawn.observations += 1;
     }
+  }
+
+  // The protection level of the position, at its true size: within the alert limit of docking, of travelling, or above.
+  level(c, { pose: [x, y], level: [bound], alarm }, sx, sy, scale) {
+    const colour = { none: "#009e73", docking: "#e69f00", travel: "#d55e00" }[alarm];
+    this.drawn.level = null;
+    if (!colour || bound > 1000) return;
+    c.beginPath(); c.arc(sx(x), sy(y), Math.max(bound * scale, 2), 0, 2 * Math.PI);
+    c.strokeStyle = colour; c.lineWidth = 2; c.stroke();
+    this.drawn.level = { m: bound, colour };
   }
 
   // Three standard deviations; magnified where it would be too small to be seen, which is then written beside it.

@@ -213,6 +213,7 @@ function state() {
     playing: page.isPlaying, speed: page.speed, following: page.isFollowing,
     pose: pose ? { time_s: pose.time_s, x_m: pose.pose[0], y_m: pose.pose[1], heading_rad: pose.pose[2] } : null,
     covariance: pose ? pose.covariance : null,
+    level: pose ? pose.level : null, alarm: pose ? pose.alarm : null,
     truth: moment && moment.truth ? { x_m: moment.truth[0], y_m: moment.truth[1], heading_rad: moment.truth[2] } : null,
     mode: pose ? pose.mode : "not_localised", reason: pose ? pose.reason : null, health: moment ? moment.health : null,
     events: model.shownEvents, all_events: model.events.length, event: page.event, drawn: map.drawn,

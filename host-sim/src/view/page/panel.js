@@ -34,10 +34,12 @@ function showPanel(moment) {
 
 function poseRows(pose, truth) {
   const [x, y, heading] = pose.pose, [xx, , yy, , , tt] = pose.covariance.map((value) => Math.max(value, 0));
+  const [bound, turn] = pose.level;
   const rows = [
     row("x", `${x.toFixed(3)} m ± ${(1000 * Math.sqrt(xx)).toFixed(1)} mm`),
     row("y", `${y.toFixed(3)} m ± ${(1000 * Math.sqrt(yy)).toFixed(1)} mm`),
     row("heading", `${degrees(heading)} ± ${degrees(Math.sqrt(tt))}`),
+    row("protection level", bound > 1000 ? "none" : `${(1000 * bound).toFixed(0)} mm, ${degrees(turn)}`, pose.alarm === "travel"),
     row("without a landmark since", pose.dead_reckoning_m.toFixed(2) + " m", pose.dead_reckoning_m > 0.5),
     row("accepted lately", (100 * pose.acceptance).toFixed(0) + " %", pose.acceptance < 0.5),
     row("normalised square, 2 expected", pose.normalised_square.toFixed(2), pose.normalised_square > 6),
