@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use agv_core::geometry::Pose;
+use agv_core::integrity::{AlertLimit, AlertLimits};
 use agv_core::measurement::{PoseFix, Time};
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions};
 use agv_host_sim::log;
@@ -114,6 +115,12 @@ fn assert_shows(state: &Value, answers: &Replay) {
     }
     // It is drawn there, too.
     assert_eq!(state["drawn"]["vehicle"]["x"], state["pose"]["x_m"]);
+    let bound = number(&state["level"][0]);
+    assert!(bound > 0.0 && state["drawn"]["level"]["m"] == state["level"][0], "{state}");
+    let limits = AlertLimits::default();
+    let is_within = |limit: &AlertLimit| bound <= limit.position && number(&state["level"][1]) <= limit.heading;
+    let alarm = if is_within(&limits.docking) { "none" } else { "docking" };
+    assert_eq!(state["alarm"], if is_within(&limits.travel) { alarm } else { "travel" });
     assert!(number(&state["drawn"]["scanPoints"]) > 500.0 && number(&state["drawn"]["pathPoints"]) > 50.0, "{state}");
 }
 

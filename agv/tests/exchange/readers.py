@@ -39,7 +39,7 @@ def look(topic, message):
         return [[marker.ns, marker.type, [[point.x, point.y] for point in marker.points]] for marker in message.markers]
     if topic == "/diagnostics":
         level = lambda status: status.level if isinstance(status.level, int) else status.level[0]
-        return [[status.name, level(status), status.message] for status in message.status]
+        return [[status.name, level(status), status.message, {value.key: value.value for value in status.values}] for status in message.status]
     raise ValueError(topic)
 
 

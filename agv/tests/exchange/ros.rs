@@ -99,6 +99,8 @@ fn an_export_is_read_by_others() {
     assert_eq!(observed, answers.uses.len());
     let last = found["/diagnostics"].as_array().unwrap().last().unwrap();
     assert_eq!((&last[0][0], &last[0][1]), (&"localisation".into(), &0.into()));
+    let told: f64 = last[0][3]["protection level of the position, m"].as_str().unwrap().parse().unwrap();
+    assert!(answers.poses.iter().any(|pose| pose.level.position == told), "{told}");
 }
 
 #[test]
