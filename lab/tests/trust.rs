@@ -12,6 +12,7 @@ use agv_lab::trust::figures::{NOTHING, figures};
 use agv_lab::trust::judge::{Judge, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn};
 use agv_lab::trust::outcome::Outcome;
+use agv_lab::trust::row::{self, Row, RowsError};
 use agv_lab::trust::{hall, sweep};
 use agv_wire::can::controller::{Health, PublishedPose};
 
@@ -237,4 +238,34 @@ fn what_nobody_can_tell_yet_counts_apart() {
     };
     // One event for each alert limit; what is misleading is so in either case.
     assert_eq!((outcome(false), outcome(true)), ((2, 0, 100), (0, 100, 100)));
+}
+
+#[test]
+fn rows_of_parts_are_those_of_the_whole() {
+    let kinds = kinds::read(&scenarios("trust.toml")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let row = |kind: &str, size: f64, seed| Row {
+        kind: kind.to_owned(),
+        size,
+        seed,
+        is_accepted: true,
+        can_recover: false,
+        outcome: Some(Outcome { most_over_level: 0.1 * size, claims: seed, ..Outcome::default() }),
+    };
+    // In the order of the kinds and their sizes; what has no fault comes last.
+    let whole = [
+        row("telegrams dropped", 0.05, 1),
+        row("telegrams dropped", 0.05, 2),
+        row("telegrams dropped", 0.2, 1),
+        row("power cut", 1.0, 7),
+        row(NOTHING, 1.0, 3),
+    ];
+    let (one, two) = (folder.path().join("0"), folder.path().join("1"));
+    row::write(&one, &[whole[4].clone(), whole[2].clone(), whole[0].clone()]).unwrap();
+    row::write(&two, &[whole[3].clone(), whole[1].clone()]).unwrap();
+    assert_eq!(row::read(&[two.clone(), one.clone()], &kinds).unwrap(), whole);
+    assert!(matches!(row::read(&[one.clone(), one.clone()], &kinds), Err(RowsError::Twice { .. })));
+    std::fs::write(&two, "{}").unwrap();
+    assert!(matches!(row::read(&[two], &kinds), Err(RowsError::Line { line: 1, .. })));
+    assert!(matches!(row::read(&[folder.path().join("2")], &kinds), Err(RowsError::File { .. })));
 }

@@ -185,7 +185,7 @@ fn per_fault(rows: &[Row], units: impl Fn(&str) -> String) -> Vec<OfKind> {
             worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
             worst_hmi_m: of.most(|outcome| outcome.worst_hazard_m),
             hidden_s: of.sum(|outcome| outcome.hidden_hazardous) as f64 * super::judge::STEP,
-            error_over_pl_max: over.is_finite().then_some(over),
+            error_over_pl_max: (over < super::judge::MOST_OVER).then_some(over),
             share_claimed: of.share_claimed(),
         })
     };

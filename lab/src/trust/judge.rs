@@ -36,6 +36,9 @@ const SAME_LOSS: f64 = 10.0;
 /// How long the end of a run must be right for the vehicle to count as recovered, s.
 const RIGHT_AT_THE_END: f64 = 5.0;
 
+/// An error is told as no more than this many times the protection level.
+pub const MOST_OVER: f64 = 1e9;
+
 /// What the bus says at one moment, and what is true.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
@@ -128,7 +131,7 @@ impl Judge {
                 outcome.add_nominal(&level);
             }
             let share = errors.over(&level);
-            outcome.most_over_level = outcome.most_over_level.max(share);
+            outcome.most_over_level = outcome.most_over_level.max(share.min(MOST_OVER));
             outcome.misleading += u64::from(share > 1.0);
             hazards =
                 [self.limits.travel, self.limits.docking].map(|limit| errors.exceed(&limit) && limit.holds(&level));

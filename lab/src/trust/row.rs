@@ -1,8 +1,83 @@
 //! The record of one run, as parts of a campaign exchange them.
 
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use agv_host_sim::output_file;
 use serde::{Deserialize, Serialize};
 
+use super::kinds::Kind;
 use super::outcome::Outcome;
+
+/// Why rows cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum RowsError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// A line of the file is no row.
+    #[error("{}: line {line} is no row of a campaign", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+    },
+    /// A run is there twice.
+    #[error("the run of {kind:?} at {size} with seed {seed} is there twice")]
+    Twice {
+        /// Its kind.
+        kind: String,
+        /// Its size.
+        size: f64,
+        /// Its seed.
+        seed: u64,
+    },
+}
+
+/// Writes rows, a line of JSON each.
+///
+/// # Errors
+/// [`RowsError::File`].
+pub fn write(path: &Path, rows: &[Row]) -> Result<(), RowsError> {
+    let wrap = |source| RowsError::File { path: path.to_owned(), source };
+    let mut text = Vec::new();
+    for row in rows {
+        serde_json::to_writer(&mut text, row).map_err(|error| wrap(error.into()))?;
+        writeln!(text).map_err(wrap)?;
+    }
+    output_file::write(path, text).map_err(wrap)
+}
+
+/// Reads the rows of all parts of a campaign, and puts them in the order in which one machine makes them.
+///
+/// # Errors
+/// See [`RowsError`].
+pub fn read(paths: &[PathBuf], kinds: &[Kind]) -> Result<Vec<Row>, RowsError> {
+    let mut rows: Vec<Row> = Vec::new();
+    for path in paths {
+        let text = std::fs::read_to_string(path).map_err(|source| RowsError::File { path: path.clone(), source })?;
+        for (line, row) in text.lines().enumerate() {
+            let row = serde_json::from_str(row).map_err(|_| RowsError::Line { path: path.clone(), line: line + 1 })?;
+            rows.push(row);
+        }
+    }
+    let place = |row: &Row| {
+        let kind = kinds.iter().position(|kind| kind.name == row.kind);
+        let size = kind.and_then(|kind| kinds.get(kind)?.every_size().iter().position(|size| *size == row.size));
+        (row.kind == super::figures::NOTHING, kind, size, row.seed)
+    };
+    rows.sort_by_key(place);
+    match rows.windows(2).find(|pair| place(&pair[0]) == place(&pair[1])) {
+        Some([row, ..]) => Err(RowsError::Twice { kind: row.kind.clone(), size: row.size, seed: row.seed }),
+        _ => Ok(rows),
+    }
+}
 
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

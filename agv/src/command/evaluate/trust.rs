@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use agv_lab::campaign::Shard;
 use agv_lab::trust::figures::{Figures, NOTHING, figures};
 use agv_lab::trust::kinds::{self, Kind};
+use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
+use agv_lab::trust::trial::Trial;
 use anyhow::{Context as _, ensure};
 
 use crate::command::progress;
@@ -35,6 +37,19 @@ pub struct Trust {
     /// First seed of the sweep; those of the worst sizes are 50000 later. Seeds below 1000 are for development.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
+    /// Make only the runs of part I of N, counted from 0, and write their rows to --output: those of the sweep, or with --swept
+    /// those of the worst sizes and without a fault.
+    #[arg(long, value_name = "I/N", requires = "output")]
+    shard: Option<Shard>,
+    /// Where the rows of a part go, a line of JSON each.
+    #[arg(long, requires = "shard")]
+    output: Option<PathBuf>,
+    /// The rows of all parts of the sweep, so that it is not driven again.
+    #[arg(long, num_args = 1.., value_name = "ROWS")]
+    swept: Vec<PathBuf>,
+    /// Tell the figures of the rows of all parts, and drive nothing.
+    #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with_all = ["shard", "swept"])]
+    merge: Vec<PathBuf>,
     /// One JSON object instead of the table.
     #[arg(long)]
     json: bool,
@@ -45,12 +60,15 @@ Examples:
   agv evaluate trust --sweep-runs 1 --runs 2 --sound-runs 10
   agv evaluate trust --only 'laser shifted' --runs 20
   agv evaluate trust --first-seed 100000 --json
+  agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
+  agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
+  agv evaluate trust --merge worst0.jsonl worst1.jsonl --json
 
 Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
 continuity_per_100km, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
 [95 %, worst], seeds [first, last], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
-worst_hmi_s, worst_hmi_m, error_over_pl_max, share_claimed].";
+worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed].";
 
 impl Trust {
     /// Runs the command.
@@ -62,16 +80,32 @@ impl Trust {
         let (sound, faults): (Vec<Kind>, Vec<Kind>) =
             all.iter().filter(is_wanted).cloned().partition(|kind| kind.name == NOTHING);
         ensure!(!sound.is_empty() || !faults.is_empty(), "no kind has {:?} in its name", self.only.unwrap_or_default());
-        let trials = sweep::sweep(&faults, self.sweep_runs, self.first_seed);
-        let bar = progress::bar("every size", trials.len() as u64);
-        let swept = run(&trials, Shard::ALL, || bar.inc(1)).context("a run cannot be made")?;
-        bar.finish_and_clear();
+        if !self.merge.is_empty() {
+            return self.tell(&row::read(&self.merge, &all)?, unit);
+        }
+        let shard = self.shard.unwrap_or(Shard::ALL);
+        let swept = if self.swept.is_empty() {
+            let trials = sweep::sweep(&faults, self.sweep_runs, self.first_seed);
+            let swept = make("every size", &trials, shard)?;
+            if let Some(output) = &self.output {
+                return Ok(row::write(output, &swept)?);
+            }
+            swept
+        } else {
+            row::read(&self.swept, &all)?
+        };
         let mut trials = sweep::worst(&faults, &swept, self.runs, self.first_seed);
         trials.extend(sweep::sweep(&sound, self.sound_runs, self.first_seed + sweep::OTHER_SEEDS));
-        let bar = progress::bar("worst sizes", trials.len() as u64);
-        let rows = run(&trials, Shard::ALL, || bar.inc(1)).context("a run cannot be made")?;
-        bar.finish_and_clear();
-        let figures = figures(&rows, unit);
+        let rows = make("worst sizes", &trials, shard)?;
+        match &self.output {
+            Some(output) => Ok(row::write(output, &rows)?),
+            None => self.tell(&rows, unit),
+        }
+    }
+
+    fn tell(&self, rows: &[Row], unit: impl Fn(&str) -> String) -> anyhow::Result<()> {
+        ensure!(!rows.is_empty(), "there is no run");
+        let figures = figures(rows, unit);
         if self.json {
             println!("{}", serde_json::to_string_pretty(&figures)?);
         } else {
@@ -79,6 +113,14 @@ impl Trust {
         }
         Ok(())
     }
+}
+
+/// Makes the runs of a part.
+fn make(what: &'static str, trials: &[Trial], shard: Shard) -> anyhow::Result<Vec<Row>> {
+    let bar = progress::bar(what, (0..trials.len()).filter(|run| shard.has(*run)).count() as u64);
+    let rows = run(trials, shard, || bar.inc(1)).context("a run cannot be made")?;
+    bar.finish_and_clear();
+    Ok(rows)
 }
 
 fn print(figures: &Figures) {
