@@ -25,7 +25,7 @@ fn line(kind: &str, size: f64, rows: &[&Row]) -> String {
 
 #[test]
 fn the_worst_size_of_each_kind_is_judged_as_it_was() {
-    let kinds = kinds::read(&repository().join("host-sim/scenarios/trust.toml")).unwrap();
+    let kinds = kinds::read(&repository("host-sim/scenarios/trust.toml")).unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/trust.csv");
     let kept = std::fs::read_to_string(&path).unwrap();
     let named: Vec<(&Kind, f64)> = kept

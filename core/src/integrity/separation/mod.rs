@@ -223,10 +223,12 @@ impl SolutionSeparation {
         self.pending.last = Some(*motion);
         if self.pending.distance > LONGEST_STEP {
             self.step(motion.end, odometry_pose);
+            let pose = self.pose;
+            self.rest_on(&pose, self.surprise);
         }
     }
 
-    /// Lets all solutions go on to where the odometry is now.
+    /// Lets all solutions go on to where the odometry is now. The level is found anew at the end of the event that follows.
     pub fn step(&mut self, now: Time, odometry_pose: &Pose) {
         let displacement = self.odometry_pose.between(odometry_pose);
         let distance = self.pending.distance;
@@ -259,7 +261,7 @@ impl SolutionSeparation {
         self.time = now;
         self.odometry_pose = *odometry_pose;
         self.pending = Pending { last: self.pending.last, ..Pending::NONE };
-        self.rest_on(&self.pose.compose(&displacement), self.surprise);
+        self.pose = self.pose.compose(&displacement);
     }
 
     /// All solutions.

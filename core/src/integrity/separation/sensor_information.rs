@@ -124,6 +124,12 @@ impl SensorInformation {
 
 const ZERO: Matrix3<f64> = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
+/// Length of a vector of everyday size; the hypotenuse that cannot overflow costs several times as much.
+#[must_use]
+pub fn norm(x: f64, y: f64) -> f64 {
+    libm::sqrt(x * x + y * y)
+}
+
 /// What rounding has made negative is zero; what is not a number stays so.
 #[must_use]
 pub fn not_negative(variance: f64) -> f64 {
@@ -133,7 +139,7 @@ pub fn not_negative(variance: f64) -> f64 {
 /// Variance along the larger axis of a covariance of two numbers.
 #[must_use]
 pub fn larger_axis(xx: f64, xy: f64, yy: f64) -> f64 {
-    not_negative(0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy))
+    not_negative(0.5 * (xx + yy) + norm(0.5 * (xx - yy), xy))
 }
 
 struct Matrix3Parts {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::assumed::{AssumedDeviations, Factors};
-use super::sensor_information::{SensorInformation, larger_axis, not_negative};
+use super::sensor_information::{SensorInformation, Told, larger_axis, norm, not_negative};
 use crate::geometry::{Pose, difference};
 use crate::odometry::BiasJacobian;
 use crate::state::ProtectionLevel;
@@ -68,8 +68,92 @@ pub const FREE_MOUNTING: [f64; 4] = [0.6, 0.6, 0.175, 0.2];
 /// A free odometry: scale, steering, rad, and turn.
 pub const FREE_ODOMETRY: [f64; 3] = [0.2, 0.1, 0.2];
 
+/// How the information changes the states if the model is linearised at `from` beside them; `covariance` is theirs, and
+/// becomes that behind the change.
+fn change_by(
+    states: (&Pose, &Lasting),
+    told: &[Option<Told>; 3],
+    laser: &Laser,
+    from: &States,
+    covariance: &mut Covariance,
+) -> (States, f64) {
+    let Laser { mount, sensor, velocity } = laser;
+    let (pose, lasting) = shifted(states, from);
+    let (sine, cosine) = libm::sincos(pose.theta);
+    let [lever_x, lever_y] = lasting.lever;
+    let (arm_x, arm_y) = (mount.x + lever_x, mount.y + lever_y);
+    let (arm_x, arm_y) = (cosine * arm_x - sine * arm_y, sine * arm_x + cosine * arm_y);
+    let clock = lasting.clock;
+    let beside = Vector3::new(
+        pose.x + arm_x - velocity.x * clock - sensor.x,
+        pose.y + arm_y - velocity.y * clock - sensor.y,
+        difference(pose.theta + mount.theta + lasting.yaw, sensor.theta) - velocity.z * clock,
+    );
+    let mut change = States::zeros();
+    let mut normalised_square = 0.0;
+    for (row, value, variance) in told.iter().flatten().copied() {
+        let (x, y, heading) = (row.x, row.y, row.z);
+        let by_heading = heading - x * arm_y + y * arm_x;
+        let (along, across) = (cosine * x + sine * y, cosine * y - sine * x);
+        let by_clock = -row.dot(velocity);
+        let expected = [x, y, by_heading, along, across, heading, by_clock];
+        let shares = shares(covariance, &expected);
+        let sum = |states: &States| {
+            expected.iter().zip(states.iter()).fold(0.0, |sum, (derivative, state)| sum + derivative * state)
+        };
+        let innovation_variance = sum(&shares) + variance;
+        if innovation_variance <= 0.0 {
+            continue;
+        }
+        let weight = 1.0 / innovation_variance;
+        let innovation = value - row.dot(&beside) - sum(&(change - from));
+        normalised_square += innovation * innovation * weight;
+        change += shares * (innovation * weight);
+        subtract(covariance, &shares, weight);
+    }
+    (change, normalised_square)
+}
+
+/// Pose and what lasts, changed by so much.
+fn shifted((pose, before): (&Pose, &Lasting), change: &States) -> (Pose, Lasting) {
+    let [[x, y, heading, lever_x, lever_y, yaw, clock, scale, steering, turn]] = change.data.0;
+    let [before_x, before_y] = before.lever;
+    let lasting = Lasting {
+        lever: [before_x + lever_x, before_y + lever_y],
+        yaw: before.yaw + yaw,
+        clock: before.clock + clock,
+        scale: before.scale + scale,
+        steering: before.steering + steering,
+        turn: before.turn + turn,
+    };
+    (Pose::new(pose.x + x, pose.y + y, pose.theta + heading), lasting)
+}
+
+/// Covariance of all states with what is expected, which the first seven of them change: `P H'`.
+fn shares(covariance: &Covariance, expected: &[f64; 7]) -> States {
+    let columns = covariance.data.0.iter().zip(expected);
+    columns.fold(States::zeros(), |mut sum, (column, derivative)| {
+        for (sum, entry) in sum.iter_mut().zip(column) {
+            *sum += derivative * entry;
+        }
+        sum
+    })
+}
+
+/// Subtracts `w s s'`, without a matrix in between.
+fn subtract(covariance: &mut Covariance, shares: &States, weight: f64) {
+    for (column, share) in covariance.data.0.iter_mut().zip(shares.iter()) {
+        let factor = weight * share;
+        for (entry, other) in column.iter_mut().zip(shares.iter()) {
+            *entry -= factor * other;
+        }
+    }
+}
+
 /// The model is linear within this change of the heading, rad; how often it is linearised at most.
 const LINEAR_WITHIN: f64 = 0.01;
+/// A heading with this variance, rad^2, is not changed by more: it is three deviations.
+const SURE_HEADING: f64 = LINEAR_WITHIN * LINEAR_WITHIN / 9.0;
 const MOST_LINEARISATIONS: usize = 4;
 
 impl Solution {
@@ -169,31 +253,42 @@ impl Solution {
         let by_steering = Vector3::from(step.by_bias.steering);
         let by_turn = Vector3::new(0.0, 0.5 * d.x * d.theta, d.theta);
         let error = by_scale * scale + by_steering * steering + by_turn * turn;
-        let displacement = Pose::new(d.x + error.x, d.y + error.y, d.theta + error.z);
-        let first = self.pose.compose_jacobian_first(&displacement);
-        let rotation = self.pose.compose_jacobian_second();
+        let displacement = Pose { x: d.x + error.x, y: d.y + error.y, theta: d.theta + error.z };
+        // One sine and cosine serve the pose and all derivatives.
+        let (sine, cosine) = libm::sincos(self.pose.theta);
+        let rotation = Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0);
         let by_odometry = [by_scale, by_steering, by_turn].map(|by| rotation * by);
         let noise = rotation * step.covariance * rotation.transpose();
-        self.pose = self.pose.compose(&displacement);
-        self.propagate((first.m13, first.m23), &by_odometry, &noise);
+        let Pose { x, y, theta } = displacement;
+        let moved = (cosine * x - sine * y, sine * x + cosine * y);
+        self.pose = Pose::new(self.pose.x + moved.0, self.pose.y + moved.1, self.pose.theta + theta);
+        self.propagate((-moved.1, moved.0), &by_odometry, &noise);
     }
 
     /// Propagates the covariance: the position changes with the heading and the pose with the odometry's errors.
     fn propagate(&mut self, by_heading: (f64, f64), by_odometry: &[Vector3<f64>; 3], noise: &Matrix3<f64>) {
         let columns = &mut self.covariance.data.0;
-        let [x, y, heading, _, _, _, _, scale, steering, turn] = columns.map(States::from);
+        let [x, y, heading, _, _, _, _, scale, steering, turn] = &*columns;
         let [by_scale, by_steering, by_turn] = by_odometry;
         // The pose's rows of F P, then its own block of F P F'.
-        let x = x + heading * by_heading.0 + scale * by_scale.x + steering * by_steering.x + turn * by_turn.x;
-        let y = y + heading * by_heading.1 + scale * by_scale.y + steering * by_steering.y + turn * by_turn.y;
-        let heading = heading + scale * by_scale.z + steering * by_steering.z + turn * by_turn.z;
-        let block = |row: &States| {
-            let [[x, y, heading, _, _, _, _, scale, steering, turn]] = row.data.0;
+        let row = |pose: &[f64; STATES], by_heading: f64, by: [f64; 3]| {
+            let [by_scale, by_steering, by_turn] = by;
+            let mut row = *pose;
+            let others = heading.iter().zip(scale).zip(steering.iter().zip(turn));
+            for (entry, ((heading, scale), (steering, turn))) in row.iter_mut().zip(others) {
+                *entry += heading * by_heading + scale * by_scale + steering * by_steering + turn * by_turn;
+            }
+            row
+        };
+        let x = row(x, by_heading.0, [by_scale.x, by_steering.x, by_turn.x]);
+        let y = row(y, by_heading.1, [by_scale.y, by_steering.y, by_turn.y]);
+        let heading = row(heading, 0.0, [by_scale.z, by_steering.z, by_turn.z]);
+        let block = |row: &[f64; STATES]| {
+            let [x, y, heading, _, _, _, _, scale, steering, turn] = *row;
             let errors = by_scale * scale + by_steering * steering + by_turn * turn;
             Vector3::new(x + heading * by_heading.0, y + heading * by_heading.1, heading) + errors
         };
         let [of_x, of_y, of_heading] = [block(&x), block(&y), block(&heading)];
-        let ([x], [y], [heading]) = (x.data.0, y.data.0, heading.data.0);
         for (column, ((x, y), heading)) in columns.iter_mut().zip(x.iter().zip(&y).zip(&heading)).skip(3) {
             let [of_x, of_y, of_heading, ..] = column;
             (*of_x, *of_y, *of_heading) = (*x, *y, *heading);
@@ -211,79 +306,27 @@ impl Solution {
     /// Takes what landmarks say of the pose of the laser. Returns the normalised squared innovation, of up to three degrees of
     /// freedom. Where the heading is changed by much, the model is linearised again behind the change (Gauss-Newton).
     pub fn correct(&mut self, information: &SensorInformation, laser: &Laser) -> f64 {
+        let (pose, lasting) = (self.pose, self.lasting);
+        let told = information.told();
         let mut change = States::zeros();
-        let mut covariance = self.covariance;
         let mut normalised_square = 0.0;
-        for _ in 0..MOST_LINEARISATIONS {
-            let from = change;
-            covariance = self.covariance;
-            (change, normalised_square) = self.change_by(information, laser, &from, &mut covariance);
-            let [[_, _, turned, ..]] = (change - from).data.0;
-            if libm::fabs(turned) < LINEAR_WITHIN {
-                break;
+        let (_, heading) = self.variances();
+        if heading <= SURE_HEADING {
+            (change, normalised_square) = change_by((&pose, &lasting), &told, laser, &change, &mut self.covariance);
+        } else {
+            let before = self.covariance;
+            for _ in 0..MOST_LINEARISATIONS {
+                let from = change;
+                self.covariance = before;
+                (change, normalised_square) = change_by((&pose, &lasting), &told, laser, &from, &mut self.covariance);
+                let [[_, _, turned, ..]] = (change - from).data.0;
+                if libm::fabs(turned) < LINEAR_WITHIN {
+                    break;
+                }
             }
         }
-        self.covariance = covariance;
-        (self.pose, self.lasting) = self.shifted(&change);
+        (self.pose, self.lasting) = shifted((&pose, &lasting), &change);
         normalised_square
-    }
-
-    /// How the information changes the states if the model is linearised at `from` beside them; `covariance` is theirs, and
-    /// becomes that behind the change.
-    fn change_by(
-        &self,
-        information: &SensorInformation,
-        laser: &Laser,
-        from: &States,
-        covariance: &mut Covariance,
-    ) -> (States, f64) {
-        let Laser { mount, sensor, velocity } = laser;
-        let (pose, lasting) = self.shifted(from);
-        let (sine, cosine) = libm::sincos(pose.theta);
-        let [lever_x, lever_y] = lasting.lever;
-        let (arm_x, arm_y) = (mount.x + lever_x, mount.y + lever_y);
-        let (arm_x, arm_y) = (cosine * arm_x - sine * arm_y, sine * arm_x + cosine * arm_y);
-        let clock = lasting.clock;
-        let beside = Vector3::new(
-            pose.x + arm_x - velocity.x * clock - sensor.x,
-            pose.y + arm_y - velocity.y * clock - sensor.y,
-            difference(pose.theta + mount.theta + lasting.yaw, sensor.theta) - velocity.z * clock,
-        );
-        let mut change = States::zeros();
-        let mut normalised_square = 0.0;
-        for (row, value, variance) in information.told().into_iter().flatten() {
-            let (x, y, heading) = (row.x, row.y, row.z);
-            let by_heading = heading - x * arm_y + y * arm_x;
-            let (along, across) = (cosine * x + sine * y, cosine * y - sine * x);
-            let by_clock = -row.dot(velocity);
-            let expected = States::from([x, y, by_heading, along, across, heading, by_clock, 0.0, 0.0, 0.0]);
-            let shares = *covariance * expected;
-            let innovation_variance = expected.dot(&shares) + variance;
-            if innovation_variance <= 0.0 {
-                continue;
-            }
-            let innovation = value - row.dot(&beside) - expected.dot(&(change - from));
-            normalised_square += innovation * innovation / innovation_variance;
-            change += shares * (innovation / innovation_variance);
-            *covariance -= shares * shares.transpose() / innovation_variance;
-        }
-        (change, normalised_square)
-    }
-
-    /// Pose and what lasts, changed by so much.
-    fn shifted(&self, change: &States) -> (Pose, Lasting) {
-        let [[x, y, heading, lever_x, lever_y, yaw, clock, scale, steering, turn]] = change.data.0;
-        let before = self.lasting;
-        let [before_x, before_y] = before.lever;
-        let lasting = Lasting {
-            lever: [before_x + lever_x, before_y + lever_y],
-            yaw: before.yaw + yaw,
-            clock: before.clock + clock,
-            scale: before.scale + scale,
-            steering: before.steering + steering,
-            turn: before.turn + turn,
-        };
-        (Pose::new(self.pose.x + x, self.pose.y + y, self.pose.theta + heading), lasting)
     }
 
     /// Variances of the position's larger axis, m^2, and of the heading, rad^2.
@@ -300,7 +343,7 @@ impl Solution {
         let (position, heading) = self.variances();
         let (by_map, heading_by_map) = map_variances;
         let level = ProtectionLevel {
-            position: libm::hypot(pose.x - self.pose.x, pose.y - self.pose.y)
+            position: norm(pose.x - self.pose.x, pose.y - self.pose.y)
                 + factors.position * libm::sqrt(position + by_map),
             heading: libm::fabs(difference(pose.theta, self.pose.theta))
                 + factors.heading * libm::sqrt(heading + heading_by_map),
