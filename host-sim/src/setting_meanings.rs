@@ -62,7 +62,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("alert_limits.travel.heading", "largest error of the heading that travelling can live with"),
     ("alert_limits.docking.position", "largest error of the position that docking can live with"),
     ("alert_limits.docking.heading", "largest error of the heading that docking can live with"),
-    ("protection", "whether the error of the pose is bounded; without it nothing is available"),
+    ("integrity.protection", "whether the error of the pose is bounded; without it nothing is available"),
     ("assumed.mounting", "deviation of the laser's place on the vehicle"),
     ("assumed.mounting_yaw", "deviation of the laser's yaw on the vehicle"),
     ("assumed.clock", "deviation of the laser's clock"),

@@ -207,7 +207,7 @@ pub static LEAVES: [Leaf; 78] = [
     number!(281, "alert_limits.travel.heading", "rad", parameters.alert_limits.travel.heading),
     number!(282, "alert_limits.docking.position", "m", parameters.alert_limits.docking.position),
     number!(283, "alert_limits.docking.heading", "rad", parameters.alert_limits.docking.heading),
-    switch!(289, "protection", parameters.protection),
+    switch!(289, "integrity.protection", parameters.protection),
     number!(290, "assumed.mounting", "m", parameters.assumed.mounting),
     number!(291, "assumed.mounting_yaw", "rad", parameters.assumed.mounting_yaw),
     number!(292, "assumed.clock", "s", parameters.assumed.clock),
