@@ -10,8 +10,8 @@ fn hours_leave_no_trace() {
     let hours = soak(&scenario, 2, || ()).unwrap();
     assert_eq!(hours.len(), 2);
     for hour in &hours {
-        // Before the first revolution nothing speaks for the pose.
-        assert!(hour.violations == 0 && hour.degraded_s < 0.2, "{hour:?}");
+        // Until the first revolutions the level is that of the pose that was given.
+        assert!(hour.violations == 0 && hour.degraded_s < 0.5, "{hour:?}");
         assert!(hour.position_mm.p95 < 8.0 && hour.position_mm.max < 20.0, "{hour:?}");
     }
     // The laser's counter of milliseconds has wrapped between them.
