@@ -93,8 +93,16 @@ class Timer(RegisterFile):
             event.cancel()
         self._events = []
 
+    def _do_due(self):
+        """What has matched by now is told, even if a register that is written at that very time changes what comes next."""
+        now = self.chip.clock.now()
+        for event in [event for event in self._events if event.action and event.time <= now]:
+            action, event.action = event.action, None
+            action()
+
     def _schedule(self):
         """The next match of each channel, and the next overflow."""
+        self._do_due()
         self._cancel()
         if not self._is_running():
             return
