@@ -9,7 +9,7 @@ use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_lab::campaign::Shard;
 use agv_lab::trust::figures::{NOTHING, figures};
-use agv_lab::trust::judge::{Judge, Moment, STEP};
+use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn};
 use agv_lab::trust::outcome::Outcome;
 use agv_lab::trust::row::{self, Row, RowsError};
@@ -89,7 +89,7 @@ fn docking_has_limits_of_its_own_and_the_heading_counts_as_the_position_does() {
     assert_eq!(judge(&[(1000, turned, 0.0)]).failures, 1);
     let nowhere = PublishedPose { pose: Pose { x: f64::NAN, y: 0.0, theta: 0.0 }, ..pose() };
     let lost = judge(&[(1000, nowhere, 0.0)]);
-    assert!(lost.failures == 1 && lost.most_over_level.is_infinite());
+    assert!(lost.failures == 1 && lost.most_over_level == MOST_OVER);
 }
 
 #[test]
