@@ -4,7 +4,7 @@
 use agv_core::geometry::{Point, Pose, difference};
 use agv_core::integrity::separation::{
     AssumedDeviations, FAULT_FREE, LandmarkKey, Laser, ONE_FAULT, Seen, SensorInformation, Solution,
-    SolutionSeparation, Step,
+    SolutionSeparation, Step, fault_free,
 };
 use agv_core::measurement::Time;
 use agv_core::odometry::{BiasJacobian, Motion};
@@ -20,7 +20,7 @@ fn landmark(random: &mut Random, sensor: &Pose, noise: f64) -> Seen {
     let position = Point::new(seen.x + noise * random.normal(), seen.y + noise * random.normal());
     let (a, b, c) = (random.uniform(0.5, 2.0), random.uniform(-0.4, 0.4), random.uniform(0.5, 2.0));
     let covariance = Matrix2::new(a, b, b, c) * 1e-4;
-    Seen { position, covariance, landmark, landmark_variance: 4e-6, shared: 1.0 }
+    Seen { position, covariance, landmark, landmark_variance: 4e-6 }
 }
 
 /// Where the landmark seems to be minus where it is, if the sensor is so far beside the pose.
@@ -185,7 +185,7 @@ fn a_solution_is_a_kalman_filter_of_all_ten_states() {
         let by_bias = BiasJacobian::of(&displacement, Some(1.4));
         let noise = Matrix3::from_diagonal(&Vector3::new(4e-6, 1e-7, 2e-7));
         let velocity = Vector3::new(0.8, 0.5, 0.3);
-        solution.predict(&Step { displacement, covariance: noise, distance: displacement.x, by_bias });
+        solution.predict(&Step { displacement, covariance: noise, by_bias });
         let model = Model { displacement, by_bias, mount, velocity };
         let forward = derivative::<STATES>(|state| model.go(state), &state);
         let turned = nalgebra::Rotation2::new(state[2]).matrix().to_owned();
@@ -305,7 +305,7 @@ impl Drive {
             let mut noise = || 0.008 * self.random.normal();
             let position = Point::new(seen.x + noise(), seen.y + noise());
             let covariance = Matrix2::identity() * 1e-4;
-            let seen = Seen { position, covariance, landmark, landmark_variance: 4e-6, shared: 1.0 };
+            let seen = Seen { position, covariance, landmark, landmark_variance: 4e-6 };
             self.monitor.see(LandmarkKey::Reflector(id as u16), &seen, &laser);
         }
         self.monitor.end_event(&self.published, &laser, 1.0);
@@ -396,5 +396,18 @@ fn a_solution_that_is_not_a_number_bounds_nothing() {
         let solution = Solution::new(Pose::default(), &covariance, &assumed);
         let level = solution.bound(&Pose::default(), &FAULT_FREE, (0.0, 0.0));
         assert!(level.position > 1e6 && level.heading > 1e6, "{level:?}");
+    }
+}
+
+#[test]
+fn a_level_without_faults_is_that_of_the_larger_axis_wherever_it_points() {
+    let (long, short) = (0.02_f64, 0.007_f64);
+    for direction in [0.0, 0.3, 0.8, 1.6, 2.5] {
+        let turned = nalgebra::Rotation2::new(direction).matrix().to_owned();
+        let covariance = turned * Matrix2::new(long * long, 0.0, 0.0, short * short) * turned.transpose();
+        let entries = [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)], 0.0, 0.0, 9e-6];
+        let level = fault_free(&entries);
+        assert!((level.position - 7.45 * long).abs() < 1e-12, "{level:?}");
+        assert!((level.heading - 7.15 * 0.003).abs() < 1e-12, "{level:?}");
     }
 }

@@ -14,7 +14,7 @@ use super::observation::{Believed, Viewpoint};
 use super::positive_semidefinite::make_positive_semidefinite;
 use super::slots::{PoseOnly, Slots, Storage, pose_state, slot_states};
 use super::{Linearisation, Observation, PackedCovariance};
-use crate::geometry::{Point, Pose, wrap};
+use crate::geometry::{Point, Pose, larger_axis, wrap};
 use crate::measurement::LaserId;
 use crate::odometry::{BiasJacobian, Motion, OdometryBias};
 
@@ -109,8 +109,7 @@ impl Ekf {
     pub fn position_deviation(&self) -> f64 {
         let of = |row, column| self.covariance.get(row, column);
         let (xx, xy, yy) = (of(0, 0), of(0, 1), of(1, 1));
-        let mean = 0.5 * (xx + yy);
-        libm::sqrt((mean + libm::hypot(0.5 * (xx - yy), xy)).max(0.0))
+        libm::sqrt(larger_axis(xx, xy, yy).max(0.0))
     }
 
     /// Standard deviation of the heading, rad.

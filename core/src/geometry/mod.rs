@@ -1,11 +1,13 @@
 //! Angles, planar poses and transforms, and the rigid fit of points to points.
 
 mod angle;
+mod axes;
 mod pose;
 mod rigid_fit;
 mod transform;
 
 pub use angle::{difference, wrap};
+pub(crate) use axes::{larger_axis, length};
 pub use pose::{Pose, Twist};
 pub use rigid_fit::{RigidFit, fit_rigid};
 pub use transform::Transform;

@@ -206,12 +206,6 @@ impl<
         if self.parameters.maps.slam { self.slam.bias() } else { OdometryBias::default() }
     }
 
-    /// What bounds the error of the pose.
-    #[must_use]
-    pub fn separation(&self) -> &SolutionSeparation {
-        &self.separation
-    }
-
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {

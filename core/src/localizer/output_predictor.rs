@@ -135,9 +135,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             ..base
         })
     }
-}
 
-impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
     /// That of the localiser's pose, grown with what the pose is less sure of, and with the heading's share in the distance since.
     fn level(&self, base: &PoseOutput, travelled: f64) -> ProtectionLevel {
         let now = fault_free(&self.state.covariance_entries());

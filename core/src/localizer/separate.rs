@@ -7,7 +7,7 @@ use crate::filter::RangeBearing;
 use crate::geometry::Point;
 use crate::integrity::separation::{LandmarkKey, Laser, Seen};
 use crate::maps::{Landmark, LandmarkKind, Verdict};
-use crate::measurement::LaserId;
+use crate::measurement::{LaserId, Time};
 use crate::state::{LandmarkSource, LandmarkUse};
 
 impl<
@@ -46,7 +46,7 @@ impl<
         self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));
     }
 
-    fn tell(&mut self, seen: &LandmarkUse, first: crate::measurement::Time, from: &Laser) {
+    fn tell(&mut self, seen: &LandmarkUse, first: Time, from: &Laser) {
         let [x, y] = seen.position.map(f64::from);
         let range = libm::hypot(x, y);
         let is_reflector = seen.kind == LandmarkKind::Reflector;
@@ -68,7 +68,6 @@ impl<
                     covariance: self.covariance_of(&position, is_reflector),
                     landmark: landmark.position(),
                     landmark_variance: deviation * deviation,
-                    shared: 1.0,
                 };
                 self.separation.see(key, &seen, from);
             }

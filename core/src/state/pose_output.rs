@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Mode, ProtectionLevel, Reason};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
 
 /// The pose with its truth.
@@ -69,7 +69,7 @@ impl PoseOutput {
             !matches!(self.mode, Mode::NotLocalised | Mode::Lost | Mode::WithoutOdometry | Mode::Degraded);
         let [xx, xy, yy, _, _, heading] = self.covariance;
         let (position_limit, heading_limit) = Self::GOOD_DEVIATIONS;
-        let worst = 0.5 * (xx + yy) + libm::hypot(0.5 * (xx - yy), xy);
+        let worst = larger_axis(xx, xy, yy);
         is_localised && worst <= position_limit * position_limit && heading <= heading_limit * heading_limit
     }
 

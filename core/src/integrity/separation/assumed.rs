@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::sensor_information::larger_axis;
+use super::sensor_information::not_negative;
+use crate::geometry::larger_axis;
 use crate::state::ProtectionLevel;
 
 /// Standard deviations of what stays as it is for the whole drive, beside the noise of the odometry and of the sensors. They
@@ -55,7 +56,7 @@ pub struct Factors {
 pub fn fault_free(covariance: &[f64; 6]) -> ProtectionLevel {
     let [xx, xy, yy, _, _, heading] = *covariance;
     ProtectionLevel {
-        position: FAULT_FREE.position * libm::sqrt(larger_axis(xx, xy, yy)),
-        heading: FAULT_FREE.heading * libm::sqrt(heading.max(0.0)),
+        position: FAULT_FREE.position * libm::sqrt(not_negative(larger_axis(xx, xy, yy))),
+        heading: FAULT_FREE.heading * libm::sqrt(not_negative(heading)),
     }
 }

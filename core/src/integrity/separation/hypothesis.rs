@@ -7,26 +7,7 @@ use super::solution::Solution;
 use crate::measurement::Time;
 
 /// Landmarks that one solution leaves out.
-pub const LEFT_OUT: usize = 8;
-
-/// What may be wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Assumption {
-    /// Nothing.
-    Nothing,
-    /// Some landmarks are not where the map has them.
-    Landmark,
-    /// The laser was knocked, or the vehicle slid or was carried, in some second.
-    Knock,
-    /// The laser is mounted elsewhere, or its clock is off.
-    Mounting,
-    /// The laser is turned.
-    Yaw,
-    /// The laser creeps.
-    Creep,
-    /// Scale, steering or turn of the odometry are not as believed.
-    Odometry,
-}
+pub const TOGETHER: usize = 8;
 
 /// What is left out together: each reflector alone, and all natural features, which one map and one detector tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +22,7 @@ pub enum LandmarkKey {
 #[derive(Clone, Debug)]
 pub struct LeftOut {
     /// Which.
-    pub keys: Vec<LandmarkKey, LEFT_OUT>,
+    pub keys: Vec<LandmarkKey, TOGETHER>,
     /// What they tell in the present event.
     pub told: SensorInformation,
     /// Distance since one of them was seen, m.
@@ -88,15 +69,23 @@ pub struct Fit {
 
 /// Events over which the fit is averaged.
 const EVENTS: f64 = 32.0;
-/// A solution does not hold whose innovation is larger in one event, or in the mean of many. The sum over 32 events of three
-/// degrees of freedom each exceeds 32 times the latter once in 1e10 times.
-const REFUTED: (f64, f64) = (40.0, 6.5);
+/// A solution whose normalised squared innovation, of three degrees of freedom, is larger does not hold: a right one is
+/// refused once in 1e8 events.
+const REFUTED: f64 = 40.0;
+/// The same of the mean: the sum over 32 events exceeds 32 times this less than once in 1e9 times.
+const REFUTED_LATELY: f64 = 6.5;
+
+/// Whether a solution does not hold; one that is not a number does not.
+#[must_use]
+pub fn is_refuted(normalised_square: f64) -> bool {
+    normalised_square.is_nan() || normalised_square > REFUTED
+}
 
 impl Fit {
     /// Takes one event; true if the solution does not hold.
     pub fn refutes(&mut self, normalised_square: f64) -> bool {
-        self.mean += (normalised_square.min(REFUTED.0) - self.mean) / EVENTS;
-        normalised_square.is_nan() || normalised_square > REFUTED.0 || self.mean > REFUTED.1
+        self.mean += (normalised_square.min(REFUTED) - self.mean) / EVENTS;
+        is_refuted(normalised_square) || self.mean > REFUTED_LATELY
     }
 }
 

@@ -6,6 +6,7 @@
 //! left out again. So each solution costs the same however many landmarks are seen.
 
 mod assumed;
+mod contradiction;
 mod hypothesis;
 mod sensor_information;
 mod solution;
@@ -14,12 +15,13 @@ use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, fault_free};
-pub use hypothesis::{Assumption, LandmarkKey};
-use hypothesis::{FreeSince, Knock, LeftOut};
+use contradiction::Contradiction;
+pub use hypothesis::LandmarkKey;
+use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
 pub use sensor_information::{Seen, SensorInformation};
 pub use solution::{Laser, Solution, Step};
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
 use crate::odometry::{BiasJacobian, Motion};
 use crate::state::ProtectionLevel;
@@ -31,17 +33,12 @@ const KNOCKS: usize = 12;
 const INTERVAL: f64 = 0.1;
 /// A solution without a landmark is kept for this distance after it was seen, m.
 const REMEMBERED: f64 = 10.0;
-/// A solution whose normalised squared innovation, of three degrees of freedom, is larger does not hold: a right one is
-/// refused once in 1e8 events.
-const REFUTED: f64 = 40.0;
 /// The solution with a laser that creeps so fast that it is found: its place, m, and yaw, rad, for a square root of a metre, or of
 /// two seconds.
 const FAST_CREEP: (f64, f64) = (3e-2, 1.7e-2);
 /// It is found where the solutions lie further apart than so many deviations of what lies between them: once in 100 km
 /// without a fault, if 50 statistics are looked at in each of 8e5 revolutions.
 const FOUND: f64 = 5.9;
-/// Over this distance, m, a contradiction is forgotten by 1/e.
-const CONTRADICTION_MEMORY: f64 = 5.0;
 /// A laser is not knocked further than this, m, or turned by more, rad: it is the vehicle that was carried.
 const FURTHEST_KNOCK: (f64, f64) = (1.5, 0.6);
 /// The solution with a laser that creeps: its place, m, and yaw, rad, for a square root of a metre, or of two seconds.
@@ -50,11 +47,6 @@ const CREEP: (f64, f64) = (1e-3, 5.2e-4);
 const WEAR: (f64, f64) = (6e-5, 1e-5);
 /// The solution with an odometry that changes: scale, steering and turn for a square root of a metre.
 const CHANGE: [f64; 3] = [0.02, 0.01, 0.02];
-/// More than this share of what is seen contradicts the pose, if it is so many at least; fewer may be false reflectors.
-const CONTRADICTED: f64 = 0.25;
-const LEAST_CONTRADICTING: f64 = 2.5;
-/// What they count from one event to the next.
-const FADING: f64 = 0.8;
 /// The errors of the map are found from events that tell the position this well, m; others hardly move the solutions.
 const WELL_SEEN: f64 = 0.03;
 /// Covariance of a pose of which it is known only about where it is: 1 m and 20 deg.
@@ -67,7 +59,7 @@ const LONGEST_STEP: f64 = 0.3;
 struct Pending {
     covariance: Matrix3<f64>,
     distance: f64,
-    /// Turn of the last motion, and its duration.
+    /// The last motion, which tells the velocity.
     last: Option<Motion>,
 }
 
@@ -76,47 +68,11 @@ impl Pending {
         Self { covariance: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), distance: 0.0, last: None };
 }
 
-/// What of one event, or of the last ones, fits the pose and contradicts it.
-#[derive(Clone, Copy, Debug, Default)]
-struct Contradiction {
-    fitting: f64,
-    contradicting: f64,
-    /// Sum of how far the latter are from where they should be, m, and of that over their distance, rad.
-    by: (f64, f64),
-}
-
-impl Contradiction {
-    fn share(&self) -> f64 {
-        self.contradicting / (self.fitting + self.contradicting).max(1e-3)
-    }
-
-    fn mean(&self) -> ProtectionLevel {
-        let count = self.contradicting.max(1e-3);
-        ProtectionLevel { position: self.by.0 / count, heading: self.by.1 / count }
-    }
-
-    /// Adds an event to those before, which count by less and less.
-    fn add(&mut self, event: &Self) {
-        let add = |sum: f64, value: f64| FADING * sum + value;
-        *self = Self {
-            fitting: add(self.fitting, event.fitting),
-            contradicting: add(self.contradicting, event.contradicting),
-            by: (add(self.by.0, event.by.0), add(self.by.1, event.by.1)),
-        };
-    }
-}
-
-/// Whether a solution does not hold; one that is not a number does not.
-fn is_refuted(normalised_square: f64) -> bool {
-    normalised_square.is_nan() || normalised_square > REFUTED
-}
-
 /// The solutions, and the protection level that they give.
 #[derive(Clone, Debug)]
 pub struct SolutionSeparation {
     assumed: AssumedDeviations,
     steering_lever: Option<f64>,
-    has_begun: bool,
     time: Time,
     odometry_pose: Pose,
     pending: Pending,
@@ -135,8 +91,6 @@ pub struct SolutionSeparation {
     odometry: Solution,
     told: SensorInformation,
     contradiction: Contradiction,
-    lately: Contradiction,
-    contradicted: ProtectionLevel,
     map_variances: (f64, f64),
     /// The pose that is bounded, how much larger innovations are than expected, and the bound, all at the last step.
     pose: Pose,
@@ -153,7 +107,6 @@ impl SolutionSeparation {
         Self {
             assumed,
             steering_lever,
-            has_begun: false,
             time: Time::default(),
             odometry_pose: Pose::default(),
             pending: Pending::NONE,
@@ -169,9 +122,7 @@ impl SolutionSeparation {
             creeps_fast: false,
             odometry: nowhere,
             told: SensorInformation::NONE,
-            contradiction: Contradiction::default(),
-            lately: Contradiction::default(),
-            contradicted: ProtectionLevel::NONE,
+            contradiction: Contradiction::new(),
             map_variances: (0.0, 0.0),
             pose: Pose::default(),
             surprise: 1.0,
@@ -191,20 +142,18 @@ impl SolutionSeparation {
         self.odometry = self.all.clone();
         self.odometry.free_odometry();
         self.leave_outs.clear();
-        if !self.has_begun {
+        if self.mounting.is_none() {
             self.mounting = Some(self.free_mounting(time));
             let mut turned = self.all.clone();
             turned.free_yaw();
             self.yaw = Some(FreeSince::new(time, turned));
-            self.has_begun = true;
             self.unseen = (0.0, 0.0);
         }
         self.time = time;
         self.odometry_pose = *odometry_pose;
         self.pending = Pending::NONE;
         self.map_variances = (0.0, 0.0);
-        self.contradicted = ProtectionLevel::NONE;
-        self.lately = Contradiction::default();
+        self.contradiction = Contradiction::new();
         self.rest_on(pose, 1.0);
     }
 
@@ -235,7 +184,6 @@ impl SolutionSeparation {
         let step = Step {
             displacement,
             covariance: self.pending.covariance,
-            distance,
             by_bias: BiasJacobian::of(&displacement, self.steering_lever),
         };
         let lasted = distance.max(0.5 * now.since(self.time).max(0.0));
@@ -250,9 +198,7 @@ impl SolutionSeparation {
         self.creeping.loosen_mounting(place, yaw);
         let [place, yaw] = [FAST_CREEP.0, FAST_CREEP.1].map(|deviation| deviation * deviation * lasted);
         self.fast_creeping.loosen_mounting(place, yaw);
-        let remaining = libm::exp(-distance / CONTRADICTION_MEMORY);
-        self.contradicted.position *= remaining;
-        self.contradicted.heading *= remaining;
+        self.contradiction.travel(distance);
         for one in &mut self.leave_outs {
             one.unseen += distance;
         }
@@ -294,7 +240,7 @@ impl SolutionSeparation {
     /// Begins to take what one event tells; the solutions have gone on to its time.
     pub fn begin_event(&mut self) {
         self.told = SensorInformation::NONE;
-        self.contradiction = Contradiction::default();
+        self.contradiction.begin_event();
         for one in &mut self.leave_outs {
             one.told = SensorInformation::NONE;
         }
@@ -304,7 +250,7 @@ impl SolutionSeparation {
     pub fn see(&mut self, key: LandmarkKey, seen: &Seen, laser: &Laser) {
         let Some(place) = self.place_of(key) else { return };
         let told = SensorInformation::of(seen, &laser.sensor);
-        self.contradiction.fitting += 1.0;
+        self.contradiction.fit();
         self.told = self.told.with(&told);
         if let Some(one) = self.leave_outs.get_mut(place) {
             one.told = one.told.with(&told);
@@ -314,10 +260,7 @@ impl SolutionSeparation {
 
     /// Takes one that is so far from where it should be, m, and so far from the laser, m.
     pub fn contradict(&mut self, by: f64, range: f64) {
-        let Contradiction { contradicting, by: sum, .. } = &mut self.contradiction;
-        *contradicting += 1.0;
-        sum.0 += by;
-        sum.1 += by / range.max(1.0);
+        self.contradiction.contradict(by, range);
     }
 
     /// Which solution leaves the landmark out. None has used one that was not in sight: so one that comes in sight can be left
@@ -343,14 +286,7 @@ impl SolutionSeparation {
     /// Ends the event: all solutions are corrected, and the protection level of `pose` is found. Innovations are `surprise` times as large
     /// as the filter expects, or as it expects them (1).
     pub fn end_event(&mut self, pose: &Pose, laser: &Laser, surprise: f64) {
-        let now = self.contradiction;
-        self.lately.add(&now);
-        for evidence in [&now, &self.lately] {
-            if evidence.share() > CONTRADICTED && evidence.contradicting >= LEAST_CONTRADICTING {
-                self.contradicted = self.contradicted.or(&evidence.mean());
-            }
-        }
-        let is_contradicted = now.share() > CONTRADICTED;
+        let is_contradicted = self.contradiction.end_event();
         if self.told.is_any() && !is_contradicted {
             self.correct(laser);
             self.map_variances = self.told.map_variances(WELL_SEEN * WELL_SEEN).unwrap_or(self.map_variances);
@@ -458,39 +394,25 @@ impl SolutionSeparation {
         }
     }
 
-    /// The largest of all bounds of a pose.
+    /// The largest of all bounds of a pose, widened by what contradicts it.
     fn bound(&self, pose: &Pose, surprise: f64) -> ProtectionLevel {
-        let level = self.bounds(pose, surprise).fold(ProtectionLevel::NONE, |level, (_, bound)| level.or(&bound));
-        ProtectionLevel {
-            position: level.position + self.contradicted.position,
-            heading: level.heading + self.contradicted.heading,
-        }
-    }
-
-    /// The bound of the pose at the last step, by each assumption that may be wrong.
-    pub fn bounds_of_last(&self) -> impl Iterator<Item = (Assumption, ProtectionLevel)> + '_ {
-        self.bounds(&self.pose, self.surprise)
-    }
-
-    fn bounds(&self, pose: &Pose, surprise: f64) -> impl Iterator<Item = (Assumption, ProtectionLevel)> + '_ {
         let larger =
             |factors: &Factors| Factors { position: surprise * factors.position, heading: surprise * factors.heading };
         let (fault_free, one_fault) = (larger(&FAULT_FREE), larger(&ONE_FAULT));
+        let fast_creep = self.creeps_fast.then_some(&self.fast_creeping);
         let found_mounting = self.mounting.as_ref().filter(|free| free.is_needed || free.has_found_mounting());
-        let fast_creep = self.creeps_fast.then_some((Assumption::Creep, &self.fast_creeping));
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
-        let pose = *pose;
-        let all = self.all.bound(&pose, &fault_free, self.map_variances);
-        let one = [(Assumption::Creep, &self.creeping), (Assumption::Odometry, &self.odometry)]
+        let level = [&self.creeping, &self.odometry]
             .into_iter()
-            .chain(self.leave_outs.iter().map(|one| (Assumption::Landmark, &one.solution)))
-            .chain(self.knocks.iter().map(|one| (Assumption::Knock, &one.solution)))
             .chain(fast_creep)
-            .chain(found_mounting.map(|one| (Assumption::Mounting, &one.solution)))
-            .chain(found_yaw.map(|one| (Assumption::Yaw, &one.solution)));
-        core::iter::once((Assumption::Nothing, all)).chain(
-            one.map(move |(assumption, solution)| (assumption, solution.bound(&pose, &one_fault, self.map_variances))),
-        )
+            .chain(self.leave_outs.iter().map(|one| &one.solution))
+            .chain(self.knocks.iter().map(|one| &one.solution))
+            .chain(found_mounting.into_iter().chain(found_yaw).map(|one| &one.solution))
+            .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
+                level.or(&solution.bound(pose, &one_fault, self.map_variances))
+            });
+        let wider = self.contradiction.widening();
+        ProtectionLevel { position: level.position + wider.position, heading: level.heading + wider.heading }
     }
 
     /// The protection level of the pose that the odometry has led on to since the last step.
@@ -502,7 +424,7 @@ impl SolutionSeparation {
         let (position, heading) = self.all.variances();
         let along = scale * distance;
         let by_turn = steering.max(turn) * distance;
-        let larger = sensor_information::larger_axis(covariance.m11, covariance.m12, covariance.m22);
+        let larger = larger_axis(covariance.m11, covariance.m12, covariance.m22);
         ProtectionLevel {
             position: self.level.position
                 + FAULT_FREE.position * grown(position, larger + along * along)

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use crate::geometry::{Point, Pose};
+use crate::geometry::{Point, Pose, larger_axis};
 
 /// Below this information, of a metre or of a radian, a direction is not seen.
 const LEAST: f64 = 1e-3;
@@ -27,8 +27,6 @@ pub struct Seen {
     pub landmark: Point,
     /// Variance of that along each axis, m^2.
     pub landmark_variance: f64,
-    /// What that variance counts as in one event, as the errors of many events are the same.
-    pub shared: f64,
 }
 
 /// One number that is told of the pose of the laser: its derivative by the pose, its value and its variance.
@@ -48,8 +46,8 @@ impl SensorInformation {
         );
         let rotation = Matrix2::new(cosine, -sine, sine, cosine);
         let covariance = rotation * seen.covariance * rotation.transpose();
-        let shared = Matrix2::identity() * (seen.shared * seen.landmark_variance);
-        let Some(weight) = (covariance + shared).try_inverse() else { return Self::NONE };
+        let of_landmark = Matrix2::identity() * seen.landmark_variance;
+        let Some(weight) = (covariance + of_landmark).try_inverse() else { return Self::NONE };
         let residual = Vector2::new(seen.landmark.x - sensor.x - turned.x, seen.landmark.y - sensor.y - turned.y);
         let by_pose = nalgebra::Matrix2x3::new(1.0, 0.0, -turned.y, 0.0, 1.0, turned.x);
         let weighted = by_pose.transpose() * weight;
@@ -96,7 +94,7 @@ impl SensorInformation {
             return None;
         }
         let covariance = inverse * self.by_map * inverse;
-        Some((larger_axis(covariance.m11, covariance.m12, covariance.m22), covariance.m33.max(0.0)))
+        Some((not_negative(larger_axis(covariance.m11, covariance.m12, covariance.m22)), covariance.m33.max(0.0)))
     }
 
     /// The same as up to three numbers with independent errors: the rows of L' of the matrix L D L'.
@@ -124,22 +122,10 @@ impl SensorInformation {
 
 const ZERO: Matrix3<f64> = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
-/// Length of a vector of everyday size; the hypotenuse that cannot overflow costs several times as much.
-#[must_use]
-pub fn norm(x: f64, y: f64) -> f64 {
-    libm::sqrt(x * x + y * y)
-}
-
 /// What rounding has made negative is zero; what is not a number stays so.
 #[must_use]
 pub fn not_negative(variance: f64) -> f64 {
     if variance < 0.0 { 0.0 } else { variance }
-}
-
-/// Variance along the larger axis of a covariance of two numbers.
-#[must_use]
-pub fn larger_axis(xx: f64, xy: f64, yy: f64) -> f64 {
-    not_negative(0.5 * (xx + yy) + norm(0.5 * (xx - yy), xy))
 }
 
 struct Matrix3Parts {

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::assumed::{AssumedDeviations, Factors};
-use super::sensor_information::{SensorInformation, Told, larger_axis, norm, not_negative};
-use crate::geometry::{Pose, difference};
+use super::sensor_information::{SensorInformation, Told, not_negative};
+use crate::geometry::{Pose, difference, larger_axis, length};
 use crate::odometry::BiasJacobian;
 use crate::state::ProtectionLevel;
 
@@ -21,8 +21,6 @@ pub struct Step {
     pub displacement: Pose,
     /// Covariance of the displacement.
     pub covariance: Matrix3<f64>,
-    /// Distance travelled, m.
-    pub distance: f64,
     /// How the displacement changes with scale and steering.
     pub by_bias: BiasJacobian,
 }
@@ -59,14 +57,17 @@ struct Lasting {
     turn: f64,
 }
 
-/// The first state of what lasts, and how many there are: of the laser with its clock, and of the odometry.
-const LASER: (usize, usize) = (3, 4);
-const ODOMETRY: (usize, usize) = (7, 3);
+/// The first state of what lasts: of the mounting, its yaw, the clock and the odometry.
+const MOUNTING: usize = 3;
+const YAW: usize = 5;
+const CLOCK: usize = 6;
+const ODOMETRY: usize = 7;
 
-/// A free mounting: place, m, yaw, rad, and clock, s.
-pub const FREE_MOUNTING: [f64; 4] = [0.6, 0.6, 0.175, 0.2];
-/// A free odometry: scale, steering, rad, and turn.
-pub const FREE_ODOMETRY: [f64; 3] = [0.2, 0.1, 0.2];
+/// Deviations of what is free: place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
+const FREE_PLACE: f64 = 0.6;
+const FREE_YAW: f64 = 0.175;
+const FREE_CLOCK: f64 = 0.2;
+const FREE_ODOMETRY: [f64; 3] = [0.2, 0.1, 0.2];
 
 /// How the information changes the states if the model is linearised at `from` beside them; `covariance` is theirs, and
 /// becomes that behind the change.
@@ -168,7 +169,7 @@ impl Solution {
             solution.set(row, column, entry);
         }
         let AssumedDeviations { mounting, mounting_yaw, clock, scale, steering, turn } = *assumed;
-        for (state, deviation) in (LASER.0..).zip([mounting, mounting, mounting_yaw, clock, scale, steering, turn]) {
+        for (state, deviation) in (MOUNTING..).zip([mounting, mounting, mounting_yaw, clock, scale, steering, turn]) {
             solution.set(state, state, deviation * deviation);
         }
         solution
@@ -192,7 +193,7 @@ impl Solution {
     #[must_use]
     pub fn mounting_error(&self) -> (f64, f64) {
         let [x, y] = self.lasting.lever;
-        (libm::hypot(x, y), libm::fabs(self.lasting.yaw))
+        (length(x, y), libm::fabs(self.lasting.yaw))
     }
 
     /// Forgets some states: they are independent of all others from now on, with these deviations.
@@ -207,34 +208,32 @@ impl Solution {
 
     /// The laser may be anywhere within what a knock can do.
     pub fn free_mounting(&mut self) {
-        let [x, y, yaw, _] = FREE_MOUNTING;
-        self.forget(LASER.0, &[x, y, yaw]);
+        self.forget(MOUNTING, &[FREE_PLACE, FREE_PLACE, FREE_YAW]);
     }
 
     /// The clock of the laser may be off.
     pub fn free_clock(&mut self) {
-        let [.., clock] = FREE_MOUNTING;
-        self.forget(LASER.0 + LASER.1 - 1, &[clock]);
+        self.forget(CLOCK, &[FREE_CLOCK]);
     }
 
     /// The laser may be turned.
     pub fn free_yaw(&mut self) {
-        self.forget(LASER.0 + 2, &[0.175]);
+        self.forget(YAW, &[FREE_YAW]);
     }
 
     /// Scale, steering and turn may be anything.
     pub fn free_odometry(&mut self) {
-        self.forget(ODOMETRY.0, &FREE_ODOMETRY);
+        self.forget(ODOMETRY, &FREE_ODOMETRY);
     }
 
     /// The laser may have moved by so much, m^2 and rad^2.
     pub fn loosen_mounting(&mut self, place: f64, yaw: f64) {
-        self.loosen(LASER.0, &[place, place, yaw]);
+        self.loosen(MOUNTING, &[place, place, yaw]);
     }
 
     /// Scale, steering and turn may have changed by so much; variances.
-    pub fn loosen_odometry(&mut self, variances: &[f64; ODOMETRY.1]) {
-        self.loosen(ODOMETRY.0, variances);
+    pub fn loosen_odometry(&mut self, variances: &[f64; 3]) {
+        self.loosen(ODOMETRY, variances);
     }
 
     fn loosen<const COUNT: usize>(&mut self, first: usize, variances: &[f64; COUNT]) {
@@ -333,7 +332,7 @@ impl Solution {
     #[must_use]
     pub fn variances(&self) -> (f64, f64) {
         let at = |row: usize, column: usize| self.covariance.get((row, column)).map_or(0.0, |entry: &f64| *entry);
-        (larger_axis(at(0, 0), at(0, 1), at(1, 1)), not_negative(at(2, 2)))
+        (not_negative(larger_axis(at(0, 0), at(0, 1), at(1, 1))), not_negative(at(2, 2)))
     }
 
     /// How far a pose may be off if this solution is right: by what lies between them, and by the solution's own bound.
@@ -343,7 +342,7 @@ impl Solution {
         let (position, heading) = self.variances();
         let (by_map, heading_by_map) = map_variances;
         let level = ProtectionLevel {
-            position: norm(pose.x - self.pose.x, pose.y - self.pose.y)
+            position: length(pose.x - self.pose.x, pose.y - self.pose.y)
                 + factors.position * libm::sqrt(position + by_map),
             heading: libm::fabs(difference(pose.theta, self.pose.theta))
                 + factors.heading * libm::sqrt(heading + heading_by_map),

@@ -49,7 +49,6 @@ fn revolve(stopwatch: &Stopwatch, separation: &mut SolutionSeparation, reflector
                     covariance: Matrix2::identity() * 1e-4,
                     landmark,
                     landmark_variance: 4e-6,
-                    shared: 1.0,
                 };
                 separation.see(LandmarkKey::Reflector(number), &seen, &laser);
             }
