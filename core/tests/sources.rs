@@ -113,6 +113,19 @@ fn an_aid_moves_the_pose_by_its_weight_and_is_gated_beyond_three_deviations() {
     assert_eq!((status.used, status.accepted, status.observations), (Some(time), 1, 1));
 }
 
+/// No solution of the level has used the aid: by as much as it moves the pose, the pose may be further off.
+#[test]
+fn what_an_aid_has_moved_widens_the_level() {
+    let mut stage = Stage::new(parameters());
+    stage.tell(stage.truth, 0.04, 0.01);
+    let before = stage.said();
+    let aid = Told { time: stage.time(), state: 0, value: before.pose.x + 0.1, deviation: 0.03 };
+    assert_eq!(stage.localizer.aid(&aid).verdict, Verdict::Accepted);
+    let after = stage.said();
+    let moved = after.pose.x - before.pose.x;
+    assert!((after.level.position - before.level.position - moved).abs() < 1e-9, "{after:?} {before:?}");
+}
+
 #[test]
 fn an_aid_that_is_not_wanted_moves_nothing() {
     let of = |change: fn(&mut Parameters)| {

@@ -282,6 +282,7 @@ impl<
         let status = &mut self.outputs.sources.aids;
         status.begin(time);
         status.add(time, outcome.verdict, outcome.verdict == Verdict::Accepted, outcome.test_ratio);
+        self.separate(None);
         self.publish(true);
         outcome
     }

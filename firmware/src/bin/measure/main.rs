@@ -61,7 +61,6 @@ struct Counts {
     scan: Count,
     slam: Count,
     falko: Count,
-    separation: Count,
     association: Count,
     map_update: Count,
 }
@@ -74,7 +73,6 @@ impl Counts {
             scan: Count::new("scan cycle"),
             slam: Count::new("scan cycle with landmarks and key scans in the state"),
             falko: Count::new("falko on 1440 beams"),
-            separation: Count::new("solutions of a revolution of the drive"),
             association: Count::new("association among 1000 reflectors"),
             map_update: Count::new("dynamic map update of 20 keypoints"),
         }
@@ -84,7 +82,6 @@ impl Counts {
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 static SLAM: StaticCell<Localizer> = StaticCell::new();
-static PROTECTED: StaticCell<Localizer> = StaticCell::new();
 static POINTS: ConstStaticCell<PointScan<1440>> = ConstStaticCell::new(PointScan::new());
 static DETECTOR: StaticCell<falko::Detector<1440>> = StaticCell::new();
 static MAP: StaticCell<FixedMap<1000>> = StaticCell::new();
@@ -97,7 +94,6 @@ fn main() -> ! {
     let mut counts = Counts::new();
     let mut localizer: Option<&mut Localizer> = None;
     let mut slam: Option<&mut Localizer> = None;
-    let mut protected: Option<&mut Localizer> = None;
     let mut detector: Option<&mut falko::Detector<1440>> = None;
     let points = POINTS.take();
     let map = MAP.init_with(FixedMap::new);
@@ -107,8 +103,8 @@ fn main() -> ! {
         .take()
         .for_each(&mut input, |record| match (record, &mut localizer) {
             (Record::Header(header), None) => {
-                protected = Some(PROTECTED.init_with(|| Localizer::new(*header.parameters)));
                 let mut parameters = *header.parameters;
+                // A revolution that is told reflector by reflector would be many for the solutions; they are counted apart.
                 parameters.protection = false;
                 localizer = Some(LOCALIZER.init_with(|| Localizer::new(parameters)));
                 parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
@@ -117,23 +113,12 @@ fn main() -> ! {
             }
             (Record::Landmarks(landmarks), Some(localizer)) => {
                 localizer.add_landmarks(landmarks).expect("the map has room for the landmarks");
-                if let Some(protected) = &mut protected {
-                    protected.add_landmarks(landmarks).expect("the map has room for the landmarks");
-                }
             }
             (Record::Event(event), Some(localizer)) => {
                 if let (Event::Scan(scan), Some(detector)) = (event, &mut detector) {
                     features(&stopwatch, &mut counts, scan, points, detector, dynamic);
                 }
-                let without = handle(&stopwatch, &mut counts, localizer, event);
-                if let Some(protected) = &mut protected {
-                    let with = stopwatch.count(|| {
-                        protected.handle(&event);
-                    });
-                    if matches!(event, Event::Reflectors(_)) {
-                        counts.separation.add(with.saturating_sub(without));
-                    }
-                }
+                handle(&stopwatch, &mut counts, localizer, event);
                 if let Some(slam) = &mut slam {
                     let count = stopwatch.count(|| {
                         slam.handle(&event);
@@ -150,24 +135,12 @@ fn main() -> ! {
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
-    let Counts { prediction, reflector, scan, slam, falko, separation, association, map_update } = counts;
+    let Counts { prediction, reflector, scan, slam, falko, association, map_update } = counts;
     let [few, many] = search::count(&stopwatch, map);
     let [six, twenty] = separation::count(&stopwatch);
-    for count in [
-        prediction,
-        reflector,
-        association,
-        falko,
-        map_update,
-        scan,
-        slam,
-        decode(&stopwatch),
-        few,
-        many,
-        separation,
-        six,
-        twenty,
-    ] {
+    for count in
+        [prediction, reflector, association, falko, map_update, scan, slam, decode(&stopwatch), few, many, six, twenty]
+    {
         let mean = count.total / count.runs.max(1);
         writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");
     }
@@ -179,34 +152,25 @@ fn main() -> ! {
     }
 }
 
-/// One event, and what it took; reflectors one by one, as each is an update of its own.
-fn handle(stopwatch: &Stopwatch, counts: &mut Counts, localizer: &mut Localizer, event: &Event) -> u64 {
+/// Counts one event; reflectors one by one, as each is an update of its own.
+fn handle(stopwatch: &Stopwatch, counts: &mut Counts, localizer: &mut Localizer, event: &Event) {
     let mut count = |event: &Event| {
         stopwatch.count(|| {
             localizer.handle(event);
         })
     };
     match event {
-        Event::Encoders(_) => {
-            let took = count(event);
-            counts.prediction.add(took);
-            took
-        }
-        Event::Scan(_) => {
-            let took = count(event);
-            counts.scan.add(took);
-            took
-        }
+        Event::Encoders(_) => counts.prediction.add(count(event)),
+        Event::Scan(_) => counts.scan.add(count(event)),
         Event::Reflectors(reflectors) => {
-            let mut sum = 0;
             for observation in reflectors.observations {
-                let took = count(&Event::Reflectors(Reflectors::of_first(core::slice::from_ref(observation))));
-                counts.reflector.add(took);
-                sum += took;
+                let one = Reflectors::of_first(core::slice::from_ref(observation));
+                counts.reflector.add(count(&Event::Reflectors(one)));
             }
-            sum
         }
-        _ => count(event),
+        _ => {
+            count(event);
+        }
     }
 }
 
