@@ -13,7 +13,7 @@ use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn};
 use agv_lab::trust::outcome::Outcome;
 use agv_lab::trust::row::{self, Row, RowsError};
-use agv_lab::trust::{hall, sweep};
+use agv_lab::trust::{hall, pair, sweep};
 use agv_wire::can::controller::{Health, PublishedPose};
 
 /// A pose in the origin with a protection level of 10 cm and 1 deg.
@@ -55,6 +55,7 @@ fn judge(spans: &[(usize, PublishedPose, f64)]) -> Outcome {
                 docks: true,
                 is_nominal: true,
                 is_bare: false,
+                has_begun: false,
                 is_hidden: false,
             });
         }
@@ -135,6 +136,7 @@ fn who_says_nothing_claims_nothing() {
             docks: false,
             is_nominal: false,
             is_bare: false,
+            has_begun: false,
             is_hidden: false,
         });
     }
@@ -147,7 +149,7 @@ fn scenarios(name: &str) -> std::path::PathBuf {
 
 #[test]
 fn there_are_sixty_kinds_and_more_each_at_nine_sizes_or_more() {
-    let kinds = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kinds = kinds::read(&scenarios("trust.toml")).unwrap().kinds;
     assert!(kinds.len() >= 61, "{}", kinds.len());
     for kind in &kinds {
         assert!(kind.sizes.is_empty() || kind.sizes.len() >= kinds::FEWEST_SIZES, "{}", kind.name);
@@ -160,7 +162,7 @@ fn there_are_sixty_kinds_and_more_each_at_nine_sizes_or_more() {
     for (wrong, complaint) in [
         ("sizes = [0, 1]\nwhat = { kind = \"wall_moved\", metres = \"size\" }", "fewer than 9 sizes"),
         ("sizes = [0, 1, 2, 3, 4, 5, 6, 7, 8]\nwhat = { kind = \"laser_silent\" }", "nothing that they are of"),
-        ("what = { kind = \"laser_silent\" }\nknock = { x = 1.0 }", "one of `what` and `knock`"),
+        ("what = { kind = \"laser_silent\" }\nknock = { x = 1.0 }", "one of `what`, `knock` and `carry`"),
         ("what = { kind = \"wall_moves\" }", "unknown variant"),
         ("what = 3", "invalid type"),
     ] {
@@ -170,13 +172,91 @@ fn there_are_sixty_kinds_and_more_each_at_nine_sizes_or_more() {
 }
 
 #[test]
+fn pairs_are_drawn_by_the_seed_and_few_hide_each_other() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kinds: Vec<_> = catalogue.kinds.iter().filter(|kind| kind.name != NOTHING).cloned().collect();
+    let mut hidden = 0;
+    for seed in 1..=2000 {
+        let [one, other] = pair::draw(&kinds, seed).unwrap();
+        assert_eq!(pair::draw(&kinds, seed).unwrap(), [one, other]);
+        assert_ne!(one.0.name, other.0.name);
+        assert!(one.0.every_size().contains(&one.1) && other.0.every_size().contains(&other.1));
+        let names = [(one.0.name.as_str(), one.1), (other.0.name.as_str(), other.1)];
+        let by = catalogue.hidden_by(names[0], names[1]);
+        assert_eq!(by, catalogue.hidden_by(names[1], names[0]));
+        hidden += usize::from(by.is_some());
+    }
+    assert!((1..=200).contains(&hidden), "{hidden} of 2000");
+    assert_eq!(catalogue.hidden_by(("laser silent", 5.0), ("wheel spins", 1.0)), Some("laser"));
+    assert_eq!(catalogue.hidden_by(("laser silent", 1.0), ("wheel spins", 1.0)), None);
+    assert_eq!(catalogue.hidden_by(("laser silent", 5.0), ("laser turned", 1.0)), None);
+    assert!(pair::draw(&kinds[..1], 1).is_none());
+    let unknown = "[[kind]]\nname = \"a\"\nunit = \"\"\nwhat = { kind = \"laser_silent\" }\n\
+                   [[blinding]]\nsource = \"laser\"\ntaken_by = [[\"b\", 1.0]]\nshows = [\"a\"]\n";
+    assert!(kinds::parse(unknown).unwrap_err().to_string().contains("is no kind"));
+}
+
+#[test]
+fn pairs_count_in_the_totals_but_where_one_hides_the_other() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let row = |kind: &str, size, with: Option<(&str, f64)>, failures| Row {
+        kind: kind.to_owned(),
+        size,
+        with: with.map(|(kind, size)| (kind.to_owned(), size)),
+        seed: 1,
+        is_accepted: true,
+        can_recover: false,
+        outcome: Some(Outcome { failures, hazards: failures, outputs: 100, ..Outcome::default() }),
+    };
+    let rows = [
+        row("laser silent", 5.0, Some(("wheel spins", 1.0)), 1),
+        row("laser silent", 5.0, Some(("laser turned", 1.0)), 2),
+        row("laser silent", 5.0, None, 0),
+    ];
+    let found = figures(&rows, &catalogue);
+    assert_eq!((found.runs, found.integrity_failures), (2, 2));
+    assert_eq!((found.pairs.runs, found.pairs.failures, found.pairs_apart.failures), (1, 1, 1));
+    assert_eq!(found.pairs_apart.failed[0].hidden_by.as_deref(), Some("laser"));
+    assert_eq!((found.per_fault.len(), found.per_fault[0].failures), (1, 0));
+}
+
+#[test]
+fn a_fault_is_found_when_the_bus_says_so() {
+    let outcome = |reason: Reason, begun: usize| {
+        let mut judge = Judge::new(AlertLimits::default());
+        for step in 0..400_usize {
+            let now = Time::from_seconds(1.0 + 0.01 * step as f64);
+            let heard = PublishedPose { reason: if step >= 300 { reason } else { Reason::None }, ..pose() };
+            judge.hear(&Moment {
+                now,
+                heard: Some((&heard, now)),
+                truth: Some(Pose::new(0.012, 0.0, 0.0)),
+                driven: 0.01,
+                docks: false,
+                is_nominal: false,
+                is_bare: false,
+                has_begun: step >= begun,
+                is_hidden: false,
+            });
+        }
+        judge.outcome()
+    };
+    let found = outcome(Reason::MotionDisagrees, 250).found.unwrap();
+    assert_eq!((found.after_ms, found.after_mm, found.by.as_str()), (500, 500, "motion"));
+    assert_eq!(outcome(Reason::None, 250).found, None);
+    assert_eq!(outcome(Reason::MotionDisagrees, 1000).found, None);
+    // A protection level of 100 mm and an error of 12 mm.
+    assert_eq!(outcome(Reason::None, 0).stanford, [(81 * 20 + 2, 400)].into());
+}
+
+#[test]
 fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
-    let kinds = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kinds = kinds::read(&scenarios("trust.toml")).unwrap().kinds;
     let sound: Vec<_> = kinds.into_iter().filter(|kind| kind.name == NOTHING).collect();
     let counts: Vec<usize> = (1..=20).map(|seed| hall::draw(seed).scenario.build_world().reflectors.len()).collect();
     assert!(counts.iter().min() < counts.iter().max(), "{counts:?}");
     let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, || ()).unwrap();
-    let found = figures(&rows, |_| String::new());
+    let found = figures(&rows, &kinds::read(&scenarios("trust.toml")).unwrap());
     assert_eq!((found.runs, found.panics, found.seeds), (2, 0, [1, 2]));
     assert!(found.first_claim_s[1] < 30.0 && found.nominal_mi == 0 && found.nominal_hmi == 0, "{found:?}");
     // The same run is the same row.
@@ -201,6 +281,7 @@ fn a_loss_where_no_reflectors_are_is_no_loss_of_continuity() {
                 docks: false,
                 is_nominal: false,
                 is_bare,
+                has_begun: false,
                 is_hidden: false,
             };
             judge.hear(&moment);
@@ -230,6 +311,7 @@ fn what_nobody_can_tell_yet_counts_apart() {
                 docks,
                 is_nominal,
                 is_bare,
+                has_begun: true,
                 is_hidden,
             });
         }
@@ -242,11 +324,12 @@ fn what_nobody_can_tell_yet_counts_apart() {
 
 #[test]
 fn rows_of_parts_are_those_of_the_whole() {
-    let kinds = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kinds = kinds::read(&scenarios("trust.toml")).unwrap().kinds;
     let folder = tempfile::tempdir().unwrap();
     let row = |kind: &str, size: f64, seed| Row {
         kind: kind.to_owned(),
         size,
+        with: None,
         seed,
         is_accepted: true,
         can_recover: false,

@@ -25,7 +25,7 @@ fn line(kind: &str, size: f64, rows: &[&Row]) -> String {
 
 #[test]
 fn the_worst_size_of_each_kind_is_judged_as_it_was() {
-    let kinds = kinds::read(&repository("host-sim/scenarios/trust.toml")).unwrap();
+    let kinds = kinds::read(&repository("host-sim/scenarios/trust.toml")).unwrap().kinds;
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/trust.csv");
     let kept = std::fs::read_to_string(&path).unwrap();
     let named: Vec<(&Kind, f64)> = kept
@@ -44,7 +44,7 @@ fn the_worst_size_of_each_kind_is_judged_as_it_was() {
         .collect();
     assert!(missing.is_empty(), "the table has no line of {missing:?}");
     let trials: Vec<Trial> =
-        named.iter().flat_map(|&(kind, size)| SEEDS.map(|seed| Trial { kind, size, seed })).collect();
+        named.iter().flat_map(|&(kind, size)| SEEDS.map(|seed| Trial { kind, size, with: None, seed })).collect();
     let rows = sweep::run(&trials, Shard::ALL, || ()).unwrap();
     let mut found = String::from("kind,worst size,runs that fail,hazardous events,misleading\n");
     for (&(kind, size), rows) in named.iter().zip(rows.chunks(SEEDS.len())) {

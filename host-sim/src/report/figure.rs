@@ -87,6 +87,15 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
+/// From light to dark, in order for every eye (cividis; J. Nunez, C. Anderton, R. Renslow, PLoS ONE 13(7), 2018).
+pub(super) const SHADES: [RGBColor; 5] = [
+    RGBColor(255, 234, 70),
+    RGBColor(203, 186, 105),
+    RGBColor(148, 142, 119),
+    RGBColor(87, 92, 109),
+    RGBColor(0, 34, 78),
+];
+
 /// Grey of what stands in the background.
 pub(super) const BACKGROUND_INK: RGBColor = RGBColor(150, 150, 150);
 

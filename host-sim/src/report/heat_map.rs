@@ -3,8 +3,8 @@
 use plotters::prelude::*;
 
 use super::figure::{
-    Extent, Figure, FigureError, MARGIN, MARKS, Mark, PointSet, Shape, WIDTH, X_LABELS, Y_LABELS, axes, axis_number,
-    draw,
+    Extent, Figure, FigureError, MARGIN, MARKS, Mark, PointSet, SHADES, Shape, WIDTH, X_LABELS, Y_LABELS, axes,
+    axis_number, draw,
 };
 
 /// A square of the floor.
@@ -30,15 +30,6 @@ pub struct HeatMap<'a> {
     /// Points above the squares.
     pub points: PointSet<'a>,
 }
-
-/// From light to dark, in order for every eye (cividis; J. Nunez, C. Anderton, R. Renslow, PLoS ONE 13(7), 2018).
-const SHADES: [RGBColor; 5] = [
-    RGBColor(255, 234, 70),
-    RGBColor(203, 186, 105),
-    RGBColor(148, 142, 119),
-    RGBColor(87, 92, 109),
-    RGBColor(0, 34, 78),
-];
 
 /// Greatest height of the plan, pixels.
 const TALLEST: f64 = 720.0;

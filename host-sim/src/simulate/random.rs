@@ -38,6 +38,8 @@ pub enum Stream {
     Telegrams = 15,
     /// What is made wrong of frames on the bus.
     Frames = 16,
+    /// Which faults come together.
+    Pairs = 17,
 }
 
 /// One sequence of random numbers.

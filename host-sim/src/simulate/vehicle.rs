@@ -105,6 +105,10 @@ pub fn drive(
                 wheel_way: state.wheel_way + moved / libm::cos(mean_steering),
                 ..state
             };
+            let (before, now) = ((states.len() - 1) as f64 * interval, states.len() as f64 * interval);
+            for carry in options.carries.iter().filter(|carry| before < carry.from && carry.from <= now) {
+                state.pose = state.pose.compose(&Pose::new(carry.x, carry.y, carry.heading_deg.to_radians()));
+            }
             states.push(state);
         }
     }

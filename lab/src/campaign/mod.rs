@@ -14,10 +14,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use agv_host_sim::simulate::SimulateError;
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, ScenarioError, toml_complaint};
-use agv_host_sim::simulate::{SimulateError, simulate};
-use fault::{Fault, window};
+use fault::{Fault, simulate_with, window};
 use rayon::prelude::*;
 use results::Row;
 use rig::{RigError, RigOptions};
@@ -70,6 +70,12 @@ pub enum CampaignError {
     /// Two faults have the same name, or none has any.
     #[error("every fault of a campaign has a name of its own; {0:?} is there twice or empty")]
     Name(String),
+    /// Reflectors cannot be added to the hall.
+    #[error("reflectors are added to halls of shapes only")]
+    Hall,
+    /// A kind of faults makes no fault.
+    #[error("{0}")]
+    Kind(String),
     /// The scenario makes no sense.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -203,9 +209,9 @@ impl Campaign {
         let mut scenario = Scenario { seed: run.seed, ..scenario.clone() };
         // The controller of a campaign has a map of reflectors only; scans would cost ten times as much.
         scenario.laser.scans = false;
-        let simulation = simulate(&scenario)?;
-        let mut recording = simulation.recording;
         let mut random = Random::new(run.seed, Stream::Faults);
+        let simulation = simulate_with(&scenario, &faults, &mut random)?;
+        let mut recording = simulation.recording;
         for fault in &faults {
             fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);
             fault.mislead(&mut recording, &mut random);
@@ -213,7 +219,9 @@ impl Campaign {
         let mut judge = Judge::new(self.limits, window(&faults).0);
         let options = RigOptions { seconds: self.seconds, seed: run.seed, is_told: true };
         rig::drive(&recording, &faults, &options, |heard| {
-            judge.hear(heard.now, heard.time, heard.output, heard.truth);
+            if heard.time >= 0.0 {
+                judge.hear(heard.now, heard.time, heard.output, heard.truth);
+            }
         })?;
         Ok(judge.verdict(&faults))
     }

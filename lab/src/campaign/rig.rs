@@ -57,12 +57,12 @@ pub struct RigOptions {
     pub is_told: bool,
 }
 
-/// What is heard a hundred times a second.
+/// What is heard a hundred times a second, from when everything was switched on.
 #[derive(Clone, Copy)]
 pub struct Heard<'a> {
     /// Now.
     pub now: Time,
-    /// How long the vehicle has driven, s.
+    /// How long the vehicle has driven, s; negative while it stands before.
     pub time: f64,
     /// What the controller would publish.
     pub output: Option<&'a PoseOutput>,
@@ -185,7 +185,7 @@ pub fn drive(
         for frame in pair.poll(now) {
             from_bus.send_frame(now, time, frame, faults);
         }
-        if time >= 0.0 && step % STEPS_A_POSE == 0 {
+        if step % STEPS_A_POSE == 0 {
             let output = controller.as_ref().and_then(|controller| controller.output());
             let truth = |at: Time| truth_at(&recording.truth, START.offset(at.since(begin).max(0.0)));
             let published = published.as_ref().map(|(pose, stated)| (pose, *stated));

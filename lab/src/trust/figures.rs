@@ -1,39 +1,16 @@
 //! The figures of a campaign.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
+use super::kinds::Catalogue;
+use super::of_kind::{Class, OfKind, per_fault};
+use super::of_pairs::{OfPairs, pairs};
 use super::outcome::Outcome;
-use super::row::{OfSize, Row, by_size, worst_size};
+use super::row::{OfSize, Row};
+use super::stanford::{Stanford, stanford};
 use agv_host_sim::accuracy::Spread;
-
-/// What a kind of fault has shown at its worst size.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfKind {
-    /// The kind.
-    pub kind: String,
-    /// Its worst size, and what it is in.
-    pub worst_size: f64,
-    /// What sizes are in.
-    pub unit: String,
-    /// Runs at that size.
-    pub runs: usize,
-    /// Of these, runs with an integrity failure or a panic.
-    pub failures: usize,
-    /// Exact 95 % bound of the share of failures, if there were none.
-    pub bound: Option<f64>,
-    /// The worst run.
-    pub worst_seed: u64,
-    /// Longest time in hazardous outputs, s.
-    pub worst_hmi_s: f64,
-    /// Longest distance in hazardous outputs, m.
-    pub worst_hmi_m: f64,
-    /// Hazardous outputs, s, while no sensor of the vehicle could tell the fault (class C); in none of the other figures.
-    pub hidden_s: f64,
-    /// Largest share of error over protection level; none if there was no claim.
-    pub error_over_pl_max: Option<f64>,
-    /// Share of the time in claims with a protection level within the alert limit of travelling.
-    pub share_claimed: f64,
-}
 
 /// The figures of a campaign; shares of nothing are none.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -84,16 +61,35 @@ pub struct Figures {
     pub first_claim_s: [f64; 2],
     /// First and last seed.
     pub seeds: [u64; 2],
+    /// Kinds of class C.
+    pub class_c: Vec<String>,
     /// Each kind at its worst size, worst first.
     pub per_fault: Vec<OfKind>,
+    /// Pairs of faults.
+    pub pairs: OfPairs,
+    /// Pairs of which one takes away every source that could show the other; in none of the figures above.
+    pub pairs_apart: OfPairs,
+    /// Without faults.
+    pub stanford_nominal: Stanford,
+    /// With faults, but for pairs apart.
+    pub stanford_faults: Stanford,
 }
 
 /// The kind without a fault.
 pub const NOTHING: &str = "nothing";
 
-/// The figures of these rows. `units` gives the unit of a kind's size.
+/// The figures of these rows.
 #[must_use]
-pub fn figures(rows: &[Row], units: impl Fn(&str) -> String) -> Figures {
+pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
+    let hidden = |row: &Row| {
+        let (kind, size) = row.with.as_ref()?;
+        catalogue.hidden_by((&row.kind, row.size), (kind, *size)).map(str::to_owned)
+    };
+    let (apart, rows): (Vec<&Row>, Vec<&Row>) = every_row.iter().partition(|row| hidden(row).is_some());
+    let of_pairs = |rows: &[&Row]| pairs(rows.iter().copied().filter(|row| row.with.is_some()), hidden);
+    let (pairs, pairs_apart) = (of_pairs(&rows), of_pairs(&apart));
+    let rows: Vec<Row> = rows.into_iter().cloned().collect();
+    let rows = rows.as_slice();
     let all = OfSize { size: 0.0, rows: rows.iter().collect() };
     let sound = OfSize { size: 0.0, rows: rows.iter().filter(|row| row.kind == NOTHING).collect() };
     let accepted = OfSize { size: 0.0, rows: sound.rows.iter().copied().filter(|row| row.is_accepted).collect() };
@@ -109,6 +105,7 @@ pub fn figures(rows: &[Row], units: impl Fn(&str) -> String) -> Figures {
         Some(outcome.first_claim.unwrap_or(outcome.outputs) as f64 * super::judge::STEP)
     }));
     let seeds = rows.iter().map(|row| row.seed);
+    let of_kinds = per_fault(rows, catalogue);
     Figures {
         runs: rows.len(),
         panics: rows.iter().filter(|row| row.outcome.is_none()).count(),
@@ -141,13 +138,18 @@ pub fn figures(rows: &[Row], units: impl Fn(&str) -> String) -> Figures {
         error_over_pl_max: sound.most(|outcome| outcome.most_over_level),
         first_claim_s: [first_claims.p95, first_claims.max],
         seeds: [seeds.clone().min().unwrap_or_default(), seeds.max().unwrap_or_default()],
-        per_fault: per_fault(rows, units),
+        class_c: of_kinds.iter().filter(|of| of.class == Class::C).map(|of| of.kind.clone()).collect(),
+        per_fault: of_kinds,
+        pairs,
+        pairs_apart,
+        stanford_nominal: stanford(&sound.rows),
+        stanford_faults: stanford(&rows.iter().filter(|row| row.kind != NOTHING).collect::<Vec<_>>()),
     }
 }
 
 /// The 95 % mark of a count of values.
-fn mark(of: &OfSize, values: fn(&Outcome) -> &std::collections::BTreeMap<u32, u64>) -> Option<f64> {
-    let mut counts = std::collections::BTreeMap::<u32, u64>::new();
+fn mark(of: &OfSize, values: fn(&Outcome) -> &BTreeMap<u32, u64>) -> Option<f64> {
+    let mut counts = BTreeMap::<u32, u64>::new();
     for outcome in of.rows.iter().filter_map(|row| row.outcome.as_ref()) {
         for (value, count) in values(outcome) {
             *counts.entry(*value).or_default() += count;
@@ -159,40 +161,4 @@ fn mark(of: &OfSize, values: fn(&Outcome) -> &std::collections::BTreeMap<u32, u6
         below += count;
         (total > 0 && below * 100 >= total * 95).then_some(f64::from(value))
     })
-}
-
-fn per_fault(rows: &[Row], units: impl Fn(&str) -> String) -> Vec<OfKind> {
-    let mut names: Vec<&str> = Vec::new();
-    for row in rows {
-        if !names.contains(&row.kind.as_str()) {
-            names.push(&row.kind);
-        }
-    }
-    let of_kind = |name: &str| {
-        let sizes = by_size(rows, name);
-        let worst = worst_size(&sizes)?;
-        let of = sizes.into_iter().find(|of| of.size.to_bits() == worst.to_bits())?;
-        let (runs, failures) = (of.rows.len(), of.failures());
-        let over = of.most(|outcome| outcome.most_over_level);
-        Some(OfKind {
-            kind: name.to_owned(),
-            worst_size: worst,
-            unit: units(name),
-            runs,
-            failures,
-            bound: (failures == 0 && runs > 0).then(|| 1.0 - 0.05_f64.powf(1.0 / runs as f64)),
-            worst_seed: of.worst()?.seed,
-            worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
-            worst_hmi_m: of.most(|outcome| outcome.worst_hazard_m),
-            hidden_s: of.sum(|outcome| outcome.hidden_hazardous) as f64 * super::judge::STEP,
-            error_over_pl_max: (over < super::judge::MOST_OVER).then_some(over),
-            share_claimed: of.share_claimed(),
-        })
-    };
-    let mut kinds: Vec<OfKind> = names.into_iter().filter_map(of_kind).collect();
-    kinds.sort_by(|a, b| {
-        let share = |of: &OfKind| of.failures as f64 / of.runs.max(1) as f64;
-        share(b).total_cmp(&share(a)).then(b.worst_hmi_s.total_cmp(&a.worst_hmi_s))
-    });
-    kinds
 }

@@ -15,12 +15,12 @@
 //! Of position and heading, one above its bound counts as above; to be within, both must be.
 
 use agv_core::geometry::{Pose, difference};
-use agv_core::integrity::{AlertLimit, AlertLimits, ProtectionLevel};
+use agv_core::integrity::{Alarm, AlertLimit, AlertLimits, ProtectionLevel};
 use agv_core::measurement::Time;
-use agv_core::state::Mode;
+use agv_core::state::{Mode, Reason};
 use agv_wire::can::controller::PublishedPose;
 
-use super::outcome::Outcome;
+use super::outcome::{Found, Outcome};
 
 /// Time between two outputs that are judged, s.
 pub const STEP: f64 = 0.01;
@@ -56,6 +56,8 @@ pub struct Moment<'a> {
     pub is_nominal: bool,
     /// Whether the vehicle is where there are no reflectors: losing availability there is no loss of continuity.
     pub is_bare: bool,
+    /// Whether a fault has begun.
+    pub has_begun: bool,
     /// Whether the fault is one that no sensor of the vehicle can tell yet: what is hazardous counts apart.
     pub is_hidden: bool,
 }
@@ -77,6 +79,8 @@ pub struct Judge {
     last_loss: Option<f64>,
     was_available: bool,
     right_since: Option<f64>,
+    /// Time and distance since the fault began, s and m.
+    begun: (f64, f64),
     outcome: Outcome,
 }
 
@@ -91,6 +95,7 @@ impl Judge {
             last_loss: None,
             was_available: false,
             right_since: None,
+            begun: (0.0, 0.0),
             outcome: Outcome::default(),
         }
     }
@@ -123,6 +128,13 @@ impl Judge {
             self.last_loss = Some(time);
         }
         self.was_available = is_available;
+        if moment.has_begun && outcome.found.is_none() {
+            outcome.found = moment.heard.and_then(|(pose, _)| found_by(pose, moment.is_bare)).map(|by| {
+                let [after_ms, after_mm] = [self.begun.0, self.begun.1].map(|value| (1e3 * value).round() as u64);
+                Found { after_ms, after_mm, by }
+            });
+            self.begun = (self.begun.0 + STEP, self.begun.1 + moment.driven);
+        }
         let mut hazards = [false; 2];
         let mut is_right = false;
         if let Some((errors, level)) = judged {
@@ -130,6 +142,7 @@ impl Judge {
             if moment.is_nominal {
                 outcome.add_nominal(&level);
             }
+            outcome.add_to_stanford(level.position, errors.position);
             let share = errors.over(&level);
             outcome.most_over_level = outcome.most_over_level.max(share.min(MOST_OVER));
             outcome.misleading += u64::from(share > 1.0);
@@ -157,6 +170,23 @@ impl Judge {
             self.right_since.is_some_and(|since| self.time - since >= RIGHT_AT_THE_END - 0.5 * STEP);
         self.outcome
     }
+}
+
+/// What a pose on the bus says to be wrong; a protection level above the alert limit where no reflectors are says nothing.
+fn found_by(pose: &PublishedPose, is_bare: bool) -> Option<String> {
+    let by = match pose.reason {
+        Reason::None | Reason::NoPose | Reason::NoLandmarks | Reason::Uncertain => None,
+        Reason::LandmarksRejected => Some("landmarks rejected"),
+        Reason::InnovationsTooLarge => Some("innovations"),
+        Reason::OdometryImplausible => Some("odometry implausible"),
+        Reason::DriveEncoder | Reason::SteeringEncoder => Some("encoder"),
+        Reason::MotionDisagrees => Some("motion"),
+        Reason::LaserMoved => Some("mounting"),
+        Reason::OdometryDisagrees => Some("odometry"),
+        Reason::OdometrySilent => Some("odometry silent"),
+    };
+    let is_wide = matches!(pose.alarm, Alarm::Travel | Alarm::NoPose) && !is_bare;
+    by.or(is_wide.then_some("protection level")).map(str::to_owned)
 }
 
 /// How wrong a pose is.

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use agv_host_sim::simulate::random::Random;
-use agv_host_sim::simulate::scenario::{Knock, toml_complaint};
+use agv_host_sim::simulate::scenario::{Carry, Knock, toml_complaint};
 use serde::{Deserialize, Serialize};
 
+use super::pair::Blinding;
 use crate::campaign::fault::{Fault, FaultKind};
 
 /// Why kinds of faults cannot be read.
@@ -46,6 +47,8 @@ pub enum Begin {
     AnyTime,
     /// It is there from the beginning.
     Before,
+    /// At any time at which the vehicle stands, and drives on later.
+    Standing,
 }
 
 /// How long a fault lasts.
@@ -76,7 +79,7 @@ pub enum TheSize {
     Size,
 }
 
-/// A kind of fault. In `what` or `knock`, the text "size" stands for the size, and "-size" for the same with the other sign.
+/// A kind of fault. In `what`, `knock` or `carry`, the text "size" stands for the size, and "-size" for the same with the other sign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kind {
@@ -96,6 +99,8 @@ pub struct Kind {
     pub what: Option<toml::Table>,
     /// How the laser moves on its mounting.
     pub knock: Option<toml::Table>,
+    /// How the vehicle is lifted and set down.
+    pub carry: Option<toml::Table>,
     /// What reveals it; until then the fault is of class C.
     #[serde(default)]
     pub revealed: Option<Revealed>,
@@ -113,12 +118,25 @@ pub enum Drawn {
     Fault(Fault),
     /// The laser moves.
     Knock(Knock),
+    /// The vehicle is carried.
+    Carry(Carry),
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     kind: Vec<Kind>,
+    #[serde(default)]
+    blinding: Vec<Blinding>,
+}
+
+/// What is known of faults before a campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Catalogue {
+    /// The kinds of faults.
+    pub kinds: Vec<Kind>,
+    /// Which take away what shows others.
+    pub blinding: Vec<Blinding>,
 }
 
 /// Fewest sizes of a kind.
@@ -128,7 +146,7 @@ pub const FEWEST_SIZES: usize = 9;
 ///
 /// # Errors
 /// See [`KindsError`].
-pub fn read(path: &Path) -> Result<Vec<Kind>, KindsError> {
+pub fn read(path: &Path) -> Result<Catalogue, KindsError> {
     let text = std::fs::read_to_string(path).map_err(|source| KindsError::Read { path: path.to_owned(), source })?;
     parse(&text)
 }
@@ -137,7 +155,7 @@ pub fn read(path: &Path) -> Result<Vec<Kind>, KindsError> {
 ///
 /// # Errors
 /// See [`KindsError`].
-pub fn parse(text: &str) -> Result<Vec<Kind>, KindsError> {
+pub fn parse(text: &str) -> Result<Catalogue, KindsError> {
     let file: File = toml::from_str(text).map_err(|error| {
         let (line, problem) = toml_complaint(text, &error);
         KindsError::Parse { line, problem }
@@ -148,7 +166,16 @@ pub fn parse(text: &str) -> Result<Vec<Kind>, KindsError> {
             return Err(KindsError::Kind { name: kind.name.clone(), problem: "the name is there twice".to_owned() });
         }
     }
-    Ok(file.kind)
+    let File { kind: kinds, blinding } = file;
+    for name in blinding.iter().flat_map(Blinding::names) {
+        if !kinds.iter().any(|kind| kind.name == *name) {
+            return Err(KindsError::Kind {
+                name: name.clone(),
+                problem: "it is blinded or blinding, and is no kind".to_owned(),
+            });
+        }
+    }
+    Ok(Catalogue { kinds, blinding })
 }
 
 impl Kind {
@@ -159,17 +186,20 @@ impl Kind {
         if !self.has_size() && !self.sizes.is_empty() {
             return Err("sizes, and nothing that they are of".to_owned());
         }
-        if self.what.is_some() == self.knock.is_some() {
-            return Err("one of `what` and `knock` is expected".to_owned());
+        if self.tables().count() != 1 {
+            return Err("one of `what`, `knock` and `carry` is expected".to_owned());
         }
         self.every_size().iter().try_for_each(|&size| self.at(size, 0.0).map(|_| ()))
     }
 
     /// Whether anything of it has a size.
     fn has_size(&self) -> bool {
-        let tables = [&self.what, &self.knock].into_iter().flatten();
-        let mut values = tables.flat_map(toml::Table::values).filter_map(toml::Value::as_str);
+        let mut values = self.tables().flat_map(toml::Table::values).filter_map(toml::Value::as_str);
         matches!(self.lasts, Some(Lasts::Size(_))) || values.any(|text| text == "size" || text == "-size")
+    }
+
+    fn tables(&self) -> impl Iterator<Item = &toml::Table> {
+        [&self.what, &self.knock, &self.carry].into_iter().flatten()
     }
 
     /// Its sizes; 1 for what has none.
@@ -187,26 +217,34 @@ impl Kind {
             Lasts::Seconds(seconds) => from + seconds,
             Lasts::Size(_) => from + size,
         });
-        if let Some(knock) = &self.knock {
-            let mut table = with_size(knock, size);
+        let since = |table: &toml::Table| {
+            let mut table = with_size(table, size);
             table.insert("from".to_owned(), toml::Value::Float(from));
-            return table.try_into().map(Drawn::Knock).map_err(|error: toml::de::Error| error.message().to_owned());
+            table
+        };
+        let complaint = |error: toml::de::Error| error.message().to_owned();
+        if let Some(knock) = &self.knock {
+            return since(knock).try_into().map(Drawn::Knock).map_err(complaint);
         }
-        let what: FaultKind = with_size(self.what.as_ref().unwrap_or(&nothing()), size)
-            .try_into()
-            .map_err(|error: toml::de::Error| error.message().to_owned())?;
+        if let Some(carry) = &self.carry {
+            return since(carry).try_into().map(Drawn::Carry).map_err(complaint);
+        }
+        let what: FaultKind =
+            with_size(self.what.as_ref().unwrap_or(&nothing()), size).try_into().map_err(complaint)?;
         if what == FaultKind::Nothing {
             return Ok(Drawn::Nothing);
         }
         Ok(Drawn::Fault(Fault { name: self.name.clone(), from, until, what, can_recover: until.is_some() }))
     }
 
-    /// When the fault of a run begins in a drive of that many seconds, s after the vehicle drives off.
-    pub fn draw_begin(&self, seconds: f64, random: &mut Random) -> f64 {
+    /// When the fault of a run begins, s after the vehicle drives off, in a drive of that many seconds in which the vehicle
+    /// stands at those times, and drives on later.
+    pub fn draw_begin(&self, seconds: f64, standing: &[f64], random: &mut Random) -> f64 {
         let drawn = random.uniform();
         match self.begins {
             Begin::Before => 0.0,
             Begin::AnyTime => drawn * seconds,
+            Begin::Standing => standing.get((drawn * standing.len() as f64) as usize).copied().unwrap_or(0.0),
         }
     }
 }

@@ -5,6 +5,17 @@ use std::collections::BTreeMap;
 use agv_core::integrity::ProtectionLevel;
 use serde::{Deserialize, Serialize};
 
+/// How a fault was found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Found {
+    /// Time since it began, ms.
+    pub after_ms: u64,
+    /// Distance driven since it began, mm.
+    pub after_mm: u64,
+    /// What said so on the bus.
+    pub by: String,
+}
+
 /// What became of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
@@ -46,11 +57,27 @@ pub struct Outcome {
     pub nominal_mm: BTreeMap<u32, u64>,
     /// The same of the heading, hundredths of a degree.
     pub nominal_cdeg: BTreeMap<u32, u64>,
+    /// How many claims had a protection level and an error of the position in which cells of [`CELL_MM`], as
+    /// `CELLS * level + error`; the last cell of each has all that is larger.
+    pub stanford: BTreeMap<u32, u64>,
+    /// How the fault was found; none if it was not.
+    pub found: Option<Found>,
     /// Whether the last 5 s are claims with the error within the protection level, and that within the alert limit.
     pub ends_right: bool,
 }
 
+/// Width of a cell of the Stanford diagram, mm, and their number along each axis.
+pub const CELL_MM: f64 = 5.0;
+/// See [`CELL_MM`].
+pub const CELLS: u32 = 81;
+
 impl Outcome {
+    /// Counts a claim with this protection level and error of the position, m.
+    pub(super) fn add_to_stanford(&mut self, level: f64, error: f64) {
+        let cell = |value: f64| (1e3 * value / CELL_MM).clamp(0.0, f64::from(CELLS - 1)) as u32;
+        *self.stanford.entry(CELLS * cell(level) + cell(error)).or_default() += 1;
+    }
+
     /// Counts a protection level with enough in sight.
     pub(super) fn add_nominal(&mut self, level: &ProtectionLevel) {
         let cell = |value: f64| value.ceil().clamp(0.0, f64::from(u32::MAX)) as u32;

@@ -70,10 +70,10 @@ pub fn read(paths: &[PathBuf], kinds: &[Kind]) -> Result<Vec<Row>, RowsError> {
     let place = |row: &Row| {
         let kind = kinds.iter().position(|kind| kind.name == row.kind);
         let size = kind.and_then(|kind| kinds.get(kind)?.every_size().iter().position(|size| *size == row.size));
-        (row.kind == super::figures::NOTHING, kind, size, row.seed)
+        (row.with.is_some(), row.kind == super::figures::NOTHING, kind, size, row.seed)
     };
     rows.sort_by_key(place);
-    match rows.windows(2).find(|pair| place(&pair[0]) == place(&pair[1])) {
+    match rows.windows(2).find(|pair| place(&pair[0]) == place(&pair[1]) && pair[0].with == pair[1].with) {
         Some([row, ..]) => Err(RowsError::Twice { kind: row.kind.clone(), size: row.size, seed: row.seed }),
         _ => Ok(rows),
     }
@@ -86,6 +86,9 @@ pub struct Row {
     pub kind: String,
     /// Its size.
     pub size: f64,
+    /// Name and size of another fault.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub with: Option<(String, f64)>,
     /// The seed.
     pub seed: u64,
     /// Whether the commissioning check accepts the hall.
@@ -161,11 +164,11 @@ impl OfSize<'_> {
     }
 }
 
-/// The rows of a kind by its sizes, in order of size.
+/// The rows of a kind that comes alone by its sizes, in order of size.
 #[must_use]
 pub fn by_size<'a>(rows: &'a [Row], kind: &str) -> Vec<OfSize<'a>> {
     let mut sizes: Vec<OfSize> = Vec::new();
-    for row in rows.iter().filter(|row| row.kind == kind) {
+    for row in rows.iter().filter(|row| row.kind == kind && row.with.is_none()) {
         match sizes.iter_mut().find(|of| of.size.to_bits() == row.size.to_bits()) {
             Some(of) => of.rows.push(row),
             None => sizes.push(OfSize { size: row.size, rows: vec![row] }),

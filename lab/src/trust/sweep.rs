@@ -4,22 +4,53 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 
+use agv_host_sim::simulate::random::{Random, Stream};
+
 use super::kinds::Kind;
+use super::pair;
 use super::row::{Row, by_size, worst_size};
 use super::trial::Trial;
 use crate::campaign::{CampaignError, Shard};
 
 /// Between the seeds of the sweep and those of the worst sizes.
 pub const OTHER_SEEDS: u64 = 50_000;
+/// Between the seeds of the sweep and those of the pairs.
+pub const PAIR_SEEDS: u64 = 75_000;
+/// Seeds of a spot check: so many from the first one on.
+const SAMPLED_SEEDS: u64 = 1_000_000;
+const SAMPLED: usize = 1_000_000_000;
 
 /// The trials of a sweep: each kind at each size with so many seeds from the first one on.
 #[must_use]
 pub fn sweep(kinds: &[Kind], runs: u64, first_seed: u64) -> Vec<Trial<'_>> {
     let of_kind = |kind| {
-        let of_size = move |&size: &f64| (first_seed..first_seed + runs).map(move |seed| Trial { kind, size, seed });
+        let of_size =
+            move |&size: &f64| (first_seed..first_seed + runs).map(move |seed| Trial { kind, size, with: None, seed });
         kind.every_size().iter().flat_map(of_size)
     };
     kinds.iter().flat_map(of_kind).collect()
+}
+
+/// Trials with two kinds each, drawn by seeds from the first one on.
+#[must_use]
+pub fn pairs(kinds: &[Kind], runs: u64, first_seed: u64) -> Vec<Trial<'_>> {
+    let first = first_seed + PAIR_SEEDS;
+    let of_seed =
+        |seed| pair::draw(kinds, seed).map(|[(kind, size), with]| Trial { kind, size, with: Some(with), seed });
+    (first..first + runs).filter_map(of_seed).collect()
+}
+
+/// A spot check: so many trials of kinds, sizes and halls that the seed draws.
+#[must_use]
+pub fn sample(kinds: &[Kind], runs: u64, seed: u64) -> Vec<Trial<'_>> {
+    let mut random = Random::new(seed, Stream::Pairs);
+    let mut drawn = |count: usize| ((random.uniform() * count as f64) as usize).min(count.saturating_sub(1));
+    let mut trial = |_| {
+        let kind = kinds.get(drawn(kinds.len()))?;
+        let size = *kind.every_size().get(drawn(kind.every_size().len()))?;
+        Some(Trial { kind, size, with: None, seed: SAMPLED_SEEDS + drawn(SAMPLED) as u64 })
+    };
+    (0..runs).filter_map(&mut trial).collect()
 }
 
 /// The trials of the worst size of each kind, found in the rows of a sweep, with so many seeds of their own.
@@ -28,7 +59,7 @@ pub fn worst<'a>(kinds: &'a [Kind], rows: &[Row], runs: u64, first_seed: u64) ->
     let first = first_seed + OTHER_SEEDS;
     let of_kind = |kind: &'a Kind| {
         let size = worst_size(&by_size(rows, &kind.name)).into_iter();
-        size.flat_map(move |size| (first..first + runs).map(move |seed| Trial { kind, size, seed }))
+        size.flat_map(move |size| (first..first + runs).map(move |seed| Trial { kind, size, with: None, seed }))
     };
     kinds.iter().flat_map(of_kind).collect()
 }
@@ -48,6 +79,7 @@ pub fn run(trials: &[Trial], shard: Shard, done: impl Fn() + Sync) -> Result<Vec
             Ok(Row {
                 kind: trial.kind.name.clone(),
                 size: trial.size,
+                with: trial.with.map(|(kind, size)| (kind.name.clone(), size)),
                 seed: trial.seed,
                 is_accepted: tried.as_ref().is_some_and(|tried| tried.is_accepted),
                 can_recover: tried.as_ref().is_some_and(|tried| tried.can_recover),

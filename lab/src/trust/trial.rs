@@ -8,11 +8,11 @@ use agv_host_sim::simulate::{START, simulate};
 
 use super::hall::{Hall, draw};
 use super::judge::{Judge, Moment};
-use super::kinds::{Drawn, Kind};
+use super::kinds::{Drawn, Kind, Revealed};
 use super::outcome::Outcome;
 use super::sight::Sight;
 use crate::campaign::CampaignError;
-use crate::campaign::fault::Fault;
+use crate::campaign::fault::{Fault, simulate_with};
 use crate::campaign::rig::{self, RigOptions};
 
 /// What one run is.
@@ -22,7 +22,9 @@ pub struct Trial<'a> {
     pub kind: &'a Kind,
     /// Its size.
     pub size: f64,
-    /// The seed of hall, drive, noise and fault.
+    /// Another fault, and its size.
+    pub with: Option<(&'a Kind, f64)>,
+    /// The seed of hall, drive, noise and faults.
     pub seed: u64,
 }
 
@@ -38,6 +40,11 @@ pub struct Tried {
 }
 
 impl Trial<'_> {
+    /// The kinds of its faults with their sizes.
+    fn kinds(&self) -> impl Iterator<Item = (&Kind, f64)> {
+        [(self.kind, self.size)].into_iter().chain(self.with)
+    }
+
     /// Makes the run.
     ///
     /// # Errors
@@ -45,28 +52,38 @@ impl Trial<'_> {
     pub fn run(&self) -> Result<Tried, CampaignError> {
         let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
         let mut random = Random::new(self.seed, Stream::Faults);
-        // The drive alone says how long it takes.
-        let seconds = duration(&scenario)?;
-        let from = self.kind.draw_begin(seconds, &mut random);
-        let drawn = self.kind.at(self.size, from).map_err(CampaignError::Name)?;
-        if let Drawn::Knock(knock) = &drawn {
-            scenario.laser.knocks.push(*knock);
+        let timetable = Timetable::of(&scenario)?;
+        let seconds = timetable.seconds;
+        let mut drawn = Vec::new();
+        for (kind, size) in self.kinds() {
+            let from = kind.draw_begin(seconds, &timetable.standing, &mut random);
+            drawn.push((from, kind.at(size, from).map_err(CampaignError::Kind)?));
         }
-        let simulation = simulate(&scenario)?;
+        let mut faults: Vec<&Fault> = Vec::new();
+        for (_, drawn) in &drawn {
+            match drawn {
+                Drawn::Nothing => {}
+                Drawn::Fault(fault) => faults.push(fault),
+                Drawn::Knock(knock) => scenario.laser.knocks.push(*knock),
+                Drawn::Carry(carry) => scenario.drive.carries.push(*carry),
+            }
+        }
+        let simulation = simulate_with(&scenario, &faults, &mut random)?;
         let mut recording = simulation.recording;
         let sight = Sight::of(&recording, [station.x, station.y]);
-        let faults: Vec<&Fault> = match &drawn {
-            Drawn::Fault(fault) => vec![fault],
-            Drawn::Nothing | Drawn::Knock(_) => Vec::new(),
-        };
         for fault in &faults {
             fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);
+        }
+        for fault in &faults {
             fault.mislead(&mut recording, &mut random);
         }
+        let begins = drawn.iter().filter(|(_, drawn)| *drawn != Drawn::Nothing).map(|(from, _)| *from);
+        let begins = begins.fold(f64::INFINITY, f64::min);
         let mut judge = Judge::new(AlertLimits::default());
         let mut before = None;
-        let mut is_hidden = self.kind.revealed.is_some();
-        let options = RigOptions { seconds, seed: self.seed, is_told: self.kind.tells_start };
+        let mut hidden: Vec<Revealed> = self.kinds().filter_map(|(kind, _)| kind.revealed).collect();
+        let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
+        let options = RigOptions { seconds, seed: self.seed, is_told };
         rig::drive(&recording, &faults, &options, |heard| {
             let here = (heard.truth)(heard.now);
             let driven = before.zip(here).map_or(0.0, |(before, here): (Pose, Pose)| {
@@ -75,7 +92,7 @@ impl Trial<'_> {
                 if step > CARRIED { 0.0 } else { step }
             });
             before = here.or(before);
-            is_hidden = is_hidden && !self.kind.revealed.is_some_and(|by| sight.reveals(by, heard.time));
+            hidden.retain(|by| !sight.reveals(*by, heard.time));
             let [least, most] = bare;
             let is_bare =
                 before.is_some_and(|here| (least.x..=most.x).contains(&here.x) && (least.y..=most.y).contains(&here.y));
@@ -87,10 +104,19 @@ impl Trial<'_> {
                 docks: sight.docks(heard.time),
                 is_nominal: sight.is_nominal(heard.time),
                 is_bare,
-                is_hidden,
+                has_begun: heard.time >= begins,
+                is_hidden: !hidden.is_empty(),
             });
         })?;
-        let can_recover = faults.iter().filter_map(|fault| fault.until).any(|until| sight.can_recover(until));
+        let mut ends = faults.iter().filter_map(|fault| fault.until);
+        let can_recover = match self.with {
+            None => ends.any(|until| sight.can_recover(until)),
+            // Of two faults both must end.
+            Some(_) => {
+                faults.len() == drawn.len()
+                    && faults.iter().all(|fault| fault.until.is_some_and(|until| sight.can_recover(until)))
+            }
+        };
         Ok(Tried { outcome: judge.outcome(), is_accepted, can_recover })
     }
 }
@@ -98,10 +124,36 @@ impl Trial<'_> {
 /// A vehicle that is further away after a hundredth of a second, m, was carried.
 const CARRIED: f64 = 0.1;
 
-/// How long the drive takes, s.
-fn duration(scenario: &Scenario) -> Result<f64, CampaignError> {
-    let mut alone = Scenario { world: WorldOptions::Shapes(Shapes::default()), ..scenario.clone() };
-    alone.laser.scans = false;
-    let truth = simulate(&alone)?.recording.truth;
-    Ok(truth.last().map_or(0.0, |last| last.time.since(START)))
+/// When a drive ends, and when it stands in between.
+struct Timetable {
+    /// How long it takes, s.
+    seconds: f64,
+    /// Times at which the vehicle stands, and has driven before, and drives on later, s.
+    standing: Vec<f64>,
+}
+
+impl Timetable {
+    /// The drive alone says it.
+    fn of(scenario: &Scenario) -> Result<Self, CampaignError> {
+        let mut alone = Scenario { world: WorldOptions::Shapes(Shapes::default()), ..scenario.clone() };
+        alone.laser.scans = false;
+        let truth = simulate(&alone)?.recording.truth;
+        let moves: Vec<bool> = truth
+            .windows(2)
+            .map(|pair| {
+                pair.first().zip(pair.last()).is_some_and(|(a, b)| a.pose.between(&b.pose).position().norm() > 1e-9)
+            })
+            .collect();
+        let first = moves.iter().position(|moves| *moves).unwrap_or(0);
+        let last = moves.iter().rposition(|moves| *moves).unwrap_or(0);
+        let standing = truth
+            .iter()
+            .zip(&moves)
+            .enumerate()
+            .filter(|(place, (_, moves))| !**moves && (first..last).contains(place));
+        Ok(Self {
+            seconds: truth.last().map_or(0.0, |last| last.time.since(START)),
+            standing: standing.map(|(_, (sample, _))| sample.time.since(START)).collect(),
+        })
+    }
 }

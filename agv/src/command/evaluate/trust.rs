@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use agv_lab::campaign::Shard;
 use agv_lab::trust::figures::{Figures, NOTHING, figures};
-use agv_lab::trust::kinds::{self, Kind};
+use agv_lab::trust::kinds::{self, Catalogue, Kind};
+use agv_lab::trust::page::page;
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
 use agv_lab::trust::trial::Trial;
@@ -34,11 +35,20 @@ pub struct Trust {
     /// Runs without a fault.
     #[arg(long, default_value_t = 4800, value_parser = clap::value_parser!(u64).range(1..))]
     sound_runs: u64,
-    /// First seed of the sweep; those of the worst sizes are 50000 later. Seeds below 1000 are for development.
+    /// Runs with two faults each, of kinds and sizes that are drawn.
+    #[arg(long, default_value_t = 3000)]
+    pairs: u64,
+    /// A spot check instead: so many runs of kinds, sizes and halls that are drawn by --seed.
+    #[arg(long, value_name = "RUNS", conflicts_with_all = ["shard", "swept", "merge"])]
+    sample: Option<u64>,
+    /// Seed of --sample.
+    #[arg(long, default_value_t = 1, requires = "sample")]
+    seed: u64,
+    /// First seed of the sweep; those of the worst sizes are 50000 later, those of the pairs 75000. Seeds below 1000 are for development.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
     /// Make only the runs of part I of N, counted from 0, and write their rows to --output: those of the sweep, or with --swept
-    /// those of the worst sizes and without a fault.
+    /// those of the worst sizes, without a fault and of pairs.
     #[arg(long, value_name = "I/N", requires = "output")]
     shard: Option<Shard>,
     /// Where the rows of a part go, a line of JSON each.
@@ -50,6 +60,9 @@ pub struct Trust {
     /// Tell the figures of the rows of all parts, and drive nothing.
     #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with_all = ["shard", "swept"])]
     merge: Vec<PathBuf>,
+    /// Write a page with the Stanford diagrams.
+    #[arg(long, value_name = "FILE.html", conflicts_with = "shard")]
+    report: Option<PathBuf>,
     /// One JSON object instead of the table.
     #[arg(long)]
     json: bool,
@@ -59,6 +72,7 @@ const HELP: &str = "\
 Examples:
   agv evaluate trust --sweep-runs 1 --runs 2 --sound-runs 10
   agv evaluate trust --only 'laser shifted' --runs 20
+  agv evaluate trust --sample 100 --seed 7
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
@@ -67,21 +81,26 @@ Examples:
 Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
 continuity_per_100km, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
-[95 %, worst], seeds [first, last], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
-worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed].";
+[95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
+worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
+pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
+and stanford_faults {cell_mm, cells [level, error, claims]}.";
 
 impl Trust {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let all = kinds::read(&self.kinds)?;
-        let unit =
-            |name: &str| all.iter().find(|kind| kind.name == name).map_or_else(String::new, |kind| kind.unit.clone());
+        let catalogue = kinds::read(&self.kinds)?;
+        let all = &catalogue.kinds;
         let is_wanted = |kind: &&Kind| self.only.as_ref().is_none_or(|only| kind.name.contains(only));
         let (sound, faults): (Vec<Kind>, Vec<Kind>) =
             all.iter().filter(is_wanted).cloned().partition(|kind| kind.name == NOTHING);
         ensure!(!sound.is_empty() || !faults.is_empty(), "no kind has {:?} in its name", self.only.unwrap_or_default());
         if !self.merge.is_empty() {
-            return self.tell(&row::read(&self.merge, &all)?, unit);
+            return self.tell(&row::read(&self.merge, all)?, &catalogue);
+        }
+        if let Some(runs) = self.sample {
+            let rows = make("spot check", &sweep::sample(&faults, runs, self.seed), Shard::ALL)?;
+            return self.tell(&rows, &catalogue);
         }
         let shard = self.shard.unwrap_or(Shard::ALL);
         let swept = if self.swept.is_empty() {
@@ -92,20 +111,24 @@ impl Trust {
             }
             swept
         } else {
-            row::read(&self.swept, &all)?
+            row::read(&self.swept, all)?
         };
         let mut trials = sweep::worst(&faults, &swept, self.runs, self.first_seed);
         trials.extend(sweep::sweep(&sound, self.sound_runs, self.first_seed + sweep::OTHER_SEEDS));
+        trials.extend(sweep::pairs(&faults, self.pairs, self.first_seed));
         let rows = make("worst sizes", &trials, shard)?;
         match &self.output {
             Some(output) => Ok(row::write(output, &rows)?),
-            None => self.tell(&rows, unit),
+            None => self.tell(&rows, &catalogue),
         }
     }
 
-    fn tell(&self, rows: &[Row], unit: impl Fn(&str) -> String) -> anyhow::Result<()> {
+    fn tell(&self, rows: &[Row], catalogue: &Catalogue) -> anyhow::Result<()> {
         ensure!(!rows.is_empty(), "there is no run");
-        let figures = figures(rows, unit);
+        let figures = figures(rows, catalogue);
+        if let Some(report) = &self.report {
+            page(&figures)?.write(report).with_context(|| report.display().to_string())?;
+        }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&figures)?);
         } else {
@@ -125,12 +148,12 @@ fn make(what: &'static str, trials: &[Trial], shard: Shard) -> anyhow::Result<Ve
 
 fn print(figures: &Figures) {
     println!(
-        "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7} {:>7} {:>8} {:>7}",
+        "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7} {:>7} {:>8} {:>7} class, found by",
         "kind", "worst size", "", "runs", "failures", "seed", "hmi s", "hmi m", "error/pl", "claimed"
     );
     for of in &figures.per_fault {
         println!(
-            "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7.2} {:>7.2} {:>8.2} {:>6.1}%",
+            "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7.2} {:>7.2} {:>8.2} {:>6.1}% {:?} {}",
             of.kind,
             of.worst_size,
             of.unit,
@@ -140,7 +163,9 @@ fn print(figures: &Figures) {
             of.worst_hmi_s,
             of.worst_hmi_m,
             of.error_over_pl_max.unwrap_or(f64::INFINITY),
-            100.0 * of.share_claimed
+            100.0 * of.share_claimed,
+            of.class,
+            of.found_by
         );
     }
     let share = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2} %", 100.0 * value));
@@ -154,6 +179,13 @@ fn print(figures: &Figures) {
         figures.worst_hmi_s,
         figures.worst_hmi_m
     );
+    for (name, pairs) in [("pairs", &figures.pairs), ("pairs apart", &figures.pairs_apart)] {
+        println!("{name}: {} of {} fail", pairs.failures, pairs.runs);
+        for pair in &pairs.failed {
+            let [(one, size), (other, other_size)] = &pair.kinds;
+            println!("  {one} {size} with {other} {other_size}, seed {}, {:.2} s", pair.seed, pair.hmi_s);
+        }
+    }
     println!(
         "without faults, {:.1} h and {:.1} km: {} misleading outputs, available {} (travel) and {} (docking)",
         figures.nominal_hours,

@@ -35,7 +35,7 @@ const SECONDS: [f64; 2] = [0.0, 86_400.0];
 const SIZE: [f64; 2] = [0.0, 1000.0];
 
 /// Every key that holds numbers.
-pub const KEYS: [Key; 81] = [
+pub const KEYS: [Key; 85] = [
     key("seed", "", SEED, "seed of all random numbers"),
     key("world.seed", "", SEED, "seed of dimensions and positions; the scenario's if absent"),
     key("world.moved_share", "", SHARE, "block storage: share of the pallets that have been moved"),
@@ -68,6 +68,10 @@ pub const KEYS: [Key; 81] = [
     key("drive.end_standstill", "s", SECONDS, "standstill at the end"),
     key("drive.stop_between_legs", "s", SECONDS, "standstill between two legs"),
     key("drive.steering_rate_deg", "deg/s", [1e-3, 100_000.0], "fastest turn of the driving wheel"),
+    key("drive.carries.from", "s", SECONDS, "when the vehicle is lifted and set down, after the first event"),
+    key("drive.carries.x", "m", PLACE, "how far forward"),
+    key("drive.carries.y", "m", PLACE, "how far to the left"),
+    key("drive.carries.heading_deg", "deg", TURN, "how far it is turned"),
     key("vehicle.believed.wheelbase", "m", [0.05, 50.0], "from the rear axle to the steering axis"),
     key("vehicle.believed.drive_scale", "m/tick", [1e-9, 1.0], "way of the driving wheel for one tick"),
     key("vehicle.believed.drive_counter", "", COUNTER, "values of the driving wheel's counter"),

@@ -14,7 +14,7 @@ mod world;
 
 pub use sensors::{DirtySector, Knock, LaserOptions, ReflectorOptions};
 pub use start::{PersonOptions, StartOptions};
-pub use vehicle::{BelievedVehicle, DriveOptions, MotionReport, OdometryOptions, VehicleErrors, VehicleOptions};
+pub use vehicle::{BelievedVehicle, Carry, DriveOptions, MotionReport, OdometryOptions, VehicleErrors, VehicleOptions};
 pub use way::{PathKind, PathOptions, PoseOptions};
 pub use world::{CircleOptions, RectangleOptions, ReflectorShape, Shapes, WorldOptions};
 

@@ -22,6 +22,25 @@ pub struct DriveOptions {
     pub stop_between_legs: f64,
     /// Fastest turn of the driving wheel, degrees a second.
     pub steering_rate_deg: f64,
+    /// When the vehicle is lifted and set down elsewhere.
+    pub carries: Vec<Carry>,
+}
+
+/// The vehicle is lifted and set down elsewhere; its wheel does not turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Carry {
+    /// When, s after the drive's first event.
+    pub from: f64,
+    /// Forward, in R, m.
+    #[serde(default)]
+    pub x: f64,
+    /// To the left, in R, m.
+    #[serde(default)]
+    pub y: f64,
+    /// Counter-clockwise.
+    #[serde(default)]
+    pub heading_deg: f64,
 }
 
 impl Default for DriveOptions {
@@ -34,6 +53,7 @@ impl Default for DriveOptions {
             end_standstill: 0.5,
             stop_between_legs: 1.0,
             steering_rate_deg: 60.0,
+            carries: Vec::new(),
         }
     }
 }

@@ -30,6 +30,7 @@ impl Fault {
                     }
                 }
             }
+            FaultKind::ReflectorMoved { metres } => move_one(recording, metres, random),
             FaultKind::LayoutSheared { share } => {
                 let middle = mean(recording.landmarks.iter().map(|landmark| landmark.y));
                 for landmark in &mut recording.landmarks {
@@ -92,6 +93,23 @@ impl Fault {
         }
     }
 }
+
+/// Moves one of the reflectors that stand nearest to a place of the way.
+fn move_one(recording: &mut Recording, metres: f64, random: &mut Random) {
+    let place = (random.uniform() * recording.truth.len() as f64) as usize;
+    let (chosen, angle) = (random.uniform(), random.between(0.0, std::f64::consts::TAU));
+    let Some(here) = recording.truth.get(place).map(|truth| truth.pose.position()) else { return };
+    recording.landmarks.sort_by(|a, b| (a.position() - here).norm().total_cmp(&(b.position() - here).norm()));
+    let near = recording.landmarks.len().min(NEAREST);
+    let (sine, cosine) = libm::sincos(angle);
+    if let Some(landmark) = recording.landmarks.get_mut((chosen * near as f64) as usize) {
+        landmark.x += metres * cosine;
+        landmark.y += metres * sine;
+    }
+}
+
+/// The one that is moved is among so many.
+const NEAREST: usize = 5;
 
 /// Reflectors no further than this from the lowest of the map, m, are on one wall.
 const NEAR_WALL: f64 = 1.0;

@@ -4,6 +4,8 @@ use agv_core::geometry::{Point, wrap};
 use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
 use agv_core::odometry::{CounterRange, Tricycle};
 
+use super::laser_state::LaserState;
+use super::tilt::Tilt;
 use super::{Fault, FaultKind};
 use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording};
 use agv_host_sim::simulate::START;
@@ -16,7 +18,7 @@ impl Fault {
             kidnap(recording, self.from, seconds, tricycle.drive_range);
         }
         let mut encoders = EncoderFaultState::default();
-        let walkers = Walkers::new(self.what, random);
+        let mut laser = LaserState::new(self.what, recording, random);
         for event in &mut recording.events {
             match event {
                 RecordedEvent::Encoders(sample) => {
@@ -27,16 +29,19 @@ impl Fault {
                     let Some(first) = seen.observations.first() else { continue };
                     let time = first.time.since(START);
                     if self.is_active(time) {
-                        self.spoil_reflectors(&mut seen.observations, time, &walkers, random);
+                        self.spoil_reflectors(&mut seen.observations, time, &mut laser, random);
                     }
                 }
-                RecordedEvent::Scan(scan) if self.is_active(scan.start.since(START)) => self.spoil_scan(scan, random),
+                RecordedEvent::Scan(scan) if self.is_active(scan.start.since(START)) => {
+                    self.spoil_scan(scan, &mut laser, random);
+                }
                 _ => {}
             }
         }
     }
 
-    fn spoil_scan(&self, scan: &mut RecordedScan, random: &mut Random) {
+    fn spoil_scan(&self, scan: &mut RecordedScan, laser: &mut LaserState, random: &mut Random) {
+        let time = scan.start.since(START);
         let returns = |scan: &mut RecordedScan, change: &mut dyn FnMut(f64, &mut f32)| {
             for (beam, range) in scan.ranges.iter_mut().enumerate().filter(|(_, range)| **range > 0.0) {
                 change((scan.first_bearing + beam as f64 * scan.bearing_step).to_degrees(), range);
@@ -45,6 +50,23 @@ impl Fault {
         match self.what {
             FaultKind::LaserShaken { deg } => scan.first_bearing += deg.to_radians() * random.normal(),
             FaultKind::RangesLong { metres } => returns(scan, &mut |_, range| *range += metres as f32),
+            FaultKind::RangesWander { metres, seconds } => {
+                let error = laser.wandering(metres, seconds, revolution_of(time), random);
+                returns(scan, &mut |_, range| *range = (*range + error as f32).max(0.1));
+            }
+            FaultKind::BearingsWander { deg, seconds } => {
+                scan.first_bearing += laser.wandering(deg, seconds, revolution_of(time), random).to_radians();
+            }
+            FaultKind::LaserTilted { deg, towards_deg, height } => Tilt::new(deg, towards_deg, height).spoil_scan(scan),
+            FaultKind::SunShines { towards_deg, half_width_deg } => {
+                let Some(sensor) = laser.sensor(scan.start) else { return };
+                let middle = towards_deg - sensor.theta.to_degrees();
+                returns(scan, &mut |bearing, range| {
+                    if is_behind(bearing, middle - half_width_deg, middle + half_width_deg) {
+                        *range = 0.0;
+                    }
+                });
+            }
             FaultKind::RangesNoisy { metres } => {
                 returns(scan, &mut |_, range| *range = (*range + (metres * random.normal()) as f32).max(0.1));
             }
@@ -83,6 +105,15 @@ impl Fault {
             FaultKind::SteeringReversed if is_active => {
                 sample.steering = sample.steering.wrapping_neg() & last_value(tricycle.steering_range);
             }
+            FaultKind::SlipInBends { share } if is_active => {
+                let ticks = i64::from(shifted(sample.steering, 0, tricycle.steering_range));
+                let values = tricycle.steering_range.values() as i64;
+                let signed = if ticks > values / 2 { ticks - values } else { ticks };
+                let angle = signed as f64 * tricycle.steering_scale + tricycle.steering_offset_forward;
+                let told = libm::atan((1.0 + share) * libm::tan(angle));
+                let more = libm::round((told - angle) / tricycle.steering_scale) as i64;
+                sample.steering = shifted(sample.steering, more, tricycle.steering_range);
+            }
             FaultKind::SteeringJumps { deg } | FaultKind::SteeringBent { deg } if is_active => {
                 let ticks = libm::round(deg.to_radians() / tricycle.steering_scale) as i64;
                 sample.steering = shifted(sample.steering, ticks, tricycle.steering_range);
@@ -96,7 +127,7 @@ impl Fault {
         &self,
         seen: &mut Vec<ReflectorObservation>,
         time: f64,
-        walkers: &Walkers,
+        laser: &mut LaserState,
         random: &mut Random,
     ) {
         match self.what {
@@ -144,11 +175,40 @@ impl Fault {
                 }
             }
             FaultKind::PeopleShine { .. } => {
-                for point in walkers.at(time) {
+                for point in laser.people(time) {
                     add(seen, libm::atan2(point.y, point.x), point.norm());
                 }
             }
-            FaultKind::ReflectorsGone { share } => seen.retain(|_| !random.happens(share)),
+            FaultKind::ReflectorsGone { .. } => seen.retain(|observation| !laser.has_gone(observation)),
+            FaultKind::RangesWander { metres, seconds } => {
+                let error = laser.wandering(metres, seconds, revolution_of(time), random);
+                for observation in seen.iter_mut() {
+                    observation.range = (observation.range + error as f32).max(0.1);
+                }
+            }
+            FaultKind::BearingsWander { deg, seconds } => {
+                turn(seen, laser.wandering(deg, seconds, revolution_of(time), random).to_radians());
+            }
+            FaultKind::LaserTilted { deg, towards_deg, height } => {
+                let tilt = Tilt::new(deg, towards_deg, height);
+                for observation in seen.iter_mut() {
+                    set_position(observation, &tilt.seen(&position(observation)));
+                }
+            }
+            FaultKind::SunShines { towards_deg, half_width_deg } => {
+                let sensor = seen.first().and_then(|first| laser.sensor(first.time));
+                let Some(sensor) = sensor.filter(|_| half_width_deg > 0.0) else { return };
+                let middle = towards_deg - sensor.theta.to_degrees();
+                let (from, to) = (middle - half_width_deg, middle + half_width_deg);
+                let false_one = (wrap(random.between(from, to).to_radians()), random.between(2.0, 25.0));
+                // The sun does not take the last one, which tells the time of the revolution.
+                let mut last = seen.last().copied();
+                seen.retain(|observation| !is_behind(f64::from(observation.bearing).to_degrees(), from, to));
+                if let Some(last) = last.take_if(|_| seen.is_empty()) {
+                    seen.push(last);
+                }
+                add(seen, false_one.0, false_one.1);
+            }
             _ => {}
         }
         seen.sort_by_key(|observation| observation.time);
@@ -208,26 +268,9 @@ fn add(seen: &mut Vec<ReflectorObservation>, bearing: f64, range: f64) {
 /// Time of a revolution, s.
 const REVOLUTION: f64 = 0.125;
 
-/// People that go around the vehicle, seen from it.
-struct Walkers(Vec<[f64; 4]>);
-
-impl Walkers {
-    fn new(what: FaultKind, random: &mut Random) -> Self {
-        let count = if let FaultKind::PeopleShine { count } = what { count } else { 0 };
-        let mut walker = || {
-            let start = random.between(-3.1, 3.1);
-            [start, random.between(2.0, 12.0), random.between(-0.3, 0.3), random.between(-0.8, 0.8)]
-        };
-        Self((0..count).map(|_| walker()).collect())
-    }
-
-    fn at(&self, time: f64) -> impl Iterator<Item = Point> + '_ {
-        self.0.iter().map(move |[bearing, range, turn, speed]| {
-            let range = (range + speed * libm::sin(time)).max(1.0);
-            let (sine, cosine) = libm::sincos(bearing + turn * time);
-            Point::new(cosine, sine) * range
-        })
-    }
+/// When the revolution began that was under way then, s.
+fn revolution_of(time: f64) -> f64 {
+    REVOLUTION * libm::floor(time / REVOLUTION + 1e-6)
 }
 
 /// Cuts `seconds` out of a drive: the vehicle is set down where it would have been later, and its wheel has not turned.

@@ -1,9 +1,13 @@
 //! What goes wrong in a run, when, and how.
 
 mod believed;
+mod hall;
+mod laser_state;
 mod measured;
+mod tilt;
 mod wire;
 
+pub(crate) use hall::simulate_with;
 pub use wire::{Line, Message};
 
 use serde::{Deserialize, Serialize};
@@ -160,6 +164,11 @@ pub enum FaultKind {
         /// Which share of the way is not counted.
         share: f64,
     },
+    /// The vehicle slips in bends: it turns less than its wheel says.
+    SlipInBends {
+        /// By which share the tangent of the steering angle is too large.
+        share: f64,
+    },
     /// The steering has an offset that nobody knows of.
     SteeringBent {
         /// The offset.
@@ -232,6 +241,37 @@ pub enum FaultKind {
         /// Share of the reflectors that are hidden in a revolution.
         share: f64,
     },
+    /// Distances have an error that all of a revolution share and that stays for seconds.
+    RangesWander {
+        /// Standard deviation.
+        metres: f64,
+        /// Time in which it decays to the e-th part.
+        seconds: f64,
+    },
+    /// Bearings have such an error.
+    BearingsWander {
+        /// Standard deviation.
+        deg: f64,
+        /// Time in which it decays to the e-th part.
+        seconds: f64,
+    },
+    /// A low sun shines from one direction of the hall: the laser is blind there, and sees a reflector where none is.
+    SunShines {
+        /// Direction in W.
+        towards_deg: f64,
+        /// Half of the width in which the laser is blinded.
+        half_width_deg: f64,
+    },
+    /// The laser's plane is tilted: distances are those along the plane, and bearings those in it.
+    LaserTilted {
+        /// By how much.
+        deg: f64,
+        /// Direction of S in which it looks down.
+        towards_deg: f64,
+        /// Height above the point about which it tilts: 0 for a laser out of level, its height above the floor for a
+        /// vehicle on a tilted floor.
+        height: f64,
+    },
 
     // What is believed, from the beginning.
     /// Reflectors have been moved since the survey.
@@ -253,10 +293,20 @@ pub enum FaultKind {
         /// How far.
         metres: f64,
     },
-    /// Reflectors have gone since the survey.
+    /// A reflector in sight on the way has been moved since the survey.
+    ReflectorMoved {
+        /// How far.
+        metres: f64,
+    },
+    /// Reflectors have gone since the survey: these are never seen again.
     ReflectorsGone {
         /// How many.
         share: f64,
+    },
+    /// Reflectors stand in the hall that are not in the layout.
+    ReflectorsStand {
+        /// How many.
+        count: u32,
     },
     /// The layout that is loaded is a mirror image.
     LayoutMirrored,
