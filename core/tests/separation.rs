@@ -311,6 +311,17 @@ impl Drive {
         self.monitor.end_event(&self.published, &laser, 1.0);
     }
 
+    /// The same vehicle, whose laser was moved while it was off: it has found itself by that laser.
+    fn with_mounting_off(seed: u64, off: &Pose) -> Self {
+        let mut drive = Self::new(seed);
+        drive.true_mount = drive.mount.compose(off);
+        let found = drive.truth.compose(&drive.true_mount).compose(&drive.mount.inverse());
+        let (now, covariance) = (drive.time, [1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5]);
+        drive.monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
+        drive.monitor.begin(now, &found, &covariance, &drive.odometry);
+        drive
+    }
+
     fn error(&self) -> (f64, f64) {
         let off = self.truth.between(&self.published);
         (off.x.hypot(off.y), off.theta.abs())
@@ -345,6 +356,36 @@ fn a_knock_of_any_size_is_held_at_once_and_after_a_turn() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// What a drive of 5 m shows of a turned laser, and a turn by 90 deg of a shifted one, the level holds from then on.
+#[test]
+fn a_mounting_that_was_changed_while_the_vehicle_was_off_is_held_once_it_can_be_told() {
+    let straight = Pose::new(0.125, 0.0, 0.0);
+    let bend = Pose::new(0.1, 0.002, 0.04);
+    let parts = [(44, straight), (60, bend), (30, straight), (60, bend), (40, straight)];
+    for (seed, off, hidden) in [
+        (1, Pose::new(0.0, 0.0, 0.01), 41),
+        (2, Pose::new(0.0, 0.0, 0.035), 41),
+        (3, Pose::new(0.0, 0.0, -0.07), 41),
+        (4, Pose::new(0.0, 0.0, 0.14), 41),
+        (5, Pose::new(0.06, 0.0, 0.0), 85),
+        (6, Pose::new(0.3, 0.0, 0.0), 85),
+        (7, Pose::new(0.0, 0.3, 0.0), 85),
+        (8, Pose::new(0.0, -0.6, 0.0), 85),
+    ] {
+        let mut drive = Drive::with_mounting_off(seed, &off);
+        let steps = parts.iter().flat_map(|(count, step)| std::iter::repeat_n(step, *count));
+        for (number, step) in steps.enumerate() {
+            drive.revolve(step);
+            let (position, heading) = drive.error();
+            let level = drive.monitor.level();
+            assert!(
+                number < hidden || position <= level.position && heading <= level.heading,
+                "{off:?}, revolution {number}: {position} m, {heading} rad, {level:?}"
+            );
         }
     }
 }

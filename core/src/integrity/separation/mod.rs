@@ -144,9 +144,7 @@ impl SolutionSeparation {
         self.leave_outs.clear();
         if self.mounting.is_none() {
             self.mounting = Some(self.free_mounting(time));
-            let mut turned = self.all.clone();
-            turned.free_yaw();
-            self.yaw = Some(FreeSince::new(time, turned));
+            self.yaw = Some(self.free_yaw(time));
             self.unseen = (0.0, 0.0);
         }
         self.time = time;
@@ -162,6 +160,13 @@ impl SolutionSeparation {
         let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
         solution.free_mounting();
         solution.free_clock();
+        FreeSince::new(since, solution)
+    }
+
+    /// A laser that was turned before has shown a wrong heading.
+    fn free_yaw(&self, since: Time) -> FreeSince {
+        let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
+        solution.free_yaw();
         FreeSince::new(since, solution)
     }
 
