@@ -1,6 +1,7 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod event_fuzz;
+mod faults;
 mod features;
 mod trust;
 

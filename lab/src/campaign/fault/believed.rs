@@ -9,7 +9,7 @@ use agv_host_sim::simulate::random::Random;
 
 impl Fault {
     /// Makes what the localiser is told before the drive wrong.
-    pub(crate) fn mislead(&self, recording: &mut Recording, random: &mut Random) {
+    pub fn mislead(&self, recording: &mut Recording, random: &mut Random) {
         match self.what {
             FaultKind::ReflectorsMoved { share, metres } => {
                 for landmark in &mut recording.landmarks {

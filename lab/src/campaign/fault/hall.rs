@@ -11,11 +11,7 @@ use crate::campaign::CampaignError;
 ///
 /// # Errors
 /// [`CampaignError::Hall`] if the hall is not one of shapes, and reflectors cannot be added to it; see there for others.
-pub(crate) fn simulate_with(
-    scenario: &Scenario,
-    faults: &[&Fault],
-    random: &mut Random,
-) -> Result<Simulation, CampaignError> {
+pub fn simulate_with(scenario: &Scenario, faults: &[&Fault], random: &mut Random) -> Result<Simulation, CampaignError> {
     let mut scenario = scenario.clone();
     let mut added = 0;
     for fault in faults {

@@ -13,7 +13,7 @@ use agv_host_sim::simulate::random::Random;
 
 impl Fault {
     /// Makes what the sensors have seen on a drive wrong.
-    pub(crate) fn spoil(&self, recording: &mut Recording, tricycle: &Tricycle, random: &mut Random) {
+    pub fn spoil(&self, recording: &mut Recording, tricycle: &Tricycle, random: &mut Random) {
         if let FaultKind::Kidnapped { seconds } = self.what {
             kidnap(recording, self.from, seconds, tricycle.drive_range);
         }

@@ -7,7 +7,7 @@ mod measured;
 mod tilt;
 mod wire;
 
-pub(crate) use hall::simulate_with;
+pub use hall::simulate_with;
 pub use wire::{Line, Message};
 
 use serde::{Deserialize, Serialize};

@@ -1,0 +1,179 @@
+//! What faults do to a drive, by the geometry that they state.
+
+use std::collections::BTreeMap;
+
+use agv_core::geometry::{Point, difference};
+use agv_core::measurement::ReflectorObservation;
+use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
+use agv_host_sim::simulate::random::{Random, Stream};
+use agv_host_sim::simulate::scenario::{Carry, Scenario};
+use agv_host_sim::simulate::{START, Simulation, simulate};
+use agv_lab::campaign::fault::{Fault, FaultKind, simulate_with};
+use agv_lab::trust::hall;
+
+fn quiet(seed: u64) -> Scenario {
+    let mut scenario = hall::draw(seed).scenario;
+    scenario.laser.scans = false;
+    scenario
+}
+
+fn fault(what: FaultKind) -> Fault {
+    Fault { name: "a".to_owned(), from: 0.0, until: None, what, can_recover: true }
+}
+
+/// The drive before and after the fault.
+fn spoilt(what: FaultKind) -> (Simulation, Recording) {
+    let simulation = simulate(&quiet(3)).unwrap();
+    let mut recording = simulation.recording.clone();
+    fault(what).spoil(&mut recording, &simulation.true_tricycle, &mut Random::new(3, Stream::Faults));
+    (simulation, recording)
+}
+
+fn revolutions(recording: &Recording) -> impl Iterator<Item = &Vec<ReflectorObservation>> {
+    recording.events.iter().filter_map(|event| match event {
+        RecordedEvent::Reflectors(seen) => Some(&seen.observations),
+        _ => None,
+    })
+}
+
+fn pairs<'a>(
+    before: &'a Simulation,
+    after: &'a Recording,
+) -> impl Iterator<Item = (&'a ReflectorObservation, &'a ReflectorObservation)> {
+    revolutions(&before.recording).zip(revolutions(after)).flat_map(|(before, after)| {
+        assert_eq!(before.len(), after.len());
+        before.iter().zip(after)
+    })
+}
+
+/// How often each reflector of the map was seen.
+fn counts(recording: &Recording) -> BTreeMap<u16, usize> {
+    let mut counts = BTreeMap::new();
+    for seen in revolutions(recording).flatten() {
+        let sensor = truth_at(&recording.truth, seen.time).unwrap().compose(recording.parameters.lasers.first());
+        let (sine, cosine) = libm::sincos(f64::from(seen.bearing));
+        let place = sensor.transform(&(Point::new(cosine, sine) * f64::from(seen.range)));
+        let nearest = recording.landmarks.iter().map(|one| (one.id, (one.position() - place).norm()));
+        let (id, distance) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        if distance < 0.3 {
+            *counts.entry(id).or_default() += 1;
+        }
+    }
+    counts
+}
+
+#[test]
+fn reflectors_that_have_gone_are_never_seen_and_the_others_as_often_as_before() {
+    let (before, after) = spoilt(FaultKind::ReflectorsGone { share: 0.5 });
+    let (known, left) = (counts(&before.recording), counts(&after));
+    assert!(left.iter().all(|(id, count)| known[id] == *count), "{left:?}");
+    let gone = known.len() - left.len();
+    assert!(known.len() > 20 && (known.len() / 4..3 * known.len() / 4).contains(&gone), "{gone} of {}", known.len());
+    assert_eq!(after.landmarks, before.recording.landmarks);
+}
+
+#[test]
+fn a_tilted_laser_measures_along_its_slope() {
+    let (deg, height) = (4.0_f64, 2.0);
+    let (sine, cosine) = deg.to_radians().sin_cos();
+    for (height, shift) in [(0.0, 0.0), (height, height * sine)] {
+        let (before, after) = spoilt(FaultKind::LaserTilted { deg, towards_deg: 0.0, height });
+        let mut compared = 0;
+        for (level, tilted) in pairs(&before, &after) {
+            let place = |seen: &ReflectorObservation| {
+                let (range, bearing) = (f64::from(seen.range), f64::from(seen.bearing));
+                (range * bearing.cos(), range * bearing.sin())
+            };
+            let ((x, y), (along, across)) = (place(level), place(tilted));
+            // Where the plane is when the laser looks down by 4 deg.
+            assert!((along * cosine - (x - shift)).abs() < 1e-4 && (across - y).abs() < 1e-4, "{level:?} {tilted:?}");
+            compared += 1;
+        }
+        assert!(compared > 500, "{compared}");
+    }
+}
+
+#[test]
+fn an_error_that_wanders_is_one_for_a_revolution_and_stays_for_its_time() {
+    let (before, after) = spoilt(FaultKind::RangesWander { metres: 0.1, seconds: 2.0 });
+    let mut errors = Vec::new();
+    for (level, wrong) in revolutions(&before.recording).zip(revolutions(&after)) {
+        let of = |place: usize| level.get(place).zip(wrong.get(place)).map(|(a, b)| f64::from(b.range - a.range));
+        let (Some(first), Some(last)) = (of(0), of(level.len().saturating_sub(1))) else { continue };
+        assert!((first - last).abs() < 1e-4, "{first} {last}");
+        errors.push(first);
+    }
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let (count, sum) = values.fold((0.0, 0.0), |(count, sum), value| (count + 1.0, sum + value));
+        sum / f64::max(count, 1.0)
+    };
+    let variance = mean(&mut errors.iter().map(|error| error * error));
+    // Sixteen revolutions are two seconds.
+    let later = mean(&mut errors.iter().zip(errors.iter().skip(16)).map(|(a, b)| a * b));
+    assert!(errors.len() > 300 && (0.06..0.14).contains(&variance.sqrt()), "{} {variance}", errors.len());
+    assert!((0.1..0.65).contains(&(later / variance)), "{}", later / variance);
+}
+
+#[test]
+fn slip_in_bends_turns_the_wheel_further_than_the_vehicle_and_nothing_else() {
+    let (before, after) = spoilt(FaultKind::SlipInBends { share: 0.2 });
+    let tricycle = &before.true_tricycle;
+    let angle = |ticks: u32| {
+        let half = (tricycle.steering_range.values() / 2) as i64;
+        let signed = (i64::from(ticks) + half).rem_euclid(2 * half) - half;
+        signed as f64 * tricycle.steering_scale + tricycle.steering_offset_forward
+    };
+    let mut bent = 0;
+    for (one, other) in before.recording.events.iter().zip(&after.events) {
+        let (RecordedEvent::Encoders(one), RecordedEvent::Encoders(other)) = (one, other) else { continue };
+        let (true_angle, told) = (angle(one.steering), angle(other.steering));
+        assert_eq!(one.drive, other.drive);
+        assert!((told.tan() - 1.2 * true_angle.tan()).abs() < 4.0 * tricycle.steering_scale, "{true_angle} {told}");
+        bent += usize::from(true_angle.abs() > 0.2);
+    }
+    assert!(bent > 100, "{bent}");
+}
+
+#[test]
+fn a_carried_vehicle_is_elsewhere_at_once_and_its_wheel_has_not_turned() {
+    let sound = simulate(&quiet(3)).unwrap().recording;
+    let stands = sound
+        .truth
+        .windows(300)
+        .find(|truth| truth[0].time.since(START) > 10.0 && truth.iter().all(|sample| sample.pose == truth[0].pose));
+    let time = stands.unwrap()[100].time.since(START);
+    let mut scenario = quiet(3);
+    scenario.drive.carries.push(Carry { from: time, x: 0.2, y: -0.3, heading_deg: 5.0 });
+    let carried = simulate(&scenario).unwrap().recording;
+    let at = |recording: &Recording, after: f64| truth_at(&recording.truth, START.offset(time + after)).unwrap();
+    assert_eq!(at(&carried, -0.02), at(&sound, -0.02));
+    let moved = at(&carried, -0.02).between(&at(&carried, 0.02));
+    assert!((moved.x - 0.2).abs() < 1e-9 && (moved.y + 0.3).abs() < 1e-9, "{moved:?}");
+    assert!(difference(moved.theta, 5_f64.to_radians()).abs() < 1e-9, "{moved:?}");
+    let drive = |recording: &Recording, after: f64| {
+        let at = START.offset(time + after);
+        let mut encoders = recording.events.iter().filter_map(|event| match event {
+            RecordedEvent::Encoders(sample) if sample.time <= at => Some(sample.drive),
+            _ => None,
+        });
+        encoders.next_back()
+    };
+    assert_eq!(drive(&carried, -0.02), drive(&carried, 0.02));
+    // It is steered back to its way, on which it is as much further as it was carried.
+    let end = sound.truth.last().unwrap().pose.between(&carried.truth.last().unwrap().pose);
+    assert!(end.y.abs() < 0.01 && end.x.abs() < 0.4 && end.theta.abs() < 0.01, "{end:?}");
+}
+
+#[test]
+fn reflectors_that_stand_there_are_seen_and_not_in_the_map() {
+    let scenario = quiet(3);
+    let sound = simulate(&scenario).unwrap().recording;
+    let stand = fault(FaultKind::ReflectorsStand { count: 12 });
+    let random = || Random::new(3, Stream::Faults);
+    let found = simulate_with(&scenario, &[&stand], &mut random()).unwrap();
+    assert_eq!(found.recording.landmarks, sound.landmarks);
+    assert_eq!(found.world.reflectors.len(), sound.landmarks.len() + 12);
+    let all = |recording: &Recording| revolutions(recording).map(Vec::len).sum::<usize>();
+    assert!(all(&found.recording) > all(&sound) + 500, "{} {}", all(&found.recording), all(&sound));
+    assert!(simulate_with(&Scenario::default(), &[&stand], &mut random()).is_err());
+}
