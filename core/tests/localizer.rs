@@ -2,7 +2,9 @@
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason};
+use agv_core::localizer::{
+    CapacitiesOf, Event, Localizer, Mode, OutputPredictor, Parameters, PoseFix, PoseOutput, Reason,
+};
 use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
     EncoderFault, EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time,
@@ -11,7 +13,7 @@ use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_core::sensing::{ReflectorDetection, falko};
 use proptest::prelude::*;
 
-type Small = Localizer<360, 64, 64, 32>;
+type Small = Localizer<CapacitiesOf<360, 64, 64, 32>>;
 
 const TICK: f64 = 1e-4;
 

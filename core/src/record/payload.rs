@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
 use super::published::Published;
 use super::truth::{Reference, Truth};
-use crate::localizer::{Capacities, Event, LandmarkUse, Outputs, Parameters, PoseOutput};
+use crate::localizer::{Event, LandmarkUse, Outputs, Parameters, PoseOutput, StatedCapacities};
 use crate::maps::Landmark;
 use crate::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 
@@ -21,7 +21,7 @@ pub struct Header<'a> {
     /// What the localiser believed of its vehicle.
     pub parameters: &'a Parameters,
     /// What the localiser had room for.
-    pub capacities: Capacities,
+    pub capacities: StatedCapacities,
 }
 
 /// What the localiser answered to one event.

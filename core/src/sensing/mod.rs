@@ -14,7 +14,7 @@ pub use keypoint::{Keypoint, KeypointKind};
 pub(crate) use line::Moments;
 pub use motion_correction::SensorPath;
 pub use neighbourhood::visit_around;
-pub use point_scan::PointScan;
+pub use point_scan::{PointScan, PointView};
 pub use reflector_detection::{ReflectorDetection, detect_reflectors};
 pub use surface_alignment::{ScanAlignment, SurfaceAlignmentParameters, align_to_surfaces};
 pub use surface_scan::{Surface, SurfaceParameters, SurfaceScan};

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{PointScan, SurfaceScan};
+use super::{PointView, SurfaceScan};
 use crate::geometry::{Pose, ScanPoint, Transform, wrap};
 
 /// A pose found by aligning scans.
@@ -52,8 +52,8 @@ const BESIDE: usize = 2;
 /// Moves the source scan, which is taken to be at `start` in the frame of the target, to where its returns lie on the
 /// target's surfaces. None if too few do, or if they fix no pose.
 #[must_use]
-pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
-    source: &PointScan<BEAMS>,
+pub fn align_to_surfaces<const DIRECTIONS: usize>(
+    source: PointView<'_>,
     target: &SurfaceScan<DIRECTIONS>,
     start: &Pose,
     parameters: &SurfaceAlignmentParameters,
@@ -70,7 +70,7 @@ pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
         let transform = Transform::of(&pose);
         let (mut information, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
         let (mut squares, mut count) = (0.0_f32, 0);
-        let returns = source.points.iter().zip(&source.ranges).step_by(usize::from(every));
+        let returns = source.points.iter().zip(source.ranges).step_by(usize::from(every));
         for (point, range) in returns.filter(|(_, range)| **range > 0.0) {
             let moved = transform.apply(point);
             let Some((surface, square)) = target.nearest(&moved, BESIDE) else { continue };

@@ -8,9 +8,9 @@ use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
+use super::capacities::HAS_SLAM;
 use super::exchange;
 use super::log_stream::SOFTWARE;
-use super::room::HAS_SLAM;
 
 static MAP: ConstStaticCell<Vec<Landmark, LANDMARKS>> = ConstStaticCell::new(Vec::new());
 

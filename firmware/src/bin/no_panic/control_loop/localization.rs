@@ -11,7 +11,7 @@ use agv_core::measurement::{
     WheelSample,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
-use agv_firmware::app::room;
+use agv_firmware::app::capacities::Localizer;
 use agv_settings::Settings;
 
 use super::any;
@@ -28,7 +28,7 @@ type SlamLocalizer = localizer::Localizer;
 
 /// The localisers of an image with the feature `slam` and of one without.
 pub struct Localization {
-    localization: agv_controller::Localization<room::Localizer>,
+    localization: agv_controller::Localization<Localizer>,
     slam: SlamLocalizer,
     frame: [u8; MAX_FRAME],
 }
@@ -67,7 +67,7 @@ impl Localization {
         let settings: Settings = any(Settings::default());
         let parameters = settings.parameters;
         Self {
-            localization: agv_controller::Localization::new(room::Localizer::new(parameters), &settings),
+            localization: agv_controller::Localization::new(Localizer::new(parameters), &settings),
             slam: SlamLocalizer::new(parameters),
             frame: [0; MAX_FRAME],
         }
