@@ -135,25 +135,25 @@ pub fn drive(
         }
         if let Some(controller) = &mut controller {
             // The controller and its laser.
-            let mut wishes = Vec::new();
+            let mut orders = Vec::new();
             while let Some(bytes) = from_laser.receive(now) {
-                controller.hear_laser(&bytes, now, |order| wishes.push(Wish::of(order)), |_| ());
+                controller.hear_laser(&bytes, now, |order| orders.push(order.map(<[u8]>::to_vec)), |_| ());
             }
-            controller.poll_laser(now, |order| wishes.push(Wish::of(order)), |_| ());
-            for wish in wishes {
-                match wish {
-                    Wish::Connect if is_unreachable => controller.unreachable(),
-                    Wish::Connect => {
+            controller.poll_laser(now, |order| orders.push(order.map(<[u8]>::to_vec)), |_| ());
+            for order in orders {
+                match order {
+                    LaserOrder::Connect if is_unreachable => controller.unreachable(),
+                    LaserOrder::Connect => {
                         connection = Some(Connection::default());
                         controller.connected(now);
                     }
-                    Wish::Disconnect => {
+                    LaserOrder::Disconnect => {
                         connection = None;
                         from_laser.clear();
                         to_laser.clear();
                     }
-                    Wish::Send(bytes) if is(FaultKind::LaserSilent) => drop(bytes),
-                    Wish::Send(bytes) => to_laser.send_telegram(now, time, bytes, &[]),
+                    LaserOrder::Send(bytes) if is(FaultKind::LaserSilent) => drop(bytes),
+                    LaserOrder::Send(bytes) => to_laser.send_telegram(now, time, bytes, &[]),
                 }
             }
             // The controller and its bus.
@@ -200,23 +200,6 @@ fn stated(pose: &PublishedPose, now: Time) -> Time {
     let milliseconds = now.micros() / 1000;
     let age = (milliseconds as u16).wrapping_sub(pose.time) as i16;
     Time::from_micros(1000 * milliseconds.saturating_add_signed(-i64::from(age)))
-}
-
-/// What the controller wants of its laser, for later.
-enum Wish {
-    Connect,
-    Disconnect,
-    Send(Vec<u8>),
-}
-
-impl Wish {
-    fn of(order: LaserOrder) -> Self {
-        match order {
-            LaserOrder::Connect => Self::Connect,
-            LaserOrder::Disconnect => Self::Disconnect,
-            LaserOrder::Send(bytes) => Self::Send(bytes.to_vec()),
-        }
-    }
 }
 
 /// What the laser's clock shows.

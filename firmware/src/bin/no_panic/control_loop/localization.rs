@@ -2,7 +2,7 @@
 
 use core::hint::black_box;
 
-use agv_controller::{BusEvent, Progress, PublishedPose, Told};
+use agv_controller::{BusEvent, Progress, SentPose, Told};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{self, Event, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
@@ -85,7 +85,7 @@ impl Localization {
             |record| log(frame, record),
         );
         localization.published(
-            &any(PublishedPose { pose: localization.estimate().pose, progress: Progress::default() }),
+            &any(SentPose { pose: localization.estimate().pose, progress: Progress::default() }),
             |record| {
                 log(frame, record);
             },
