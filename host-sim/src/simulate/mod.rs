@@ -13,6 +13,7 @@ pub mod random;
 pub mod raycast;
 pub mod reflector_detector;
 pub mod scenario;
+pub mod shape;
 pub mod speed_profile;
 pub mod vehicle;
 pub mod warehouse_hall;
