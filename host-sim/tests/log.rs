@@ -231,6 +231,18 @@ fn a_log_states_what_its_localiser_had_room_for() {
 }
 
 #[test]
+fn a_header_with_which_nothing_can_be_computed_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive.agvlog");
+    let mut wrong = parameters();
+    wrong.reflectors.range_deviation = 0.0;
+    Writer::begin(&path, &wrong, &[]).unwrap().finish().unwrap();
+    let error = log::read(&path).unwrap_err().to_string();
+    let expected = "the log's header cannot be used: reflectors.range_deviation is out of its bounds";
+    assert_eq!(error, format!("{}: {expected}", path.display()));
+}
+
+#[test]
 fn what_is_flushed_is_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");

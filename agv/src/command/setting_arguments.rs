@@ -30,6 +30,7 @@ impl SettingArguments {
     pub fn apply(&self, parameters: &mut Parameters) -> anyhow::Result<()> {
         let mut settings = Settings::of(*parameters);
         self.change(&mut settings)?;
+        settings.parameters.check()?;
         *parameters = settings.parameters;
         Ok(())
     }
