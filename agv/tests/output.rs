@@ -231,6 +231,8 @@ fn values_that_no_vehicle_has_are_named_with_their_bounds() {
         let complaint = refusal(&["replay", &log, "--vehicle", &vehicle]);
         assert!(complaint.contains(expected), "{complaint}");
     }
+    let complaint = refusal(&["replay", &log, "--set", "features.nearest=40"]);
+    assert!(complaint.contains("features.nearest is out of its bounds"), "{complaint}");
     let key = files.write("agv.key", "0".repeat(64).as_bytes());
     let flash = files.path("flash.bin");
     let complaint = refusal(&["provision", "--key", &key, "--set", "vehicle.wheelbase=", "-o", &flash]);

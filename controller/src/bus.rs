@@ -12,7 +12,7 @@ use agv_wire::can::frame::Frame;
 
 use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
 use super::localization::Estimate;
-use super::progress::{Progress, PublishedPose, Told};
+use super::progress::{Progress, SentPose, Told};
 use super::standstill::Standstill;
 
 /// Motions that the localiser may be behind: more than a scan takes. All of them are redone when it has spoken, which with
@@ -47,7 +47,7 @@ pub enum BusOutput {
     /// The localiser is told something.
     Event(Told),
     /// A pose went out, in the frames before.
-    Published(PublishedPose),
+    Published(SentPose),
 }
 
 /// The encoders, the controller's own node, and the pose for now.
@@ -145,7 +145,7 @@ impl Bus {
             take(BusOutput::Send(*frame));
         }
         if has_published {
-            take(BusOutput::Published(PublishedPose { pose: output, progress: self.progress }));
+            take(BusOutput::Published(SentPose { pose: output, progress: self.progress }));
         }
     }
 

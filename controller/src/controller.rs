@@ -19,15 +19,26 @@ pub const TELEGRAM: usize = 18 * 1024;
 /// Slices of the search that there is time for in a millisecond.
 const SLICES: usize = 8;
 
-/// What the controller wants of its laser.
+/// What the controller wants of its laser; `B` are bytes, borrowed or kept for later.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LaserOrder<'a> {
+pub enum LaserOrder<B> {
     /// A connection.
     Connect,
     /// No connection any more.
     Disconnect,
     /// These bytes sent.
-    Send(&'a [u8]),
+    Send(B),
+}
+
+impl<B> LaserOrder<B> {
+    /// The same with other bytes.
+    pub fn map<T>(self, bytes: impl FnOnce(B) -> T) -> LaserOrder<T> {
+        match self {
+            Self::Connect => LaserOrder::Connect,
+            Self::Disconnect => LaserOrder::Disconnect,
+            Self::Send(sent) => LaserOrder::Send(bytes(sent)),
+        }
+    }
 }
 
 /// A controller that does one thing after the other: that of a desktop, in simulated time. A board runs its parts at three
@@ -69,7 +80,7 @@ impl<L: Localize> Controller<L> {
         &mut self,
         bytes: &[u8],
         now: Time,
-        mut order: impl FnMut(LaserOrder),
+        mut order: impl FnMut(LaserOrder<&[u8]>),
         mut log: impl FnMut(&Record),
     ) {
         let mut rest = bytes;
@@ -82,7 +93,7 @@ impl<L: Localize> Controller<L> {
     }
 
     /// Does what there is to do with the laser.
-    pub fn poll_laser(&mut self, now: Time, mut order: impl FnMut(LaserOrder), mut log: impl FnMut(&Record)) {
+    pub fn poll_laser(&mut self, now: Time, mut order: impl FnMut(LaserOrder<&[u8]>), mut log: impl FnMut(&Record)) {
         loop {
             match self.laser.poll(now, &mut self.revolution) {
                 Step::Wait(_) => return,

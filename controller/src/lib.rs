@@ -10,7 +10,7 @@
 //! | [`Controller`] | all of them as one value, one after the other | a desktop, in simulated time |
 //!
 //! A board runs the parts at three priorities and passes events of the bus ([`Told`]), revolutions,
-//! [`Estimate`]s and what was published ([`PublishedPose`]) between them.
+//! [`Estimate`]s and what was published ([`SentPose`]) between them.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -27,5 +27,5 @@ pub use controller::{Controller, LaserOrder, TELEGRAM};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels};
 pub use laser::Laser;
 pub use localization::{Estimate, Localization};
-pub use progress::{Progress, PublishedPose, Told};
+pub use progress::{Progress, SentPose, Told};
 pub use standstill::Standstill;

@@ -7,7 +7,7 @@ use agv_core::state::{PoseOutput, Relocalization};
 use agv_settings::Settings;
 use agv_wire::nav350::Revolution;
 
-use super::progress::{PublishedPose, Told};
+use super::progress::{SentPose, Told};
 
 /// What the localiser has said last, for whoever publishes it.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +97,7 @@ impl<L: Localize> Localization<L> {
 
     /// Takes what was published. Where it stands in the log matters: behind all events that the bus had told
     /// ([`Localization::told`]), and before the next of them.
-    pub fn published(&self, published: &PublishedPose, mut log: impl FnMut(&Record)) {
+    pub fn published(&self, published: &SentPose, mut log: impl FnMut(&Record)) {
         let behind = self.answered.wrapping_sub(published.progress.answered);
         log(&Record::Published(Published { pose: published.pose, behind }));
     }

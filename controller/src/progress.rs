@@ -40,7 +40,7 @@ impl From<BusEvent> for Told {
 
 /// A pose that went out on the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PublishedPose {
+pub struct SentPose {
     /// The pose.
     pub pose: PoseOutput,
     /// How far the bus was.

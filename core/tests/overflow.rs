@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::support::hall::{cast, corners};
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Event, Localizer, OBSERVATIONS, Parameters, PoseFix};
+use agv_core::localizer::{CapacitiesOf, Event, Localizer, OBSERVATIONS, Parameters, PoseFix};
 use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::sensing::falko::{Detector, Parameters as Falko};
@@ -29,7 +29,7 @@ fn observations(count: usize) -> Vec<ReflectorObservation> {
     (0..count).map(of).collect()
 }
 
-fn localizer() -> Box<Localizer<360, 8, 8, 8>> {
+fn localizer() -> Box<Localizer<CapacitiesOf<360, 8, 8, 8>>> {
     let mut localizer = Box::new(Localizer::new(Parameters::new(Vehicle::Increments, Pose::default())));
     let fix = PoseFix {
         time: Time::from_micros(1_000_000),

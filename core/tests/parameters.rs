@@ -2,6 +2,7 @@
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Limits, ParameterError, Parameters, bounds};
+use agv_core::measurement::LaserId;
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 
 const TRICYCLE: Tricycle = Tricycle {
@@ -28,6 +29,15 @@ fn the_default_parameters_of_every_vehicle_are_sound() {
     for vehicle in vehicles {
         assert_eq!(Parameters { vehicle, ..parameters() }.check(), Ok(()));
     }
+}
+
+#[test]
+fn the_wheelbase_of_a_car_and_the_mount_of_a_second_laser_are_bounded_too() {
+    let car = Vehicle::Ackermann(Ackermann { wheelbase: f64::NAN, encoder_offset: 0.7 });
+    assert_eq!(Parameters { vehicle: car, ..parameters() }.check(), Err(ParameterError { leaf: "vehicle.wheelbase" }));
+    let mut two = parameters();
+    two.lasers.set(LaserId::new(1).unwrap_or(LaserId::FIRST), Pose { x: 0.0, y: f64::INFINITY, theta: 0.0 });
+    assert_eq!(two.check(), Err(ParameterError { leaf: "laser.y" }));
 }
 
 type Set = fn(&mut Parameters, f64);

@@ -4,7 +4,8 @@
 use agv_core::geometry::Pose;
 use agv_core::integrity::ProtectionLevel;
 use agv_core::localizer::{
-    Capacities, Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
+    CapacitiesOf, Event, LandmarkSource, LandmarkUse, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason,
+    StatedCapacities,
 };
 use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
@@ -21,7 +22,7 @@ use proptest::prelude::*;
 /// Everything that a record can hold, with its own memory.
 #[derive(Clone, Debug)]
 enum Owned {
-    Header(String, Box<Parameters>, Capacities),
+    Header(String, Box<Parameters>, StatedCapacities),
     Landmarks(Vec<Landmark>),
     Encoders(EncoderSample),
     Speed(SpeedSample),
@@ -195,7 +196,7 @@ fn record() -> impl Strategy<Value = Owned> {
             Owned::Header(
                 software,
                 Box::new(Parameters::new(vehicle, laser)),
-                Capacities { landmarks: a, beams: b, history: c },
+                StatedCapacities { landmarks: a, beams: b, history: c },
             )
         }),
         prop::collection::vec(landmark(), 0..=50).prop_map(Owned::Landmarks),
@@ -392,7 +393,7 @@ fn small_log() -> (Vec<Vec<u8>>, Vec<usize>) {
         Owned::Header(
             "test".into(),
             Box::new(Parameters::new(Vehicle::Increments, Pose::new(1.0, 0.0, 0.5))),
-            Capacities::default(),
+            StatedCapacities::default(),
         ),
         Owned::Landmarks(vec![Landmark { id: 1, kind: LandmarkKind::Corner, x: 1.0, y: -2.0, deviation: 0.01 }; 3]),
         Owned::Encoders(EncoderSample { time: Time::from_micros(1000), drive: 70_000, steering: 5 }),
@@ -489,7 +490,7 @@ fn another_version_is_told_apart_from_damage() {
 fn the_header_of_a_localiser_s_log_states_its_room() {
     let parameters = Parameters::new(Vehicle::Increments, Pose::default());
     let mut buffer = vec![0; MAX_FRAME];
-    let capacities = Localizer::<360, 64, 32, 8>::CAPACITIES;
+    let capacities = Localizer::<CapacitiesOf<360, 64, 32, 8>>::CAPACITIES;
     let header = Header { software: "test", parameters: &parameters, capacities };
     let length = encode(&Record::Header(header), 0, &mut buffer).unwrap();
     let mut scratch = Box::new(Scratch::<1, 1>::new());
@@ -499,7 +500,7 @@ fn the_header_of_a_localiser_s_log_states_its_room() {
         panic!("no header")
     };
     // The past does not depend on the maps.
-    assert_eq!(read.capacities, Capacities { landmarks: 96, beams: 360, history: 128 });
+    assert_eq!(read.capacities, StatedCapacities { landmarks: 96, beams: 360, history: 128 });
 }
 
 #[test]

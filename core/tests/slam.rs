@@ -4,9 +4,9 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::support::hall::{cast, corners};
-use agv_core::filter::{packed_entries, slot_states};
+use agv_core::filter::{PoseAndSlots, packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose};
-use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
+use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::LandmarkKind;
 use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
@@ -16,7 +16,7 @@ const BEAMS: usize = 1440;
 const KEYS: usize = 2;
 const PLACES: usize = 16;
 const STATES: usize = slot_states(KEYS, PLACES);
-type Mapper = Localizer<BEAMS, 64, 64, 4, KEYS, PLACES, STATES, { packed_entries(STATES) }>;
+type Mapper = Localizer<CapacitiesOf<BEAMS, 64, 64, 4, PoseAndSlots<KEYS, PLACES, STATES, { packed_entries(STATES) }>>>;
 
 /// Seconds of a revolution, and samples of the odometry in it.
 const REVOLUTION: f64 = 0.125;

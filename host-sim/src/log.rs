@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use agv_core::localizer::{Event, Localizer, Parameters};
+use agv_core::localizer::{Event, Localizer, ParameterError, Parameters};
 use agv_core::maps::Landmark;
 use agv_core::record::{
     self, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
@@ -68,6 +68,14 @@ pub enum LogError {
         path: PathBuf,
         /// What may have happened to it.
         damage: Option<Damage>,
+    },
+    /// The header says of the vehicle what cannot be.
+    #[error("{}: the log's header cannot be used: {error}", path.display())]
+    Parameters {
+        /// The file.
+        path: PathBuf,
+        /// The parameter.
+        error: ParameterError,
     },
     /// The log holds two drives that do not belong together.
     #[error("{}: a second drive with other parameters begins at byte {offset}", path.display())]
@@ -183,7 +191,7 @@ impl Reader {
     /// The next record or damage. None at the end.
     ///
     /// # Errors
-    /// If the file cannot be read.
+    /// If the file cannot be read, or the parameters of its header are out of their bounds.
     #[expect(clippy::should_implement_trait, reason = "the items borrow from the reader")]
     pub fn next(&mut self) -> Result<Option<Item<'_>>, LogError> {
         let (offset, kind, sequence, payload) = match self.find()? {
@@ -194,6 +202,9 @@ impl Reader {
         let frame = Frame { kind, sequence, payload: &self.buffer[payload] };
         let skipped = frame.length() as u64;
         Ok(Some(match frame.record(&mut self.scratch) {
+            Ok(Record::Header(header)) if let Err(error) = header.parameters.check() => {
+                return Err(LogError::Parameters { path: self.path.clone(), error });
+            }
             Ok(record) => Item::Record { offset, sequence, record },
             Err(reason) => Item::Damage(Damage { offset, skipped, reason }),
         }))

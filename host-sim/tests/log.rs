@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Capacities, Parameters, PoseFix};
+use agv_core::localizer::{Parameters, PoseFix, StatedCapacities};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderSample, LaserId, PoseIncrement, ReflectorObservation, SpeedSample, Time};
 use agv_core::odometry::Vehicle;
@@ -227,14 +227,26 @@ fn a_log_states_what_its_localiser_had_room_for() {
     Writer::begin(&path, &parameters(), &[]).unwrap().finish().unwrap();
     let mut reader = Reader::open(&path).unwrap();
     let Some(Item::Record { record: Record::Header(header), .. }) = reader.next().unwrap() else { panic!("no header") };
-    assert_eq!(header.capacities, Capacities { landmarks: 2000, beams: 1440, history: 128 });
+    assert_eq!(header.capacities, StatedCapacities { landmarks: 2000, beams: 1440, history: 128 });
+}
+
+#[test]
+fn a_header_with_which_nothing_can_be_computed_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive.agvlog");
+    let mut wrong = parameters();
+    wrong.reflectors.range_deviation = 0.0;
+    Writer::begin(&path, &wrong, &[]).unwrap().finish().unwrap();
+    let error = log::read(&path).unwrap_err().to_string();
+    let expected = "the log's header cannot be used: reflectors.range_deviation is out of its bounds";
+    assert_eq!(error, format!("{}: {expected}", path.display()));
 }
 
 #[test]
 fn what_is_flushed_is_on_the_disk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");
-    let header = Header { software: "test", parameters: &parameters(), capacities: Capacities::default() };
+    let header = Header { software: "test", parameters: &parameters(), capacities: StatedCapacities::default() };
     let mut writer = Writer::create(&path, &header).unwrap();
     writer.take_name().unwrap();
     writer.write(&Record::Note("one")).unwrap();

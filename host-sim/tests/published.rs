@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use agv_controller::{Bus, BusOutput, Localization, PublishedPose, Told, Troubles};
+use agv_controller::{Bus, BusOutput, Localization, SentPose, Told, Troubles};
 use agv_core::localizer::{Event, Localizer, PoseFix};
 use agv_core::measurement::Time;
 use agv_core::record::Record;
@@ -32,7 +32,7 @@ struct Board {
     bus: Bus,
     localization: Localization<Localizer>,
     told: VecDeque<Told>,
-    published: VecDeque<PublishedPose>,
+    published: VecDeque<SentPose>,
     is_answered: bool,
     frames: VecDeque<Frame>,
     writer: Writer,

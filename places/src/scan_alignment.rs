@@ -1,10 +1,8 @@
 //! The pose under which the surfaces of two scans coincide: points to lines, iterated.
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::beam_lookup::BeamLookup;
-use agv_core::geometry::{Pose, ScanPoint, Transform, wrap};
-use agv_core::sensing::{PointScan, ScanAlignment};
+use agv_core::geometry::{Pose, ScanPoint, Transform};
+use agv_core::sensing::{PointScan, PointToLine, ScanAlignment};
 
 /// How scans are aligned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,29 +51,24 @@ pub fn align_scans<const BEAMS: usize>(
         let share = f32::from(iteration) / f32::from((iterations - 1).max(1));
         let reach = parameters.first_reach + share * (parameters.last_reach - parameters.first_reach);
         let transform = Transform::of(&pose);
-        let (mut information, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        let mut equations = PointToLine::default();
         let (mut squares, mut count) = (0.0, 0);
         let returns = source.points.iter().zip(&source.ranges).step_by(usize::from(parameters.every.max(1)));
         for (point, _) in returns.filter(|(_, range)| **range > 0.0) {
             let moved = transform.apply(point);
             let Some((normal, distance)) = surface(&lookup, &moved, reach) else { continue };
-            // The lever about the source's own position, so that heading and position hardly mix.
-            let lever = moved - transform.shift();
-            let row = Vector3::new(normal.x, normal.y, lever.x * normal.y - lever.y * normal.x).cast::<f64>();
-            information += row * row.transpose();
-            gradient += row * f64::from(distance);
+            equations.add(&normal, &(moved - transform.shift()), distance, 1.0);
             squares += f64::from(distance * distance);
             count += 1;
         }
         if count < FEWEST {
             return None;
         }
-        let step = information.cholesky()?.solve(&gradient);
-        pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
+        pose = equations.step(&pose)?;
         let residual = libm::sqrt(squares / f64::from(count));
         let deviation = residual.max(f64::from(parameters.range_deviation));
-        outcome =
-            Some(ScanAlignment { pose, information: information / (deviation * deviation), residual, points: count });
+        let information = equations.information / (deviation * deviation);
+        outcome = Some(ScanAlignment { pose, information, residual, points: count });
     }
     outcome.filter(|found| found.pose.is_finite())
 }

@@ -40,7 +40,7 @@ pub struct Leaf {
 pub enum LeafError {
     /// The leaf holds another kind of value.
     Kind,
-    /// The value is not within the bounds of the leaf.
+    /// The value is not within the bounds of the leaf, or does not go with the other settings.
     Bounds,
 }
 
@@ -67,6 +67,24 @@ impl Leaf {
             return Err(LeafError::Bounds);
         }
         if (self.set)(settings, value) { Ok(()) } else { Err(LeafError::Kind) }
+    }
+}
+
+impl Leaf {
+    /// Changes settings that go together, if they still do with the new value.
+    ///
+    /// # Errors
+    /// As [`Leaf::set`], and if the value does not go with the others. The settings are as before.
+    pub fn change(&self, settings: &mut Settings, value: Value) -> Result<(), LeafError> {
+        let before = self.get(settings);
+        self.set(settings, value)?;
+        if settings.parameters.check().is_err() {
+            if let Some(before) = before {
+                (self.set)(settings, before);
+            }
+            return Err(LeafError::Bounds);
+        }
+        Ok(())
     }
 }
 

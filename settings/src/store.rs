@@ -53,6 +53,9 @@ pub struct Loaded {
     pub leaves: u16,
     /// Items that mean nothing or are out of bounds; their settings are the default ones.
     pub bad: u16,
+    /// The first setting that does not go with the others, though it is within its own bounds. If its default does not
+    /// either, all that the localiser believes is as by default.
+    pub contradiction: Option<&'static str>,
     /// Whether what was there is no storage at all. It was erased.
     pub was_formatted: bool,
     /// Whether there is a map that is not whole. None was loaded.
@@ -153,6 +156,21 @@ const _: () = assert!(KNOWN_KEYS >= LEAVES.len() + 3, "all leaves are known, and
 
 type KnownKeys = Cache<Uncached, Uncached, ArrayKeyPointers<u16, KNOWN_KEYS>, u16>;
 
+/// Takes the former value of a setting that does not go with the others, and of all that the localiser believes if that is
+/// not enough. Gives the first such setting.
+fn make_sound(settings: &mut Settings, former: &Settings) -> Option<&'static str> {
+    let error = settings.parameters.check().err()?;
+    if let Some(leaf) = Leaf::named(error.leaf)
+        && let Some(value) = leaf.get(former)
+    {
+        let _ = leaf.set(settings, value);
+    }
+    if settings.parameters.check().is_err() {
+        settings.parameters = former.parameters;
+    }
+    Some(error.leaf)
+}
+
 /// The storage in a flash of two or more pages, all of it.
 pub struct Store<F: NorFlash> {
     storage: MapStorage<u16, Immediate<F>, KnownKeys>,
@@ -241,6 +259,7 @@ impl<F: NorFlash> Store<F> {
         }
         loaded.leaves = are_good.iter().filter(|is_good| **is_good == Some(true)).count() as u16;
         loaded.bad = are_good.iter().filter(|is_good| **is_good == Some(false)).count() as u16;
+        loaded.contradiction = make_sound(settings, &before);
         Ok(has_items)
     }
 

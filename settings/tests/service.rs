@@ -159,6 +159,8 @@ fn wrong_values_change_nothing() {
     for (change, refusal) in [
         (Change::Set("vehicle.wheelbase", Value::Number(f64::NAN)), Refusal::Bounds),
         (Change::Set("vehicle.wheelbase", Value::Number(-1.0)), Refusal::Bounds),
+        (Change::Set("features.nearest", Value::Number(100.0)), Refusal::Bounds),
+        (Change::Set("vehicle.drive_scale", Value::Number(0.0)), Refusal::Bounds),
         (Change::Set("vehicle.wheelbase", Value::Whole(2)), Refusal::Kind),
         (Change::Set("nav350.port", Value::Whole(65_536)), Refusal::Bounds),
         (Change::Set("maps.dynamic", Value::Number(1.0)), Refusal::Kind),

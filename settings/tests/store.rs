@@ -2,7 +2,7 @@
 
 mod support;
 
-use agv_settings::leaf::Leaf;
+use agv_settings::leaf::{Leaf, Value};
 use agv_settings::store::{LANDMARKS, Store};
 use agv_settings::{LEAVES, Settings};
 use proptest::prelude::*;
@@ -53,6 +53,30 @@ fn what_is_stored_is_read() {
     assert_eq!(store.key(), Some([7; 32]));
     assert_eq!(store.count_start(), Ok(3));
     assert!(store.begin_map(LANDMARKS as u16 + 1).is_err());
+}
+
+#[test]
+fn a_stored_setting_that_does_not_go_with_the_others_is_named_and_not_taken() {
+    let set = |settings: &mut Settings, name: &str, value: f64| {
+        Leaf::named(name).unwrap().set(settings, Value::Number(value)).unwrap();
+    };
+    for (nearest, is_default_enough) in [(40.0, true), (0.4, false)] {
+        let mut settings = changed(0.3);
+        set(&mut settings, "features.nearest", nearest);
+        set(&mut settings, "features.farthest", if is_default_enough { 20.0 } else { 0.3 });
+        let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
+        store.store_leaves(&settings).unwrap();
+        let (found, _, loaded) = load(&mut store);
+        assert_eq!(loaded.contradiction, Some("features.nearest"));
+        assert_eq!(found.parameters.check(), Ok(()));
+        let parameters = Settings::default().parameters;
+        if is_default_enough {
+            settings.parameters.features.nearest = parameters.features.nearest;
+        } else {
+            settings.parameters = parameters;
+        }
+        assert_eq!(found, settings);
+    }
 }
 
 #[test]

@@ -14,6 +14,7 @@ use serde_json::json;
 
 use super::output::{note, print_rows};
 use super::progress;
+use super::setting_text::{parse_value, show};
 
 const HELP: &str = "\
 Reading needs nothing; changing needs the controller's key (64 hexadecimal digits in a file) and a vehicle that stands.
@@ -133,32 +134,6 @@ pub fn read_key(path: &Path) -> anyhow::Result<[u8; 32]> {
         *byte = value.with_context(|| format!("{}: the key has something else than digits", path.display()))?;
     }
     Ok(key)
-}
-
-/// A value as it is written on a command line or in a file, for a leaf that holds `like`.
-pub fn parse_value(name: &str, text: &str, like: Value) -> anyhow::Result<Value> {
-    let value = match like {
-        Value::Number(_) => text.parse().ok().map(Value::Number),
-        Value::Whole(_) => text.parse().ok().map(Value::Whole),
-        Value::Switch(_) => text.parse().ok().map(Value::Switch),
-        Value::Address(_) => text.parse::<std::net::Ipv4Addr>().ok().map(|address| Value::Address(address.octets())),
-    };
-    let wanted = match like {
-        Value::Number(_) => "a number",
-        Value::Whole(_) => "a whole number",
-        Value::Switch(_) => "true or false",
-        Value::Address(_) => "an address such as 192.168.1.10",
-    };
-    value.with_context(|| format!("{name} must be {wanted}, not '{text}'"))
-}
-
-pub fn show(value: Value) -> String {
-    match value {
-        Value::Number(number) => number.to_string(),
-        Value::Whole(whole) => whole.to_string(),
-        Value::Switch(is_on) => is_on.to_string(),
-        Value::Address([a, b, c, d]) => format!("{a}.{b}.{c}.{d}"),
-    }
 }
 
 fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {

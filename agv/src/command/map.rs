@@ -96,28 +96,7 @@ impl Map {
         let (recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
             .map(|read| (read.recording, read.damages))?;
         reading.finish_and_clear();
-        let mut slam = None;
-        let default = match self.kind {
-            Kind::Features => Poses::Localiser,
-            Kind::Reflectors if recording.truth.is_empty() => Poses::References,
-            Kind::Reflectors => Poses::Truth,
-            Kind::Contours if recording.truth.is_empty() => Poses::References,
-            Kind::Contours => Poses::Truth,
-        };
-        let poses = match self.poses.unwrap_or(default) {
-            _ if self.slam => {
-                let bar = progress::spinner().with_message("finding the poses");
-                let found = slam_poses(&recording, &SlamParameters::all(), || bar.tick())
-                    .with_context(|| self.log.display().to_string())?;
-                bar.finish_and_clear();
-                ensure!(!found.1.keys.is_empty(), "{}: the log has no scans", self.log.display());
-                slam = Some((found.1.keys.len(), found.1.closures.len()));
-                Some((found.0, "poses"))
-            }
-            Poses::Localiser => None,
-            Poses::Truth => Some((recording.truth.clone(), "true poses")),
-            Poses::References => Some((recording.referenced_poses(), "reference poses with a heading")),
-        };
+        let (poses, slam) = self.known_poses(&recording)?;
         if let Some((poses, name)) = &poses {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());
         }
@@ -130,19 +109,7 @@ impl Map {
             }
             return self.map_contours(&recording, poses, slam);
         }
-        let looking = progress::spinner().with_message("looking for landmarks");
-        looking.tick();
-        let landmarks = match (self.kind, &poses) {
-            (Kind::Reflectors, None) => {
-                bail!("reflectors cannot be mapped from poses that rest on them; choose --poses truth or references")
-            }
-            (Kind::Reflectors, Some((poses, _))) => map_reflectors_at(&recording, poses, &reflector_clustering()),
-            (Kind::Contours, _) => bail!("contours are no landmarks"),
-            (Kind::Features, None) => map_features(&recording, &Clustering::default()),
-            (Kind::Features, Some((poses, _))) => map_features_at(&recording, poses, &Clustering::default()),
-        }
-        .with_context(|| self.log.display().to_string())?;
-        looking.finish_and_clear();
+        let landmarks = self.landmarks(&recording, poses.as_ref().map(|(poses, _)| &**poses))?;
         ensure!(!landmarks.is_empty(), "{}: no landmark was seen often enough from known poses", self.log.display());
         map_file::write(&self.output, &landmarks)?;
         for damage in &damages {
@@ -169,7 +136,55 @@ impl Map {
     }
 }
 
+/// Poses, and what they are called.
+type NamedPoses = (Vec<Truth>, &'static str);
+
 impl Map {
+    /// From which poses the map is made, with what they are called; none for those of the localiser. Then the key scans and
+    /// loops of SLAM.
+    fn known_poses(&self, recording: &Recording) -> anyhow::Result<(Option<NamedPoses>, Option<(usize, usize)>)> {
+        let mut slam = None;
+        let default = match self.kind {
+            Kind::Features => Poses::Localiser,
+            Kind::Reflectors if recording.truth.is_empty() => Poses::References,
+            Kind::Reflectors => Poses::Truth,
+            Kind::Contours if recording.truth.is_empty() => Poses::References,
+            Kind::Contours => Poses::Truth,
+        };
+        let poses = match self.poses.unwrap_or(default) {
+            _ if self.slam => {
+                let bar = progress::spinner().with_message("finding the poses");
+                let found = slam_poses(recording, &SlamParameters::all(), || bar.tick())
+                    .with_context(|| self.log.display().to_string())?;
+                bar.finish_and_clear();
+                ensure!(!found.1.keys.is_empty(), "{}: the log has no scans", self.log.display());
+                slam = Some((found.1.keys.len(), found.1.closures.len()));
+                Some((found.0, "poses"))
+            }
+            Poses::Localiser => None,
+            Poses::Truth => Some((recording.truth.clone(), "true poses")),
+            Poses::References => Some((recording.referenced_poses(), "reference poses with a heading")),
+        };
+        Ok((poses, slam))
+    }
+
+    fn landmarks(&self, recording: &Recording, poses: Option<&[Truth]>) -> anyhow::Result<Vec<Landmark>> {
+        let looking = progress::spinner().with_message("looking for landmarks");
+        looking.tick();
+        let landmarks = match (self.kind, poses) {
+            (Kind::Reflectors, None) => {
+                bail!("reflectors cannot be mapped from poses that rest on them; choose --poses truth or references")
+            }
+            (Kind::Reflectors, Some(poses)) => map_reflectors_at(recording, poses, &reflector_clustering()),
+            (Kind::Contours, _) => bail!("contours are no landmarks"),
+            (Kind::Features, None) => map_features(recording, &Clustering::default()),
+            (Kind::Features, Some(poses)) => map_features_at(recording, poses, &Clustering::default()),
+        }
+        .with_context(|| self.log.display().to_string())?;
+        looking.finish_and_clear();
+        Ok(landmarks)
+    }
+
     fn map_contours(&self, recording: &Recording, poses: &[Truth], slam: Option<(usize, usize)>) -> anyhow::Result<()> {
         let mapping = progress::spinner().with_message("mapping contours");
         mapping.tick();

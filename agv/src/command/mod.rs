@@ -36,6 +36,7 @@ pub mod record;
 pub mod replay;
 pub mod report;
 mod setting_arguments;
+mod setting_text;
 pub mod settings;
 pub mod simulate;
 mod stop;

@@ -10,9 +10,10 @@ use agv_settings::{LEAVES, Settings};
 use anyhow::Context;
 use serde_json::json;
 
-use super::ctl::{read_key, show};
+use super::ctl::read_key;
 use super::output::{note, print_rows};
 use super::setting_arguments::SettingArguments;
+use super::setting_text::show;
 
 const HELP: &str = "\
 The image is for the last two pages of the controller's flash, 0x081C0000 on the STM32H743:

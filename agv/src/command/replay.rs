@@ -10,9 +10,10 @@ use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::drive_check::{POOR, poor_share};
 use agv_host_sim::log::{self, Contents};
+use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::mapping::{contour_file, contour_replay, map_file};
 use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
-use agv_host_sim::replay::{Comparisons, replay};
+use agv_host_sim::replay::{Comparisons, Replay as Replayed, replay};
 use agv_host_sim::report::Page;
 use agv_host_sim::setting_doubts::doubt;
 use anyhow::{Context, ensure};
@@ -120,54 +121,9 @@ impl Replay {
         let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let Contents { software, mut recording, outputs, publishing, damages } = contents;
-        let is_as_recorded = self.map.is_empty()
-            && self.landmarks.is_empty()
-            && self.start.is_none()
-            && self.vehicle.is_none()
-            && self.settings.is_empty()
-            && !self.relocalisation.is_wanted();
-        self.relocalisation.apply(&mut recording).with_context(|| self.log.display().to_string())?;
-        if let Some(start) = self.start {
-            set_start(&mut recording, start).with_context(|| self.log.display().to_string())?;
-        }
-        self.settings.apply(&mut recording.parameters)?;
-        if let Some(path) = &self.vehicle {
-            let vehicle = VehicleFile::read(path)?;
-            let doubts = vehicle.settings().filter_map(|(name, value)| doubt(name, value));
-            doubts.for_each(|doubt| output::note(&format!("agv: {}: {doubt}", path.display())));
-            let is_tricycle = vehicle.apply(&mut recording.parameters);
-            ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
-        }
-        let mut contours = None;
-        for path in &self.map {
-            if contour_file::is_contour_map(path) {
-                contours = Some(contour_file::read(path)?);
-                continue;
-            }
-            let map = map_file::read(path)?;
-            ensure!(
-                !map.is_empty(),
-                "{}: there are no landmarks in the map; --landmarks none uses none",
-                path.display()
-            );
-            use_map(&mut recording, map);
-        }
-        if !self.landmarks.is_empty() {
-            recording.parameters.maps = self.maps()?;
-        }
-
-        if contours.is_some() {
-            contour_replay::prepare(&mut recording).with_context(|| self.log.display().to_string())?;
-        }
-        let running = progress::bar("replaying", recording.events.len() as u64);
-        let done = |events: usize| running.set_position(events as u64);
-        let replay = match &contours {
-            Some(map) => contour_replay::replay_in(&recording, map, done).map_err(anyhow::Error::from),
-            None => replay(&recording, done).map_err(anyhow::Error::from),
-        }
-        .with_context(|| self.log.display().to_string())?;
-        running.finish_and_clear();
-        let comparisons = if is_as_recorded {
+        let contours = self.prepare(&mut recording)?;
+        let replay = self.replay(&recording, contours.as_ref())?;
+        let comparisons = if self.is_as_recorded() {
             Comparisons::of(&outputs, &publishing, &recording, &replay)
         } else {
             Comparisons::default()
@@ -191,11 +147,76 @@ impl Replay {
         if self.json {
             let summary = DriveSummary::new(&software, &figures, comparisons, &damages);
             println!("{}", serde_json::to_string_pretty(&summary)?);
-            return Ok(());
+        } else {
+            self.print(remarks, &figures);
         }
+        Ok(())
+    }
+
+    /// Whether nothing is changed of what the log says.
+    fn is_as_recorded(&self) -> bool {
+        self.map.is_empty()
+            && self.landmarks.is_empty()
+            && self.start.is_none()
+            && self.vehicle.is_none()
+            && self.settings.is_empty()
+            && !self.relocalisation.is_wanted()
+    }
+
+    /// Changes what the log says to what is wanted. A map of contours is given back.
+    fn prepare(&self, recording: &mut Recording) -> anyhow::Result<Option<ContourMap>> {
+        let of_log = || self.log.display().to_string();
+        self.relocalisation.apply(recording).with_context(of_log)?;
+        if let Some(start) = self.start {
+            set_start(recording, start).with_context(of_log)?;
+        }
+        self.settings.apply(&mut recording.parameters)?;
+        if let Some(path) = &self.vehicle {
+            let vehicle = VehicleFile::read(path)?;
+            let doubts = vehicle.settings().filter_map(|(name, value)| doubt(name, value));
+            doubts.for_each(|doubt| output::note(&format!("agv: {}: {doubt}", path.display())));
+            let is_tricycle = vehicle.apply(&mut recording.parameters);
+            ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
+        }
+        let mut contours = None;
+        for path in &self.map {
+            if contour_file::is_contour_map(path) {
+                contours = Some(contour_file::read(path)?);
+                continue;
+            }
+            let map = map_file::read(path)?;
+            ensure!(
+                !map.is_empty(),
+                "{}: there are no landmarks in the map; --landmarks none uses none",
+                path.display()
+            );
+            use_map(recording, map);
+        }
+        if !self.landmarks.is_empty() {
+            recording.parameters.maps = self.maps()?;
+        }
+        if contours.is_some() {
+            contour_replay::prepare(recording).with_context(of_log)?;
+        }
+        Ok(contours)
+    }
+
+    fn replay(&self, recording: &Recording, contours: Option<&ContourMap>) -> anyhow::Result<Replayed> {
+        let running = progress::bar("replaying", recording.events.len() as u64);
+        let done = |events: usize| running.set_position(events as u64);
+        let replay = match contours {
+            Some(map) => contour_replay::replay_in(recording, map, done).map_err(anyhow::Error::from),
+            None => replay(recording, done).map_err(anyhow::Error::from),
+        }
+        .with_context(|| self.log.display().to_string())?;
+        running.finish_and_clear();
+        Ok(replay)
+    }
+
+    fn print(&self, remarks: Vec<[String; 2]>, figures: &Figures) {
         let mut rows = remarks;
-        rows.extend(figure_rows(&figures));
-        let poor = poor_share(&figures);
+        rows.extend(figure_rows(figures));
+        let poor = poor_share(figures);
         if poor > POOR {
             let next = format!("for {:.0} % of the time; agv check {} says why", 100.0 * poor, self.log.display());
             rows.push(["lost or poor".to_owned(), next]);
@@ -204,7 +225,6 @@ impl Replay {
             rows.push(["report".to_owned(), folder.join("index.html").display().to_string()]);
         }
         output::print_rows(&rows);
-        Ok(())
     }
 
     fn maps(&self) -> anyhow::Result<MapUse> {

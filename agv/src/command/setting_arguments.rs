@@ -1,12 +1,11 @@
 //! Settings on a command line.
 
 use agv_core::localizer::Parameters;
-use agv_settings::leaf::{Leaf, LeafError};
-use agv_settings::{LEAVES, Settings};
+use agv_settings::Settings;
+use agv_settings::leaf::LeafError;
 use anyhow::{Context, bail};
 
-use super::ctl::parse_value;
-use super::settings::show_number;
+use super::setting_text::{named, parse_value, show_number};
 
 /// Options of the commands that take settings.
 #[derive(clap::Args)]
@@ -31,6 +30,7 @@ impl SettingArguments {
     pub fn apply(&self, parameters: &mut Parameters) -> anyhow::Result<()> {
         let mut settings = Settings::of(*parameters);
         self.change(&mut settings)?;
+        settings.parameters.check()?;
         *parameters = settings.parameters;
         Ok(())
     }
@@ -48,14 +48,4 @@ fn change(settings: &mut Settings, text: &str) -> anyhow::Result<()> {
         }
         Err(LeafError::Kind) => bail!("{value} is no value of {name}"),
     }
-}
-
-/// The setting of that name; what comes near it is suggested if there is none.
-pub fn named(name: &str) -> anyhow::Result<&'static Leaf> {
-    Leaf::named(name).with_context(|| {
-        let near = LEAVES.iter().map(|leaf| (strsim::jaro_winkler(leaf.name, name), leaf.name));
-        let nearest = near.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(likeness, _)| *likeness > 0.7);
-        let suggestion = nearest.map_or_else(String::new, |(_, name)| format!("; did you mean {name}?"));
-        format!("there is no setting of the name {name}{suggestion}")
-    })
 }

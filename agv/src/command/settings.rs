@@ -5,8 +5,7 @@ use agv_settings::leaf::{Leaf, Value};
 use agv_settings::{LEAVES, Settings as Defaults};
 use serde_json::json;
 
-use super::ctl;
-use super::setting_arguments::named;
+use super::setting_text::{named, show_number, show_readable as show};
 
 const HELP: &str = "\
 Examples:
@@ -77,23 +76,4 @@ fn entry(leaf: &Leaf, defaults: &Defaults) -> serde_json::Value {
 /// Bounds, if the setting is a number.
 fn bounds(leaf: &Leaf, defaults: &Defaults) -> Option<[f64; 2]> {
     matches!(leaf.get(defaults), Some(Value::Number(_) | Value::Whole(_))).then_some([leaf.bounds.0, leaf.bounds.1])
-}
-
-/// A number with as many digits as people read.
-pub fn show_number(value: f64) -> String {
-    let size = value.abs();
-    let is_plain = value == 0.0 || (1e-3..1e6).contains(&size);
-    if !is_plain {
-        return format!("{value:.6e}").replace("000000e", "e").replace(".e", "e");
-    }
-    let text = format!("{value:.6}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-/// A value as people read it.
-fn show(value: Value) -> String {
-    match value {
-        Value::Number(number) => show_number(number),
-        other => ctl::show(other),
-    }
 }

@@ -2,7 +2,6 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::segment::Segment;
 use crate::geometry::{Pose, Twist};
 
 /// An arc of R: where it ends, and how the end's position changes with the parameters.
@@ -33,12 +32,4 @@ pub(super) fn arc(sine: f64, cosine: f64, offset: f64, turn_scale: f64, wheelbas
     let by_offset = unit * (-wheelbase * turn_scale * across) + by_rotation * (distance * turn_scale * along);
     let by_scale = unit * (wheelbase * along) + by_rotation * (distance * across);
     Arc { position: unit * distance, derivative: Matrix2::from_columns(&[by_offset, by_scale]) }
-}
-
-impl Segment {
-    /// Where R ends, in R at the start, with its derivatives: the arc, and what the nominal integration adds to it.
-    pub(super) fn arc(&self, offset: f64, turn_scale: f64, wheelbase: f64) -> Arc {
-        let arc = arc(self.sine, self.cosine, offset, turn_scale, wheelbase);
-        Arc { position: arc.position + self.bend, ..arc }
-    }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::arc::arc;
+use super::arc::{Arc, arc};
 use crate::geometry::{Pose, wrap};
 use crate::measurement::EncoderSample;
 use crate::odometry::{Control, Integration, Tricycle};
@@ -36,6 +36,12 @@ impl Segment {
         [self.sine, self.cosine, self.bend.x, self.bend.y, self.sensor.x, self.sensor.y, self.rotation]
             .iter()
             .all(|value| value.is_finite())
+    }
+
+    /// Where R ends, in R at the start, with its derivatives: the arc, and what the nominal integration adds to it.
+    pub(super) fn arc(&self, offset: f64, turn_scale: f64, wheelbase: f64) -> Arc {
+        let arc = arc(self.sine, self.cosine, offset, turn_scale, wheelbase);
+        Arc { position: arc.position + self.bend, ..arc }
     }
 
     /// The rotation that the encoders claim, rad (K 2.8), for an offset (rad) and a turn scale (rad for a tick).

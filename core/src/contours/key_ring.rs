@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::{PackedPoint, SurfacePoint};
 use crate::geometry::{Pose, difference};
 
-/// A scan of the way behind.
+/// A scan of the distance behind.
 #[derive(Clone, Debug)]
 pub struct KeyScan<const POINTS: usize> {
     /// Pose of the laser.

@@ -1,4 +1,4 @@
-//! Where a laser is by the surfaces of the way behind.
+//! Where a laser is by the surfaces of the distance behind.
 
 use heapless::Vec;
 use nalgebra::Matrix3;

@@ -1,4 +1,4 @@
-//! Localising by contours: surfaces of the way behind, or of a map, that scans are matched to.
+//! Localising by contours: surfaces of the distance behind, or of a map, that scans are matched to.
 //!
 //! A scan becomes points of surfaces ([`find_surface_points`]); those of the last key scans ([`KeyRing`]) make a map of the
 //! surroundings ([`Submap`]) in which a scan is first looked for ([`search`]) and then laid onto the surfaces ([`refine`]).

@@ -27,11 +27,11 @@ impl Prediction {
     /// The pose behind a step of the odometry from a known pose.
     #[must_use]
     pub fn by_odometry(before: &Pose, step: &Pose) -> Self {
-        let way = libm::hypot(step.x, step.y);
+        let distance = libm::hypot(step.x, step.y);
         Self {
             pose: before.compose(step),
-            position_deviation: POSITION * libm::sqrt(way),
-            heading_deviation: libm::hypot(HEADING * libm::sqrt(way), TURN * step.theta),
+            position_deviation: POSITION * libm::sqrt(distance),
+            heading_deviation: libm::hypot(HEADING * libm::sqrt(distance), TURN * step.theta),
         }
     }
 

@@ -12,7 +12,7 @@ use super::biases::{BiasModel, SCALE, STEERING, YAW};
 use super::cholesky::Root;
 use super::observation::{Believed, Viewpoint};
 use super::positive_semidefinite::make_positive_semidefinite;
-use super::slots::{PoseOnly, Slots, Storage, pose_state, slot_states};
+use super::slots::{PastPose, PoseOnly, Slots, StateLandmark, Storage, pose_state, slot_states};
 use super::{Linearisation, Observation, PackedCovariance};
 use crate::geometry::{Point, Pose, larger_axis, wrap};
 use crate::measurement::LaserId;
@@ -25,8 +25,8 @@ pub struct Ekf<S: Slots = PoseOnly> {
     pub pose: Pose,
     pub(super) anchor: S::Anchor,
     pub(super) biases: S::Biases,
-    pub(super) poses: S::Poses,
-    pub(super) landmarks: S::Landmarks,
+    pub(super) poses: S::PerPose<Option<PastPose>>,
+    pub(super) landmarks: S::PerLandmark<Option<StateLandmark>>,
     pub(super) covariance: PackedCovariance<S>,
 }
 
@@ -126,10 +126,10 @@ impl<S: Slots> Ekf<S> {
     pub fn empty() -> Self {
         Self {
             pose: Pose { x: 0.0, y: 0.0, theta: 0.0 },
-            anchor: S::Anchor::filled(Point::new(0.0, 0.0)),
-            biases: S::Biases::filled(0.0),
-            poses: S::Poses::filled(None),
-            landmarks: S::Landmarks::filled(None),
+            anchor: S::Anchor::empty(),
+            biases: S::Biases::empty(),
+            poses: S::PerPose::empty(),
+            landmarks: S::PerLandmark::empty(),
             covariance: PackedCovariance::zero(),
         }
     }

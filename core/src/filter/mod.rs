@@ -22,5 +22,5 @@ pub use observation::{Observation, Viewpoint};
 pub use packed_covariance::PackedCovariance;
 pub use range_bearing::RangeBearing;
 pub use relative_pose::RelativePose;
-pub use slots::{PoseAndSlots, PoseOnly, Slots, Storage, packed_entries, slot_states};
+pub use slots::{Empty, PoseAndSlots, PoseOnly, Slots, Storage, packed_entries, slot_states};
 pub use timeline::{Correction, Timeline, TimelineError};

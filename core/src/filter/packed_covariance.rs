@@ -18,7 +18,7 @@ impl<S: Slots> PackedCovariance<S> {
     #[must_use]
     #[inline(always)]
     pub fn zero() -> Self {
-        Self { entries: S::Covariance::filled(0.0) }
+        Self { entries: S::Covariance::empty() }
     }
 
     /// Covariance of two states; zero if one of them does not exist.
@@ -45,7 +45,7 @@ impl<S: Slots> PackedCovariance<S> {
     /// out.
     #[must_use]
     pub fn cross<const SIZE: usize>(&self, observation: &Linearisation<SIZE>, count: usize) -> S::Rows<SIZE> {
-        let mut rows = S::Rows::<SIZE>::filled(SVector::zeros());
+        let mut rows = S::Rows::<SIZE>::empty();
         let cross = rows.as_mut();
         let [by_x, by_y, by_heading] = &observation.by_pose;
         for (other, sum) in cross.iter_mut().enumerate().take(count) {

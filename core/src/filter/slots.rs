@@ -2,20 +2,38 @@
 
 use core::fmt::Debug;
 
-use nalgebra::SVector;
+use nalgebra::{ArrayStorage, SVector};
 
 use crate::geometry::{Point, Pose};
 
-/// Memory for a number of values that is known when it is compiled.
-pub trait Storage<T>: Clone + Debug + AsRef<[T]> + AsMut<[T]> {
-    /// Memory with the same value everywhere.
-    fn filled(value: T) -> Self;
+/// A value with which memory begins.
+pub trait Empty: Clone + Debug {
+    /// It says nothing.
+    const EMPTY: Self;
 }
 
-impl<T: Copy + Debug, const SIZE: usize> Storage<T> for [T; SIZE] {
+impl Empty for f64 {
+    const EMPTY: Self = 0.0;
+}
+
+impl<T: Clone + Debug> Empty for Option<T> {
+    const EMPTY: Self = None;
+}
+
+impl<const SIZE: usize> Empty for SVector<f64, SIZE> {
+    const EMPTY: Self = Self::from_array_storage(ArrayStorage([[0.0; SIZE]]));
+}
+
+/// Memory for a number of values that is known when it is compiled.
+pub trait Storage<T>: Clone + Debug + AsRef<[T]> + AsMut<[T]> {
+    /// Memory in which nothing is yet.
+    fn empty() -> Self;
+}
+
+impl<T: Empty, const SIZE: usize> Storage<T> for [T; SIZE] {
     #[inline(always)]
-    fn filled(value: T) -> Self {
-        [value; SIZE]
+    fn empty() -> Self {
+        [const { T::EMPTY }; SIZE]
     }
 }
 
@@ -41,10 +59,10 @@ pub struct StateLandmark {
 pub trait Slots: Clone + Debug {
     /// Scale and steering of the odometry, yaw of the laser: three numbers, or none.
     type Biases: Storage<f64>;
-    /// Past poses.
-    type Poses: Storage<Option<PastPose>>;
-    /// Landmarks that are found, or seen again, while driving.
-    type Landmarks: Storage<Option<StateLandmark>>;
+    /// One value for each past pose.
+    type PerPose<T: Empty>: Storage<T>;
+    /// One value for each landmark that is found, or seen again, while driving.
+    type PerLandmark<T: Empty>: Storage<T>;
     /// Position of the pose for the Jacobians: one, or none if it is that of the pose.
     type Anchor: Storage<Point>;
     /// Lower triangle of the covariance.
@@ -61,8 +79,8 @@ pub struct PoseOnly;
 
 impl Slots for PoseOnly {
     type Biases = [f64; 0];
-    type Poses = [Option<PastPose>; 0];
-    type Landmarks = [Option<StateLandmark>; 0];
+    type PerPose<T: Empty> = [T; 0];
+    type PerLandmark<T: Empty> = [T; 0];
     type Anchor = [Point; 0];
     type Covariance = [f64; 6];
     type Rows<const SIZE: usize> = [SVector<f64, SIZE>; 3];
@@ -78,8 +96,8 @@ impl<const POSES: usize, const LANDMARKS: usize, const STATES: usize, const ENTR
     for PoseAndSlots<POSES, LANDMARKS, STATES, ENTRIES>
 {
     type Biases = [f64; 3];
-    type Poses = [Option<PastPose>; POSES];
-    type Landmarks = [Option<StateLandmark>; LANDMARKS];
+    type PerPose<T: Empty> = [T; POSES];
+    type PerLandmark<T: Empty> = [T; LANDMARKS];
     type Anchor = [Point; 1];
     type Covariance = [f64; ENTRIES];
     type Rows<const SIZE: usize> = [SVector<f64, SIZE>; STATES];

@@ -194,7 +194,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     /// The state at the newest entry.
     #[must_use]
     pub fn state(&mut self) -> Ekf {
-        self.settle(self.entries.len());
+        self.repropagate(self.entries.len());
         self.entries.back().map_or(Ekf::new(Pose::default(), 0.0, 0.0), |entry| entry.state)
     }
 
@@ -261,7 +261,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     /// See [`TimelineError`].
     pub fn state_at(&mut self, time: Time) -> Result<Ekf, TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
-        self.settle(position + 1);
+        self.repropagate(position + 1);
         let before = self.entries.get(position).ok_or(TimelineError::TooLate)?;
         if before.time() == time {
             return Ok(before.state);
@@ -285,7 +285,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         correct: impl FnOnce(&mut Ekf) -> Option<Correction>,
     ) -> Result<bool, TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
-        self.settle(position + 1);
+        self.repropagate(position + 1);
         let mut state = self.entries.get(position).ok_or(TimelineError::TooLate)?.state;
         let parts = self.motion_to(position, time)?;
         state.predict(&parts.0);
@@ -303,7 +303,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     pub fn set_state(&mut self, time: Time, state: Ekf) -> Result<(), TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         let parts = self.motion_to(position, time)?;
-        self.settle(position + 1);
+        self.repropagate(position + 1);
         self.divide(position, &parts, Fusion::Given, &state);
         Ok(())
     }
@@ -381,7 +381,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     }
 
     fn append(&mut self, motion: &Motion) {
-        self.settle(self.entries.len());
+        self.repropagate(self.entries.len());
         self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
         if let Some(last) = self.joinable(motion) {
             last.motion = last.motion.then(motion);
@@ -442,7 +442,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
     }
 
     /// Brings the states of the first `count` entries up to date.
-    fn settle(&mut self, count: usize) {
+    fn repropagate(&mut self, count: usize) {
         let first = self.settled.max(1);
         if count <= first {
             return;

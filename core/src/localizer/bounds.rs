@@ -37,13 +37,17 @@ const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     }
 }
 
+/// The distance of the axles, of the vehicles that have one.
+const fn wheelbase(parameters: &Parameters) -> Option<f64> {
+    match &parameters.vehicle {
+        Vehicle::Tricycle(tricycle) => Some(tricycle.wheelbase),
+        Vehicle::Ackermann(car) => Some(car.wheelbase),
+        Vehicle::Increments | Vehicle::Wheels(_) => None,
+    }
+}
+
 const BOUNDS: [Bound; 52] = [
-    Bound {
-        leaf: "vehicle.wheelbase",
-        least: 0.05,
-        most: 50.0,
-        get: |parameters| Some(tricycle(parameters)?.wheelbase),
-    },
+    Bound { leaf: "vehicle.wheelbase", least: 0.05, most: 50.0, get: wheelbase },
     Bound {
         leaf: "vehicle.drive_scale",
         least: -1.0,
@@ -323,6 +327,14 @@ impl Parameters {
             let is_within = (bound.get)(self).is_none_or(|value| (bound.least..=bound.most).contains(&value));
             if !is_within {
                 return Err(ParameterError { leaf: bound.leaf });
+            }
+        }
+        for (_, mount) in self.lasers.iter() {
+            let numbers = [("laser.x", mount.x), ("laser.y", mount.y), ("laser.theta", mount.theta)];
+            let is_within =
+                |leaf: &str, value: f64| bounds(leaf).is_none_or(|(least, most)| (least..=most).contains(&value));
+            if let Some((leaf, _)) = numbers.into_iter().find(|(leaf, value)| !is_within(leaf, *value)) {
+                return Err(ParameterError { leaf });
             }
         }
         let scales = tricycle(self).map(|tricycle| {

@@ -1,10 +1,59 @@
 //! How much a localiser has room for.
 
+use core::fmt::Debug;
+
 use serde::{Deserialize, Serialize};
+
+use crate::filter::{PoseAndSlots, Slots, packed_entries, slot_states};
+use crate::sources::{FeatureFinder, FindFeatures, LandmarkMaps, Maps};
+
+/// The memory of a localiser. [`CapacitiesOf`] makes it of numbers.
+pub trait Capacities: Clone + Debug {
+    /// State of the filter.
+    type Slots: Slots;
+    /// Landmarks that are compared with what is seen.
+    type Maps: LandmarkMaps;
+    /// Points of a scan, and what finds features in them.
+    type Features: FindFeatures;
+}
+
+/// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, `DYNAMIC` landmarks that are
+/// found while driving, and in the filter's state for `S`.
+#[derive(Clone, Copy, Debug)]
+pub struct CapacitiesOf<
+    const BEAMS: usize,
+    const REFLECTORS: usize,
+    const FEATURES: usize,
+    const DYNAMIC: usize,
+    S = SlamSlots,
+>(core::marker::PhantomData<S>);
+
+impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, S: Slots> Capacities
+    for CapacitiesOf<BEAMS, REFLECTORS, FEATURES, DYNAMIC, S>
+{
+    type Slots = S;
+    type Maps = Maps<REFLECTORS, FEATURES, DYNAMIC>;
+    type Features = FeatureFinder<BEAMS>;
+}
+
+const SLAM_STATES: usize = slot_states(4, 64);
+
+/// The state of a filter with 4 past poses, which have key scans, and 64 landmarks.
+pub type SlamSlots = PoseAndSlots<4, 64, SLAM_STATES, { packed_entries(SLAM_STATES) }>;
+
+/// The state of a filter with biases only.
+pub type NoSlots = PoseAndSlots<0, 0, { slot_states(0, 0) }, { packed_entries(slot_states(0, 0)) }>;
+
+/// The usual room: 1440 beams, 1000 reflectors and 1000 features of fixed maps, 256 landmarks found while driving, and the
+/// map in the state.
+pub type SlamCapacities = CapacitiesOf<1440, 1000, 1000, 256>;
+
+/// The same without a map in the state: [`super::Parameters::maps`] must not ask for one.
+pub type VehicleCapacities = CapacitiesOf<1440, 1000, 1000, 256, NoSlots>;
 
 /// How much a localiser has room for, as the log of its vehicle states it. One of another size may answer differently.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Capacities {
+pub struct StatedCapacities {
     /// Landmarks of the fixed maps, reflectors and features together.
     pub landmarks: u32,
     /// Beams of a scan.

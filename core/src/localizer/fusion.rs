@@ -1,30 +1,26 @@
 //! Fusing what is seen, each sighting at its own time or all at the filter's.
 
-use super::Localizer;
 use super::evidence::Evidence;
+use super::{Capacities, Localizer, Parameters};
+use crate::geometry::Pose;
 use crate::maps::{LandmarkKind, Verdict};
-use crate::measurement::Time;
-use crate::sources::{LandmarkSlots, Outcome, correct};
+use crate::measurement::{Scan, Time};
+use crate::sources::{FindFeatures, LandmarkMaps, MapViews, Outcome, correct};
 use crate::state::LandmarkSource;
 
-impl<
-    const BEAMS: usize,
-    const REFLECTORS: usize,
-    const FEATURES: usize,
-    const DYNAMIC: usize,
-    const KEYS: usize,
-    const LANDMARKS: usize,
-    const STATES: usize,
-    const ENTRIES: usize,
-> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
-{
+impl<C: Capacities> Localizer<C> {
     /// Fuses the sightings of the workspace: each at its own time, or, with landmarks in the state, all at the time of the
     /// filter, moved there by the path of the workspace, which begins at `start`.
     pub(super) fn fuse(&mut self, start: Time) {
         let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none()) else {
             return;
         };
-        let (believed, maps) = (self.parameters.believed(), &self.maps);
+        let believed = self.parameters.believed();
+        let maps = MapViews {
+            reflectors: self.maps.reflectors(),
+            features: self.maps.features(),
+            dynamic: self.maps.dynamic(),
+        };
         let has_slots = believed.maps.slam;
         // With slots a vehicle without a map of reflectors finds them on its way.
         let are_reflectors_expected = !has_slots || !maps.reflectors.landmarks().is_empty();
@@ -34,13 +30,13 @@ impl<
             let outcome = if has_slots {
                 let moved = sighting.moved(&self.workspace.path, start, self.slam.time());
                 let (filter, slots) = self.slam.parts();
-                correct(filter, Some(slots), maps, &moved, believed).0
+                correct(filter, Some(slots), &maps, &moved, believed).0
             } else {
                 let mut outcome = Outcome::OUT_OF_TIME;
                 // What finds no place in the past is out of time.
                 let _ = timeline.fuse(sighting.time, |state| {
                     let correction;
-                    (outcome, correction) = correct(state, None::<&mut LandmarkSlots<0>>, maps, sighting, believed);
+                    (outcome, correction) = correct(state, None, &maps, sighting, believed);
                     correction
                 });
                 outcome
@@ -56,6 +52,12 @@ impl<
         if has_slots {
             self.discover(start, are_reflectors_expected);
         }
+    }
+
+    /// Finds the natural features of a scan.
+    pub(super) fn find_features(&mut self, mount: &Pose, scan: &Scan) {
+        let Parameters { features, sources, .. } = &self.parameters;
+        self.outputs.has_cut |= self.features.find(&mut self.workspace, features, sources, mount, scan);
     }
 
     /// Tells that the sightings of the workspace are neither for nor against the pose.
@@ -86,17 +88,12 @@ impl<
         let Some(timeline) = self.timeline.begun_mut().filter(|_| is_wanted) else {
             return;
         };
-        for sighting in &self.workspace.sightings {
-            let Ok(state) = timeline.state_at(sighting.time) else {
-                continue;
-            };
-            let position = sighting.observation.locate(&state.pose, &sighting.mount);
-            match (sighting.matched, sighting.verdict) {
-                (Some(id), _) => self.maps.dynamic.update(id, position),
-                (None, Verdict::Unknown | Verdict::Gated) => self.maps.dynamic.insert(sighting.kind, position),
-                _ => {}
+        self.maps.find(self.workspace.sightings.iter().filter_map(|sighting| {
+            if sighting.matched.is_none() && !matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
+                return None;
             }
-        }
-        self.maps.dynamic.finish();
+            let state = timeline.state_at(sighting.time).ok()?;
+            Some((sighting.kind, sighting.observation.locate(&state.pose, &sighting.mount), sighting.matched))
+        }));
     }
 }

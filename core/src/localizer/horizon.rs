@@ -1,20 +1,11 @@
 //! With landmarks or past poses in the state the filter stands a little in the past: at the middle of what it has used last.
 
-use super::Localizer;
+use super::{Capacities, Localizer};
 use crate::geometry::Pose;
 use crate::measurement::{LaserId, Scan, Time};
+use crate::sources::FindFeatures;
 
-impl<
-    const BEAMS: usize,
-    const REFLECTORS: usize,
-    const FEATURES: usize,
-    const DYNAMIC: usize,
-    const KEYS: usize,
-    const LANDMARKS: usize,
-    const STATES: usize,
-    const ENTRIES: usize,
-> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
-{
+impl<C: Capacities> Localizer<C> {
     /// Fuses the reflectors of the workspace that came without a scan.
     pub(super) fn fuse_lone_reflectors_by_slam(&mut self, mount: &Pose) {
         let sightings = &self.workspace.sightings;
@@ -40,8 +31,7 @@ impl<
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
     pub(super) fn fuse_scan_by_slam(&mut self, mount: &Pose, scan: &Scan) {
-        self.outputs.has_cut |=
-            self.workspace.see_features(&self.parameters.features, &self.parameters.sources, mount, scan);
+        self.find_features(mount, scan);
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }
@@ -54,12 +44,12 @@ impl<
         if is_aligned {
             let status = &mut self.outputs.sources.key_scans;
             status.begin(self.slam.time());
-            self.slam.align(&self.workspace.points, &place, &self.parameters, status);
+            self.slam.align(self.features.points(), &place, &self.parameters, status);
         }
         self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
         if is_aligned {
-            self.slam.keep(&self.workspace.points, &place, &self.parameters);
+            self.slam.keep(self.features.points(), &place, &self.parameters);
         }
         self.end_slam();
     }

@@ -3,44 +3,37 @@
 use heapless::Vec;
 
 use super::evidence::DistanceSince;
-use super::slam::{SLAM_ENTRIES, SLAM_STATES, Slam};
+use super::slam::Slam;
 use super::supervisor::{Support, supervise};
-use super::{Capacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason};
+use super::{
+    Capacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason, SlamCapacities,
+    StatedCapacities,
+};
 use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::separation::SolutionSeparation;
 use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, is_sure};
-use crate::maps::{DynamicLandmark, DynamicMap, FixedMap, Landmark, LandmarkKind, MapError, MapView, Verdict};
+use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
 use crate::odometry::{Coasting, Motion, OdometryBias, OdometryError, VehicleOdometer};
-use crate::sensing::{PointScan, SensorPath, detect_reflectors, falko};
-use crate::sources::{Aid, AidOutcome, Maps, Source, Statuses, Workspace, correct_by_aid, see_reflectors};
+use crate::sensing::detect_reflectors;
+use crate::sources::{
+    Aid, AidOutcome, FindFeatures, LandmarkMaps, Source, Statuses, Workspace, correct_by_aid, see_reflectors,
+};
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
 
 /// Localises one vehicle. All of its memory is in this value.
 ///
-/// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, and `DYNAMIC` landmarks
-/// that are found while driving; in the filter's state for `KEYS` past poses and `LANDMARKS` landmarks, which make `STATES`
-/// states and `ENTRIES` entries of their covariance ([`crate::filter::slot_states`],
-/// [`crate::filter::packed_entries`]).
+/// `C` says how much it has room for.
 #[derive(Clone, Debug)]
-pub struct Localizer<
-    const BEAMS: usize = 1440,
-    const REFLECTORS: usize = 1000,
-    const FEATURES: usize = 1000,
-    const DYNAMIC: usize = 256,
-    const KEYS: usize = 4,
-    const LANDMARKS: usize = 64,
-    const STATES: usize = SLAM_STATES,
-    const ENTRIES: usize = SLAM_ENTRIES,
-> {
+pub struct Localizer<C: Capacities = SlamCapacities> {
     pub(super) parameters: Parameters,
     pub(super) odometer: VehicleOdometer,
-    pub(super) maps: Maps<REFLECTORS, FEATURES, DYNAMIC>,
+    pub(super) maps: C::Maps,
     pub(super) timeline: Timeline<PAST>,
-    pub(super) slam: Slam<KEYS, LANDMARKS, STATES, ENTRIES>,
+    pub(super) slam: Slam<C::Slots>,
     pub(super) integrity: Integrity,
     pub(super) separation: SolutionSeparation,
     pub(super) lost: Option<Reason>,
@@ -48,7 +41,8 @@ pub struct Localizer<
     /// Samples of the odometry in a row that were not later than the one before.
     repeated: u8,
     pub(super) distance: DistanceSince,
-    pub(super) workspace: Workspace<BEAMS>,
+    pub(super) features: C::Features,
+    pub(super) workspace: Workspace,
     pub(super) outputs: Outputs,
 }
 
@@ -73,20 +67,10 @@ const LONGEST_LEAD: f64 = 0.5;
 /// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
 const LONGEST_BRIDGE: f64 = 1.0;
 
-impl<
-    const BEAMS: usize,
-    const REFLECTORS: usize,
-    const FEATURES: usize,
-    const DYNAMIC: usize,
-    const KEYS: usize,
-    const LANDMARKS: usize,
-    const STATES: usize,
-    const ENTRIES: usize,
-> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
-{
+impl<C: Capacities> Localizer<C> {
     /// How much it has room for.
-    pub const CAPACITIES: Capacities =
-        Capacities { landmarks: (REFLECTORS + FEATURES) as u32, beams: BEAMS as u32, history: PAST as u32 };
+    pub const CAPACITIES: StatedCapacities =
+        StatedCapacities { landmarks: C::Maps::FIXED as u32, beams: C::Features::BEAMS as u32, history: PAST as u32 };
 
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
@@ -110,11 +94,7 @@ impl<
         };
         Self {
             odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
-            maps: Maps {
-                reflectors: FixedMap::new(),
-                features: FixedMap::new(),
-                dynamic: DynamicMap::new(parameters.dynamic_map),
-            },
+            maps: C::Maps::new(parameters.dynamic_map),
             timeline: Timeline::new(parameters.limits.longest_extrapolation),
             slam: Slam::new(),
             integrity: Integrity::new(parameters.consistency),
@@ -123,14 +103,8 @@ impl<
             outage: None,
             repeated: 0,
             distance: DistanceSince::NEVER,
-            workspace: Workspace {
-                points: PointScan::new(),
-                path: SensorPath::default(),
-                detector: falko::Detector::new(parameters.features.detector),
-                keypoints: Vec::new(),
-                reflectors: Vec::new(),
-                sightings: Vec::new(),
-            },
+            features: C::Features::new(parameters.features.detector),
+            workspace: Workspace::default(),
             outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
         }
@@ -141,21 +115,7 @@ impl<
     /// # Errors
     /// [`MapError`] if a landmark does not fit; those before it are in the map.
     pub fn add_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
-        let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
-        // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
-        let mut rest = landmarks;
-        while let Some(first) = rest.first() {
-            let are_reflectors = is_reflector(first);
-            let length = rest.iter().take_while(|landmark| is_reflector(landmark) == are_reflectors).count();
-            let Some((run, others)) = rest.split_at_checked(length) else { break };
-            if are_reflectors {
-                self.maps.reflectors.extend(run)?;
-            } else {
-                self.maps.features.extend(run)?;
-            }
-            rest = others;
-        }
-        Ok(())
+        self.maps.add(landmarks)
     }
 
     /// Replaces all landmarks of the fixed maps, also while the vehicle drives: what is seen next is compared with the new
@@ -164,17 +124,9 @@ impl<
     /// # Errors
     /// [`MapError`] if the landmarks do not fit; the maps are as before then.
     pub fn replace_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
-        if !landmarks.iter().all(Landmark::is_finite) {
-            return Err(MapError::NotFinite);
-        }
-        let reflectors = landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector).count();
-        if reflectors > REFLECTORS || landmarks.len() - reflectors > FEATURES {
-            return Err(MapError::Full);
-        }
-        self.maps.reflectors.clear();
-        self.maps.features.clear();
+        self.maps.replace(landmarks)?;
         self.slam.forget_given();
-        self.add_landmarks(landmarks)
+        Ok(())
     }
 
     /// What the localiser believes of its vehicle and its sensors.
@@ -186,13 +138,13 @@ impl<
     /// The landmarks that were found while driving.
     #[must_use]
     pub fn dynamic_landmarks(&self) -> &[DynamicLandmark] {
-        self.maps.dynamic.landmarks()
+        self.maps.found()
     }
 
     /// The map of the reflectors.
     #[must_use]
     pub fn reflectors(&self) -> MapView<'_> {
-        self.maps.reflectors.view()
+        self.maps.reflectors()
     }
 
     /// The landmarks in the state of the filter, those too that were given: kind and position in W, m.
@@ -383,7 +335,7 @@ impl<
             .motions(fix.time, self.timeline.now())
             .fold(0.0, |distance, motion| distance + motion.distance);
         self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
-        self.maps.dynamic.clear();
+        self.maps.forget_found();
         self.count_given_pose();
     }
 
@@ -581,8 +533,7 @@ impl<
         if maps.slam {
             self.fuse_scan_by_slam(&mount, scan);
         } else if maps.features || maps.dynamic {
-            self.outputs.has_cut |=
-                self.workspace.see_features(&self.parameters.features, &self.parameters.sources, &mount, scan);
+            self.find_features(&mount, scan);
             self.fuse(scan.start);
             self.update_dynamic_map();
         }
@@ -633,17 +584,7 @@ impl<
     }
 }
 
-impl<
-    const BEAMS: usize,
-    const REFLECTORS: usize,
-    const FEATURES: usize,
-    const DYNAMIC: usize,
-    const KEYS: usize,
-    const LANDMARKS: usize,
-    const STATES: usize,
-    const ENTRIES: usize,
-> Localize for Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
-{
+impl<C: Capacities> Localize for Localizer<C> {
     fn handle(&mut self, event: &Event) -> &Outputs {
         self.handle(event)
     }

@@ -19,7 +19,7 @@ mod start_search;
 mod supervisor;
 
 pub use bounds::{ParameterError, bounds};
-pub use capacities::Capacities;
+pub use capacities::{Capacities, CapacitiesOf, SlamCapacities, StatedCapacities, VehicleCapacities};
 pub use event::{AnyEvent, AsReflectors, AsScan, Event, kind};
 pub use lasers::Lasers;
 pub use localize::Localize;
@@ -28,7 +28,6 @@ pub use output::{Misuse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{Limits, Parameters};
 
-pub use slam::{SLAM_ENTRIES, SLAM_STATES};
 pub use start_finder::{StartFinder, StartState};
 pub use start_search::{EFFORT_A_REVOLUTION, StartSearch};
 

@@ -2,25 +2,16 @@
 
 use nalgebra::Matrix2;
 
-use super::Localizer;
+use super::{Capacities, Localizer};
 use crate::filter::RangeBearing;
 use crate::geometry::Point;
 use crate::integrity::separation::{LandmarkKey, Laser, Seen};
 use crate::maps::{Landmark, LandmarkKind, Verdict};
 use crate::measurement::{LaserId, Time};
+use crate::sources::LandmarkMaps;
 use crate::state::{LandmarkSource, LandmarkUse};
 
-impl<
-    const BEAMS: usize,
-    const REFLECTORS: usize,
-    const FEATURES: usize,
-    const DYNAMIC: usize,
-    const KEYS: usize,
-    const LANDMARKS: usize,
-    const STATES: usize,
-    const ENTRIES: usize,
-> Localizer<BEAMS, REFLECTORS, FEATURES, DYNAMIC, KEYS, LANDMARKS, STATES, ENTRIES>
-{
+impl<C: Capacities> Localizer<C> {
     /// Tells the solutions what the event has seen, at the time of the newest motion. Of two lasers the first one is judged; what
     /// the other has corrected is part of the separation.
     #[inline(never)]
@@ -84,7 +75,7 @@ impl<
     }
 
     fn has_reflectors(&self) -> bool {
-        !self.maps.reflectors.landmarks().is_empty()
+        !self.maps.reflectors().landmarks().is_empty()
     }
 
     /// The landmark of a fixed map that something was compared with.
@@ -93,9 +84,9 @@ impl<
         let association = &self.parameters.association;
         let is_it = |landmark: &&Landmark| landmark.id == id && landmark.kind == seen.kind;
         if seen.kind == LandmarkKind::Reflector {
-            self.maps.reflectors.near(at, association.reflector_radius).find(is_it).copied()
+            self.maps.reflectors().near(at, association.reflector_radius).find(is_it).copied()
         } else {
-            self.maps.features.near(at, association.feature_radius).find(is_it).copied()
+            self.maps.features().near(at, association.feature_radius).find(is_it).copied()
         }
     }
 

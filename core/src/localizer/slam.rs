@@ -5,38 +5,27 @@
 //! states, so that seeing one often does not make its place certain.
 
 use super::Parameters;
-use crate::filter::{BiasModel, Ekf, PoseAndSlots, Timeline, packed_entries, slot_states};
+use crate::filter::{BiasModel, Ekf, Slots, Timeline};
 use crate::geometry::{Point, Pose, difference};
 use crate::maps::LandmarkKind;
 use crate::measurement::Time;
 use crate::odometry::OdometryBias;
-use crate::sensing::PointScan;
+use crate::sensing::PointView;
 use crate::sources::{Believed, Comparison, KeyScans, LandmarkSlots, Sighting, SlamParameters, SourceStatus};
-
-/// A filter with room for past poses and landmarks.
-pub(super) type Filter<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize> =
-    Ekf<PoseAndSlots<KEYS, LANDMARKS, STATES, ENTRIES>>;
-
-/// States of a filter with the usual room: 4 key scans and 64 landmarks.
-pub const SLAM_STATES: usize = slot_states(4, 64);
-/// Entries of its covariance.
-pub const SLAM_ENTRIES: usize = packed_entries(SLAM_STATES);
 
 /// The map in the state.
 #[derive(Clone, Debug)]
-pub(super) struct Slam<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize> {
-    filter: Filter<KEYS, LANDMARKS, STATES, ENTRIES>,
-    slots: LandmarkSlots<LANDMARKS>,
-    key_scans: KeyScans<KEYS>,
+pub(super) struct Slam<S: Slots> {
+    filter: Ekf<S>,
+    slots: LandmarkSlots<S>,
+    key_scans: KeyScans<S>,
     /// Time at which the filter stands.
     time: Time,
     /// Where the vehicle was when it came to the present place, and how many scans have been used there.
     place: (Pose, u16),
 }
 
-impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRIES: usize>
-    Slam<KEYS, LANDMARKS, STATES, ENTRIES>
-{
+impl<S: Slots> Slam<S> {
     #[inline(always)]
     pub(super) fn new() -> Self {
         Self {
@@ -116,7 +105,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// The filter and what is known of its landmarks.
-    pub(super) fn parts(&mut self) -> (&mut Filter<KEYS, LANDMARKS, STATES, ENTRIES>, &mut LandmarkSlots<LANDMARKS>) {
+    pub(super) fn parts(&mut self) -> (&mut Ekf<S>, &mut LandmarkSlots<S>) {
         (&mut self.filter, &mut self.slots)
     }
 
@@ -153,9 +142,9 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// Aligns a scan of the first laser to the key scans; S is at `place` in the frame of its points.
-    pub(super) fn align<const BEAMS: usize>(
+    pub(super) fn align(
         &mut self,
-        points: &PointScan<BEAMS>,
+        points: PointView<'_>,
         place: &Pose,
         parameters: &Parameters,
         status: &mut SourceStatus,
@@ -165,12 +154,7 @@ impl<const KEYS: usize, const LANDMARKS: usize, const STATES: usize, const ENTRI
     }
 
     /// Makes a scan a key scan if it is time for one; to be called when all that it tells has been used.
-    pub(super) fn keep<const BEAMS: usize>(
-        &mut self,
-        points: &PointScan<BEAMS>,
-        place: &Pose,
-        parameters: &Parameters,
-    ) {
+    pub(super) fn keep(&mut self, points: PointView<'_>, place: &Pose, parameters: &Parameters) {
         self.key_scans.keep(&mut self.filter, points, place, &parameters.slam.key_scans);
     }
 }

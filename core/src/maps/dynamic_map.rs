@@ -52,6 +52,24 @@ pub struct DynamicMap<const LANDMARKS: usize> {
     next_id: u16,
 }
 
+/// A [`DynamicMap`] of any capacity.
+#[derive(Clone, Copy, Debug)]
+pub struct DynamicMapView<'a> {
+    landmarks: &'a [DynamicLandmark],
+    least_hits: u16,
+}
+
+impl<'a> DynamicMapView<'a> {
+    /// The landmarks within `radius` (m) of `point` that have been seen often enough to count.
+    #[inline]
+    pub fn near(self, point: Point, radius: f64) -> impl Iterator<Item = &'a DynamicLandmark> {
+        self.landmarks.iter().filter(move |landmark| {
+            landmark.hits >= self.least_hits
+                && libm::hypot(landmark.position.x - point.x, landmark.position.y - point.y) <= radius
+        })
+    }
+}
+
 impl<const LANDMARKS: usize> DynamicMap<LANDMARKS> {
     /// An empty map.
     #[must_use]
@@ -65,12 +83,16 @@ impl<const LANDMARKS: usize> DynamicMap<LANDMARKS> {
         &self.landmarks
     }
 
-    /// The landmarks within `radius` (m) of `point` that have been seen often enough to count.
+    /// The map without its capacity.
+    #[must_use]
+    #[inline]
+    pub fn view(&self) -> DynamicMapView<'_> {
+        DynamicMapView { landmarks: &self.landmarks, least_hits: self.parameters.least_hits }
+    }
+
+    /// See [`DynamicMapView::near`].
     pub fn near(&self, point: Point, radius: f64) -> impl Iterator<Item = &DynamicLandmark> {
-        self.landmarks.iter().filter(move |landmark| {
-            landmark.hits >= self.parameters.least_hits
-                && libm::hypot(landmark.position.x - point.x, landmark.position.y - point.y) <= radius
-        })
+        self.view().near(point, radius)
     }
 
     /// Forgets everything.

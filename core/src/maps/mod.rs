@@ -7,7 +7,7 @@ mod grid;
 mod landmark;
 
 pub use association::{Match, NearestNeighbour, Verdict};
-pub use dynamic_map::{DynamicLandmark, DynamicMap, DynamicMapParameters};
+pub use dynamic_map::{DynamicLandmark, DynamicMap, DynamicMapParameters, DynamicMapView};
 pub use fixed_map::{FixedMap, MapError, MapView};
 pub use grid::{Grid, GridView};
 pub use landmark::{Landmark, LandmarkKind};

@@ -14,6 +14,6 @@ pub use encoder_fault::{EncoderFault, EncoderFaults};
 pub use laser_id::{LASERS, LaserId, LaserIdError};
 pub use pose_fix::PoseFix;
 pub use reflectors::{ReflectorObservation, Reflectors};
-pub use scan::Scan;
+pub use scan::{Scan, ScanHead};
 pub use time::Time;
 pub use wheels::{MOST_WHEELS, WheelReading, WheelSample};

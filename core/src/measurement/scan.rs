@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{LaserId, Time};
 
@@ -26,7 +26,38 @@ pub struct Scan<'a> {
     pub intensities: &'a [u16],
 }
 
+/// A scan without its beams.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScanHead {
+    /// See [`Scan::laser`].
+    pub laser: LaserId,
+    /// See [`Scan::start`].
+    pub start: Time,
+    /// See [`Scan::beam_interval`], s.
+    pub beam_interval: f64,
+    /// See [`Scan::first_bearing`], rad.
+    pub first_bearing: f64,
+    /// See [`Scan::bearing_step`], rad.
+    pub bearing_step: f64,
+}
+
+impl ScanHead {
+    /// The scan with these beams.
+    #[must_use]
+    pub const fn scan<'a>(&self, ranges: &'a [f32], intensities: &'a [u16]) -> Scan<'a> {
+        let Self { laser, start, beam_interval, first_bearing, bearing_step } = *self;
+        Scan { laser, start, beam_interval, first_bearing, bearing_step, ranges, intensities }
+    }
+}
+
 impl Scan<'_> {
+    /// The scan without its beams.
+    #[must_use]
+    pub const fn head(&self) -> ScanHead {
+        let Self { laser, start, beam_interval, first_bearing, bearing_step, .. } = *self;
+        ScanHead { laser, start, beam_interval, first_bearing, bearing_step }
+    }
+
     /// Direction of beam `index` in S, rad, not wrapped.
     #[must_use]
     pub fn bearing(&self, index: usize) -> f64 {

@@ -56,7 +56,7 @@ pub struct WheelMotion {
 }
 
 impl WheelMotion {
-    /// What the steering encoder said after that share of the way, rad.
+    /// What the steering encoder said after that share of the step, rad.
     #[must_use]
     pub fn steering_at(&self, share: f64) -> f64 {
         self.steering_start + share * (self.steering_end - self.steering_start)

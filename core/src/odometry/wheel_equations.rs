@@ -4,13 +4,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Contact, OdometryNoise, Wheel, WheelMotion, WheelParameter};
 
-/// One linear equation of the vehicle's motion: `row * motion = way`.
+/// One linear equation of the vehicle's motion: `row * motion = distance`.
 #[derive(Clone, Copy, Debug)]
 struct Equation {
     /// Direction along which the wheel's contact tells the motion: x, y, and its moment about R, m.
     row: Vector3<f64>,
     /// How far the contact has moved along it, m.
-    way: f64,
+    distance: f64,
     /// One over the square of its slip, m for a square root of a metre.
     weight: f64,
 }
@@ -49,7 +49,7 @@ fn rolling(wheel: &Wheel, turn: f64, steering: f64, noise: &OdometryNoise) -> Op
     let angle = roller(wheel);
     Some(Equation {
         row: direction(wheel, wheel.heading + steering + angle),
-        way: wheel.radius * turn * libm::cos(angle),
+        distance: wheel.radius * turn * libm::cos(angle),
         weight: weight(noise.slip),
     })
 }
@@ -58,7 +58,7 @@ fn rolling(wheel: &Wheel, turn: f64, steering: f64, noise: &OdometryNoise) -> Op
 fn sideways(wheel: &Wheel, steering: f64, noise: &OdometryNoise) -> Option<Equation> {
     (wheel.contact == Contact::Tyre).then(|| Equation {
         row: direction(wheel, wheel.heading + steering + QUARTER),
-        way: 0.0,
+        distance: 0.0,
         weight: weight(noise.side_slip),
     })
 }
@@ -68,7 +68,7 @@ fn sideways(wheel: &Wheel, steering: f64, noise: &OdometryNoise) -> Option<Equat
 pub struct Solution {
     /// Motion of R at constant velocity: x and y, m, and rotation, rad.
     pub motion: Vector3<f64>,
-    /// Inverse of the normal equations: covariance of the motion for each metre of way.
+    /// Inverse of the normal equations: covariance of the motion for each metre of distance.
     pub spread: Matrix3<f64>,
     /// Squares of what does not fit, each over the square of its slip, m.
     pub misfit: f64,
@@ -78,13 +78,13 @@ pub struct Solution {
     pub redundancy: usize,
 }
 
-/// Solves for the motion while the steering is where it was after `share` of the way. None if the wheels do not determine it.
+/// Solves for the motion while the steering is where it was after `share` of the step. None if the wheels do not determine it.
 #[must_use]
 pub fn solve(wheels: &[Wheel], motions: &[WheelMotion], share: f64, noise: &OdometryNoise) -> Option<Solution> {
     let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0_usize);
     for equation in equations(wheels, motions, share, noise) {
         normal += equation.weight * equation.row * equation.row.transpose();
-        right += equation.weight * equation.way * equation.row;
+        right += equation.weight * equation.distance * equation.row;
         count += 1;
     }
     let product = normal.m11 * normal.m22 * normal.m33;
@@ -96,7 +96,7 @@ pub fn solve(wheels: &[Wheel], motions: &[WheelMotion], share: f64, noise: &Odom
     let motion = spread * right;
     let (mut misfit, mut squares) = (0.0, 0.0);
     for equation in equations(wheels, motions, share, noise) {
-        let rest = equation.way - equation.row.dot(&motion);
+        let rest = equation.distance - equation.row.dot(&motion);
         misfit += equation.weight * rest * rest;
         squares += rest * rest;
     }
@@ -139,9 +139,9 @@ pub fn derivative(
     let mut add = |equation: Option<Equation>, angle: f64, is_rolling: bool| {
         let Some(equation) = equation else { return };
         let row = row_derivative(wheel, angle, steering, is_rolling, parameter);
-        let way = if is_rolling { way_derivative(wheel, motion.turn, parameter) } else { 0.0 };
-        let rest = equation.way - equation.row.dot(&solution.motion);
-        change += equation.weight * (rest * row + (way - row.dot(&solution.motion)) * equation.row);
+        let distance = if is_rolling { distance_derivative(wheel, motion.turn, parameter) } else { 0.0 };
+        let rest = equation.distance - equation.row.dot(&solution.motion);
+        change += equation.weight * (rest * row + (distance - row.dot(&solution.motion)) * equation.row);
     };
     add(rolling(wheel, motion.turn, steering, noise), along, true);
     add(sideways(wheel, steering, noise), wheel.heading + steering + QUARTER, false);
@@ -153,7 +153,7 @@ pub fn derivative(
 pub fn rests(wheel: &Wheel, motion: &WheelMotion, share: f64, noise: &OdometryNoise, solution: &Solution) -> [f64; 2] {
     let steering = steering_at(wheel, motion, share);
     [rolling(wheel, motion.turn, steering, noise), sideways(wheel, steering, noise)]
-        .map(|equation| equation.map_or(0.0, |equation| equation.way - equation.row.dot(&solution.motion)))
+        .map(|equation| equation.map_or(0.0, |equation| equation.distance - equation.row.dot(&solution.motion)))
 }
 
 /// Derivative of [`rests`] of a wheel while the solution changes by `change`; by a parameter of the same wheel, if one is given.
@@ -171,8 +171,8 @@ pub fn rests_derivative(
     let of = |equation: Option<Equation>, angle: f64, is_rolling: bool| {
         let Some(equation) = equation else { return 0.0 };
         let by_own = own.map_or(0.0, |parameter| {
-            let way = if is_rolling { way_derivative(wheel, motion.turn, parameter) } else { 0.0 };
-            way - row_derivative(wheel, angle, steering, is_rolling, parameter).dot(&solution.motion)
+            let distance = if is_rolling { distance_derivative(wheel, motion.turn, parameter) } else { 0.0 };
+            distance - row_derivative(wheel, angle, steering, is_rolling, parameter).dot(&solution.motion)
         });
         by_own - equation.row.dot(change)
     };
@@ -200,7 +200,7 @@ fn row_derivative(
     }
 }
 
-fn way_derivative(wheel: &Wheel, turn: f64, parameter: WheelParameter) -> f64 {
+fn distance_derivative(wheel: &Wheel, turn: f64, parameter: WheelParameter) -> f64 {
     let (sine, cosine) = libm::sincos(roller(wheel));
     match parameter {
         WheelParameter::Radius => turn * cosine,

@@ -6,7 +6,7 @@ use super::wheel_equations::{Solution, derivative, rests, rests_derivative, solv
 use super::{Integration, OdometryNoise, Wheel, WheelMotion, WheelParameter};
 use crate::geometry::{Pose, Twist};
 
-/// Shares of the way at which the wheels are asked: start, quarter, middle, end.
+/// Shares of the step at which the wheels are asked: start, quarter, middle, end.
 const SHARES: [f64; 4] = [0.0, 0.25, 0.5, 1.0];
 
 /// One term of a Runge-Kutta sum: a motion seen under a heading.
@@ -27,7 +27,7 @@ const SECOND_ORDER: [Term; 1] = [term(1.0, 2, 1, 0.5)];
 const FOURTH_ORDER: [Term; 4] =
     [term(1.0 / 6.0, 0, 0, 0.0), term(1.0 / 3.0, 2, 0, 0.5), term(1.0 / 3.0, 2, 2, 0.5), term(1.0 / 6.0, 3, 2, 1.0)];
 
-/// The wheels' motions at several places of their way.
+/// The wheels' motions at several places of their step.
 #[derive(Clone, Copy, Debug)]
 pub struct WheelPath<'a> {
     wheels: &'a [Wheel],

@@ -55,8 +55,8 @@ pub fn wheel_motion_between(wheel: &Wheel, from: &WheelReading, to: &WheelReadin
     }
 }
 
-/// Mean way of the measured wheels, m.
-fn mean_way(wheels: &[Wheel], motions: &[WheelMotion]) -> f64 {
+/// Mean distance of the measured wheels, m.
+fn mean_distance(wheels: &[Wheel], motions: &[WheelMotion]) -> f64 {
     let measured = wheels.iter().zip(motions).filter(|(wheel, _)| wheel.turn.is_some());
     let (sum, count) = measured
         .fold((0.0, 0.0), |(sum, count), (wheel, motion)| (sum + libm::fabs(wheel.radius * motion.turn), count + 1.0));
@@ -65,11 +65,11 @@ fn mean_way(wheels: &[Wheel], motions: &[WheelMotion]) -> f64 {
 
 /// Covariance of the displacement of that path: slip of every wheel, errors of its encoders, and what the model does not know.
 /// Where redundant wheels contradict each other by more than their slip, all are believed so much less.
-fn covariance(path: &WheelPath, wheels: &[Wheel], way: f64, duration: f64, noise: &OdometryNoise) -> Matrix3<f64> {
+fn covariance(path: &WheelPath, wheels: &[Wheel], distance: f64, duration: f64, noise: &OdometryNoise) -> Matrix3<f64> {
     let solution = path.middle();
-    let expected = solution.redundancy as f64 * way;
+    let expected = solution.redundancy as f64 * distance;
     let excess = if expected > 0.0 { libm::fmax(solution.misfit / expected, 1.0) } else { 1.0 };
-    let mut covariance = solution.spread * (way * excess);
+    let mut covariance = solution.spread * (distance * excess);
     let mut add = |by: Vector3<f64>, deviation: f64| covariance += by * by.transpose() * (deviation * deviation);
     for (number, wheel) in wheels.iter().enumerate() {
         if wheel.turn.is_some() && noise.speed > 0.0 && wheel.radius != 0.0 {
@@ -79,13 +79,13 @@ fn covariance(path: &WheelPath, wheels: &[Wheel], way: f64, duration: f64, noise
             add(path.derivative(number, WheelParameter::Heading), noise.steering);
         }
     }
-    covariance.m33 += noise.yaw * noise.yaw * way;
+    covariance.m33 += noise.yaw * noise.yaw * distance;
     covariance
 }
 
 /// The step that those wheels made in `duration` seconds. Its displacement is not a number if they do not determine it.
 fn step_of(wheels: &[Wheel], motions: &[WheelMotion], duration: f64, believed: &Believed) -> Step {
-    let distance = mean_way(wheels, motions);
+    let distance = mean_distance(wheels, motions);
     let Some(path) = WheelPath::new(wheels, motions, &believed.noise, believed.integration) else {
         return Step { distance: f64::NAN, ..Step::standing(believed.was_backward) };
     };

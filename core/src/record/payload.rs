@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
 use super::published::Published;
 use super::truth::{Reference, Truth};
-use crate::localizer::{Capacities, Event, LandmarkUse, Outputs, Parameters, PoseOutput};
+use crate::localizer::{Event, LandmarkUse, Outputs, Parameters, PoseOutput, StatedCapacities};
 use crate::maps::Landmark;
-use crate::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
+use crate::measurement::{ReflectorObservation, Reflectors, Scan, ScanHead, Time};
 
 /// Greatest number of landmarks in one record; a map is written in pieces.
 pub const LANDMARKS_A_RECORD: usize = 50;
@@ -21,7 +21,7 @@ pub struct Header<'a> {
     /// What the localiser believed of its vehicle.
     pub parameters: &'a Parameters,
     /// What the localiser had room for.
-    pub capacities: Capacities,
+    pub capacities: StatedCapacities,
 }
 
 /// What the localiser answered to one event.
@@ -146,14 +146,10 @@ mod kind {
     pub const PUBLISHED: u8 = 16;
 }
 
-/// What stands before the beams of a scan.
+/// What stands before the beams of a scan, and how many there are.
 #[derive(Serialize, Deserialize)]
-struct ScanHead {
-    laser: LaserId,
-    start: Time,
-    beam_interval: f64,
-    first_bearing: f64,
-    bearing_step: f64,
+struct ScanLayout {
+    head: ScanHead,
     ranges: u16,
     intensities: u16,
 }
@@ -287,17 +283,13 @@ fn put_all<T: Serialize>(values: &[T], room: &mut [u8]) -> Option<usize> {
 }
 
 fn put_scan(scan: &Scan, room: &mut [u8]) -> Option<usize> {
-    let head = ScanHead {
-        laser: scan.laser,
-        start: scan.start,
-        beam_interval: scan.beam_interval,
-        first_bearing: scan.first_bearing,
-        bearing_step: scan.bearing_step,
+    let layout = ScanLayout {
+        head: scan.head(),
         ranges: u16::try_from(scan.ranges.len()).ok()?,
         intensities: u16::try_from(scan.intensities.len()).ok()?,
     };
-    let head_length = put(&head, room)?;
-    let (ranges, rest) = room.get_mut(head_length..)?.split_at_mut_checked(scan.ranges.len() * 4)?;
+    let layout_length = put(&layout, room)?;
+    let (ranges, rest) = room.get_mut(layout_length..)?.split_at_mut_checked(scan.ranges.len() * 4)?;
     for (bytes, range) in ranges.as_chunks_mut::<4>().0.iter_mut().zip(scan.ranges) {
         *bytes = range.to_le_bytes();
     }
@@ -305,7 +297,7 @@ fn put_scan(scan: &Scan, room: &mut [u8]) -> Option<usize> {
     for (bytes, intensity) in intensities.as_chunks_mut::<2>().0.iter_mut().zip(scan.intensities) {
         *bytes = intensity.to_le_bytes();
     }
-    Some(head_length + scan.ranges.len() * 4 + scan.intensities.len() * 2)
+    Some(layout_length + scan.ranges.len() * 4 + scan.intensities.len() * 2)
 }
 
 fn take_all<T>(result: postcard::Result<(T, &[u8])>) -> Result<T, DecodeError> {
@@ -337,8 +329,8 @@ fn take_scan<'a, const BEAMS: usize, const REFLECTORS: usize>(
     payload: &[u8],
     scratch: &'a mut Scratch<BEAMS, REFLECTORS>,
 ) -> Result<Scan<'a>, DecodeError> {
-    let (head, rest): (ScanHead, _) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
-    let (range_count, intensity_count) = (usize::from(head.ranges), usize::from(head.intensities));
+    let (layout, rest): (ScanLayout, _) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+    let (range_count, intensity_count) = (usize::from(layout.ranges), usize::from(layout.intensities));
     let (ranges, intensities) = rest.split_at_checked(range_count * 4).ok_or(DecodeError::Content)?;
     if intensities.len() != intensity_count * 2 {
         return Err(DecodeError::Content);
@@ -351,13 +343,5 @@ fn take_scan<'a, const BEAMS: usize, const REFLECTORS: usize>(
     for (intensity, bytes) in scratch.intensities.iter_mut().zip(intensities.as_chunks::<2>().0) {
         *intensity = u16::from_le_bytes(*bytes);
     }
-    Ok(Scan {
-        laser: head.laser,
-        start: head.start,
-        beam_interval: head.beam_interval,
-        first_bearing: head.first_bearing,
-        bearing_step: head.bearing_step,
-        ranges: &scratch.ranges,
-        intensities: &scratch.intensities,
-    })
+    Ok(layout.head.scan(&scratch.ranges, &scratch.intensities))
 }

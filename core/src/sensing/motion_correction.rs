@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::PointScan;
-use crate::geometry::{Point, Pose, ScanPoint};
+use crate::geometry::{Point, Pose, Transform};
 use crate::measurement::{Scan, Time};
 
 /// Nodes of a path. If there are more, every second one is left out.
@@ -21,19 +21,7 @@ pub struct SensorPath {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     time: f64,
-    x: f64,
-    y: f64,
-    sine: f64,
-    cosine: f64,
-}
-
-/// A pose as the matrix that it stands for.
-#[derive(Clone, Copy, Debug)]
-struct Transform {
-    x: f64,
-    y: f64,
-    sine: f64,
-    cosine: f64,
+    transform: Transform<f64>,
 }
 
 impl SensorPath {
@@ -43,10 +31,9 @@ impl SensorPath {
         let back = laser.inverse();
         let mut last = f64::NEG_INFINITY;
         let mut spacing = LEAST_SPACING;
-        let node = |time: f64, displacement: &Pose| {
-            let pose = back.compose(&displacement.compose(laser));
-            let (sine, cosine) = libm::sincos(pose.theta);
-            Node { time, x: pose.x, y: pose.y, sine, cosine }
+        let node = |time: f64, displacement: &Pose| Node {
+            time,
+            transform: Transform::exact(&back.compose(&displacement.compose(laser))),
         };
         let mut skipped = None;
         for (time, displacement) in displacements {
@@ -84,8 +71,7 @@ impl SensorPath {
     /// Where the sensor was `time` seconds after the first beam, in its frame at the first beam.
     #[must_use]
     pub fn place(&self, time: f64) -> Pose {
-        let transform = self.transform(time, &mut 0);
-        Pose::new(transform.x, transform.y, libm::atan2(transform.sine, transform.cosine))
+        self.transform(time, &mut 0).exact_pose()
     }
 
     /// Where a point that was seen `time` seconds after the first beam is in the frame of the first beam, m.
@@ -97,9 +83,7 @@ impl SensorPath {
     /// Where a point of the frame of the first beam is seen from the sensor `time` seconds later, m.
     #[must_use]
     pub fn from_start(&self, time: f64, point: &Point) -> Point {
-        let transform = self.transform(time, &mut 0);
-        let (dx, dy) = (point.x - transform.x, point.y - transform.y);
-        Point::new(transform.cosine * dx + transform.sine * dy, transform.cosine * dy - transform.sine * dx)
+        self.transform(time, &mut 0).apply_inverse(point)
     }
 
     /// Moves all points of a scan into the frame of its first beam.
@@ -109,46 +93,23 @@ impl SensorPath {
         for (beam, (point, range)) in points.points.iter_mut().zip(&points.ranges).enumerate() {
             if *range > 0.0 {
                 let transform = self.transform(beam as f64 * interval, &mut segment);
-                *point = transform.apply_single(point);
+                *point = transform.single().apply(point);
             }
         }
     }
 
     /// The sensor's pose `time` seconds after the first beam; `segment` is where the search begins and where it ended.
-    fn transform(&self, time: f64, segment: &mut usize) -> Transform {
+    fn transform(&self, time: f64, segment: &mut usize) -> Transform<f64> {
         while self.nodes.get(*segment + 1).is_some_and(|node| node.time < time) {
             *segment += 1;
         }
         match (self.nodes.get(*segment), self.nodes.get(*segment + 1)) {
             (Some(before), Some(after)) => {
                 let share = ((time - before.time) / (after.time - before.time)).clamp(0.0, 1.0);
-                let between = |from: f64, to: f64| from + share * (to - from);
-                Transform {
-                    x: between(before.x, after.x),
-                    y: between(before.y, after.y),
-                    sine: between(before.sine, after.sine),
-                    cosine: between(before.cosine, after.cosine),
-                }
+                before.transform.towards(&after.transform, share)
             }
-            (Some(only), None) => Transform { x: only.x, y: only.y, sine: only.sine, cosine: only.cosine },
-            _ => Transform { x: 0.0, y: 0.0, sine: 0.0, cosine: 1.0 },
+            (Some(only), None) => only.transform,
+            _ => Transform::IDENTITY,
         }
-    }
-}
-
-impl Transform {
-    fn apply(&self, point: &Point) -> Point {
-        Point::new(
-            self.x + self.cosine * point.x - self.sine * point.y,
-            self.y + self.sine * point.x + self.cosine * point.y,
-        )
-    }
-
-    fn apply_single(&self, point: &ScanPoint) -> ScanPoint {
-        let (sine, cosine) = (self.sine as f32, self.cosine as f32);
-        ScanPoint::new(
-            self.x as f32 + cosine * point.x - sine * point.y,
-            self.y as f32 + sine * point.x + cosine * point.y,
-        )
     }
 }

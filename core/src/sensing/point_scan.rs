@@ -22,6 +22,17 @@ pub struct PointScan<const BEAMS: usize> {
     pub is_full_circle: bool,
 }
 
+/// A [`PointScan`] of any capacity.
+#[derive(Clone, Copy, Debug)]
+pub struct PointView<'a> {
+    /// See [`PointScan::points`].
+    pub points: &'a [ScanPoint],
+    /// See [`PointScan::ranges`].
+    pub ranges: &'a [f32],
+    /// See [`PointScan::is_full_circle`].
+    pub is_full_circle: bool,
+}
+
 impl<const BEAMS: usize> PointScan<BEAMS> {
     /// An empty scan.
     #[must_use]
@@ -34,6 +45,13 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
             is_clockwise: false,
             is_full_circle: false,
         }
+    }
+
+    /// The points without their capacity.
+    #[must_use]
+    #[inline]
+    pub fn view(&self) -> PointView<'_> {
+        PointView { points: &self.points, ranges: &self.ranges, is_full_circle: self.is_full_circle }
     }
 
     /// How many beams of the scan there are for each one that is kept: 1 if there is room for all of them.

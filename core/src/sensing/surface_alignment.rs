@@ -1,10 +1,10 @@
 //! The pose under which a scan lies on the surfaces of an earlier one: points to planes, iterated, robustly weighted.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use super::{PointScan, SurfaceScan};
-use crate::geometry::{Pose, ScanPoint, Transform, wrap};
+use super::{PointToLine, PointView, SurfaceScan};
+use crate::geometry::{Pose, ScanPoint, Transform};
 
 /// A pose found by aligning scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,8 +52,8 @@ const BESIDE: usize = 2;
 /// Moves the source scan, which is taken to be at `start` in the frame of the target, to where its returns lie on the
 /// target's surfaces. None if too few do, or if they fix no pose.
 #[must_use]
-pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
-    source: &PointScan<BEAMS>,
+pub fn align_to_surfaces<const DIRECTIONS: usize>(
+    source: PointView<'_>,
     target: &SurfaceScan<DIRECTIONS>,
     start: &Pose,
     parameters: &SurfaceAlignmentParameters,
@@ -68,9 +68,9 @@ pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
     for iteration in 1..=iterations {
         let every = if iteration < iterations { parameters.every.max(1) } else { 1 };
         let transform = Transform::of(&pose);
-        let (mut information, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        let mut equations = PointToLine::default();
         let (mut squares, mut count) = (0.0_f32, 0);
-        let returns = source.points.iter().zip(&source.ranges).step_by(usize::from(every));
+        let returns = source.points.iter().zip(source.ranges).step_by(usize::from(every));
         for (point, range) in returns.filter(|(_, range)| **range > 0.0) {
             let moved = transform.apply(point);
             let Some((surface, square)) = target.nearest(&moved, BESIDE) else { continue };
@@ -79,25 +79,20 @@ pub fn align_to_surfaces<const BEAMS: usize, const DIRECTIONS: usize>(
             }
             let normal = surface.normal;
             let distance = normal.dot(&(moved - surface.point));
-            // The lever about the source's own position, so that heading and position hardly mix.
             let lever: ScanPoint = moved - transform.shift();
             let slant = normal.dot(&lever) / range;
             let robust = 1.0 / (1.0 + distance * distance * tolerance);
             let weight = robust * robust / (noise * slant * slant + floor);
-            let row = Vector3::new(normal.x, normal.y, lever.x * normal.y - lever.y * normal.x).cast::<f64>();
-            let weighted = row * f64::from(weight);
-            information += weighted * row.transpose();
-            gradient += weighted * f64::from(distance);
+            equations.add(&normal, &lever, distance, weight);
             squares += weight * distance * distance;
             count += 1;
         }
         if count * u32::from(every) < FEWEST {
             return None;
         }
-        let step = information.cholesky()?.solve(&gradient);
-        pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
+        pose = equations.step(&pose)?;
         let residual = libm::sqrt(f64::from(squares) / f64::from(count));
-        outcome = Some(ScanAlignment { pose, information, residual, points: count });
+        outcome = Some(ScanAlignment { pose, information: equations.information, residual, points: count });
     }
     outcome.filter(|found| found.pose.is_finite())
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::PointScan;
+use super::PointView;
 use super::line::Moments;
 use crate::geometry::{Pose, ScanPoint, Transform};
 
@@ -58,7 +58,7 @@ impl<const DIRECTIONS: usize> SurfaceScan<DIRECTIONS> {
     }
 
     /// Replaces the content by the surfaces of a scan, seen from `place` in the frame of its points.
-    pub fn set<const BEAMS: usize>(&mut self, scan: &PointScan<BEAMS>, place: &Pose, parameters: &SurfaceParameters) {
+    pub fn set(&mut self, scan: PointView<'_>, place: &Pose, parameters: &SurfaceParameters) {
         self.surfaces.fill(Surface::NONE);
         let transform = Transform::of(&place.inverse());
         for index in 0..scan.ranges.len() {
@@ -108,11 +108,7 @@ impl<const DIRECTIONS: usize> Default for SurfaceScan<DIRECTIONS> {
 }
 
 /// The surface through a return and its neighbours. None if they are too few or not straight.
-fn surface_at<const BEAMS: usize>(
-    scan: &PointScan<BEAMS>,
-    index: usize,
-    parameters: &SurfaceParameters,
-) -> Option<Surface> {
+fn surface_at(scan: PointView<'_>, index: usize, parameters: &SurfaceParameters) -> Option<Surface> {
     let centre = *scan.points.get(index)?;
     let range = *scan.ranges.get(index)?;
     if range <= 0.0 {

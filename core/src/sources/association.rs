@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::landmark_maps::Maps;
+use super::landmark_maps::MapViews;
 use super::landmark_slots::LandmarkSlots;
 use super::sighting::Sighting;
 use super::slot_parameters::SlamParameters;
@@ -132,11 +132,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
 
     /// Compares it with the landmarks of the state, if there are `slots`, and with those that were given; and with those of the
     /// dynamic map only where none of them fits.
-    pub fn associate<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, const LANDMARKS: usize>(
-        &self,
-        maps: &Maps<REFLECTORS, FEATURES, DYNAMIC>,
-        slots: Option<&LandmarkSlots<LANDMARKS>>,
-    ) -> Association {
+    pub fn associate(&self, maps: &MapViews<'_>, slots: Option<&LandmarkSlots<S>>) -> Association {
         let MapUse { reflectors, features, dynamic, .. } = self.believed.maps;
         let kind = self.seen.kind;
         let in_state = slots.map(|slots| self.in_state(slots));
@@ -173,7 +169,7 @@ impl<'a, S: Slots> Comparison<'a, S> {
     }
 
     /// Landmarks of the state that it may be.
-    fn in_state<const LANDMARKS: usize>(&self, slots: &LandmarkSlots<LANDMARKS>) -> impl Iterator<Item = Candidate> {
+    fn in_state(&self, slots: &LandmarkSlots<S>) -> impl Iterator<Item = Candidate> {
         let (radius, orientation) = (self.radius(), self.orientation());
         let is_near = move |slot: usize| {
             self.filter.landmark(slot).is_some_and(|position| {

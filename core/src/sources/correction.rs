@@ -1,7 +1,7 @@
 //! Correcting the filter by what is seen: the same for every state that it may have.
 
 use super::association::{Association, Believed, Candidate, Comparison};
-use super::landmark_maps::Maps;
+use super::landmark_maps::MapViews;
 use super::landmark_slots::LandmarkSlots;
 use super::sighting::Sighting;
 use crate::filter::{Correction, Ekf, Innovation, Landmark, Slots};
@@ -28,16 +28,10 @@ impl Outcome {
 
 /// Corrects a filter by something seen from its state. A landmark of a map that is recognised enters the state, if there are
 /// `slots` and one can be freed. Tells what became of it, and the correction if one was made.
-pub(crate) fn correct<
-    S: Slots,
-    const REFLECTORS: usize,
-    const FEATURES: usize,
-    const DYNAMIC: usize,
-    const LANDMARKS: usize,
->(
+pub(crate) fn correct<S: Slots>(
     filter: &mut Ekf<S>,
-    mut slots: Option<&mut LandmarkSlots<LANDMARKS>>,
-    maps: &Maps<REFLECTORS, FEATURES, DYNAMIC>,
+    mut slots: Option<&mut LandmarkSlots<S>>,
+    maps: &MapViews<'_>,
     seen: &Sighting,
     believed: Believed,
 ) -> (Outcome, Option<Correction>) {

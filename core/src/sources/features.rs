@@ -1,16 +1,19 @@
 //! Natural features of a scan: corners and end points of contours.
 
+use core::fmt::Debug;
+
+use heapless::Vec;
 use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
 
-use super::sighting::{Sighting, Workspace};
+use super::sighting::{OBSERVATIONS, Sighting, Workspace};
 use super::{Source, Switches};
 use crate::filter::{Cartesian, Observation};
 use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::Scan;
 use crate::order::insertion_sort_by;
-use crate::sensing::{KeypointKind, PointScan, falko};
+use crate::sensing::{Keypoint, KeypointKind, PointScan, PointView, falko};
 
 /// How natural features are seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,12 +43,54 @@ impl Default for FeatureParameters {
     }
 }
 
-impl<const BEAMS: usize> Workspace<BEAMS> {
+/// Finds natural features in scans of up to `BEAMS` beams.
+#[derive(Clone, Debug)]
+pub struct FeatureFinder<const BEAMS: usize> {
+    points: PointScan<BEAMS>,
+    detector: falko::Detector<BEAMS>,
+    keypoints: Vec<Keypoint, OBSERVATIONS>,
+}
+
+/// A [`FeatureFinder`] of any capacity.
+pub trait FindFeatures: Clone + Debug {
+    /// Beams of a scan, at the most.
+    const BEAMS: usize;
+
+    /// One that has seen nothing.
+    fn new(detector: falko::Parameters) -> Self;
+
+    /// The points of the last scan.
+    fn points(&self) -> PointView<'_>;
+
     /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
     /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two. True if there
     /// was not room for all beams and features.
-    pub fn see_features(
+    fn find(
         &mut self,
+        workspace: &mut Workspace,
+        features: &FeatureParameters,
+        switches: &Switches,
+        mount: &Pose,
+        scan: &Scan,
+    ) -> bool;
+}
+
+impl<const BEAMS: usize> FindFeatures for FeatureFinder<BEAMS> {
+    const BEAMS: usize = BEAMS;
+
+    #[inline(always)]
+    fn new(detector: falko::Parameters) -> Self {
+        Self { points: PointScan::new(), detector: falko::Detector::new(detector), keypoints: Vec::new() }
+    }
+
+    #[inline]
+    fn points(&self) -> PointView<'_> {
+        self.points.view()
+    }
+
+    fn find(
+        &mut self,
+        workspace: &mut Workspace,
         features: &FeatureParameters,
         switches: &Switches,
         mount: &Pose,
@@ -53,20 +98,20 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
     ) -> bool {
         self.points.set(scan, features.nearest, features.farthest);
         if features.motion_correction {
-            self.path.correct(scan, &mut self.points);
+            workspace.path.correct(scan, &mut self.points);
         }
         let stride = PointScan::<BEAMS>::stride(scan);
         self.keypoints.clear();
         let is_wanted = switches.corners || switches.end_points;
         let left_out = if is_wanted { self.detector.detect(&self.points, &mut self.keypoints) } else { 0 };
         insertion_sort_by(&mut self.keypoints, |a, b| a.beam.cmp(&b.beam));
-        self.sightings.clear();
+        workspace.sightings.clear();
         let added = features.added_deviation * features.added_deviation;
         for keypoint in &self.keypoints {
             let beam = usize::from(keypoint.beam) * stride;
             let position = Point::new(f64::from(keypoint.position.x), f64::from(keypoint.position.y));
             let position = if features.motion_correction {
-                self.path.from_start(beam as f64 * scan.beam_interval, &position)
+                workspace.path.from_start(beam as f64 * scan.beam_interval, &position)
             } else {
                 position
             };
@@ -78,7 +123,7 @@ impl<const BEAMS: usize> Workspace<BEAMS> {
             if !switches.of(Source::of_landmark(kind)) {
                 continue;
             }
-            let _ = self.sightings.push(Sighting {
+            let _ = workspace.sightings.push(Sighting {
                 time: scan.beam_time(beam),
                 laser: scan.laser,
                 mount: *mount,

@@ -4,11 +4,11 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::status::SourceStatus;
-use crate::filter::{Ekf, RelativePose, Slots};
+use crate::filter::{Ekf, Empty, RelativePose, Slots, Storage};
 use crate::geometry::{Pose, difference};
 use crate::maps::Verdict;
 use crate::measurement::Time;
-use crate::sensing::{PointScan, SurfaceAlignmentParameters, SurfaceParameters, SurfaceScan, align_to_surfaces};
+use crate::sensing::{PointView, SurfaceAlignmentParameters, SurfaceParameters, SurfaceScan, align_to_surfaces};
 
 /// How scans are aligned to key scans.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,18 +54,22 @@ impl Default for KeyScanParameters {
 /// Sectors of a key scan.
 const DIRECTIONS: usize = 720;
 
+impl Empty for SurfaceScan<DIRECTIONS> {
+    const EMPTY: Self = Self::new();
+}
+
 /// The surfaces that were seen at the past poses of the state.
 #[derive(Clone, Debug)]
-pub(crate) struct KeyScans<const KEYS: usize> {
-    surfaces: [SurfaceScan<DIRECTIONS>; KEYS],
+pub(crate) struct KeyScans<S: Slots> {
+    surfaces: S::PerPose<SurfaceScan<DIRECTIONS>>,
     /// Place of the newest one; places are taken in turn.
     newest: usize,
 }
 
-impl<const KEYS: usize> KeyScans<KEYS> {
+impl<S: Slots> KeyScans<S> {
     #[inline(always)]
-    pub(crate) const fn new() -> Self {
-        Self { surfaces: [const { SurfaceScan::new() }; KEYS], newest: 0 }
+    pub(crate) fn new() -> Self {
+        Self { surfaces: S::PerPose::empty(), newest: 0 }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -73,10 +77,10 @@ impl<const KEYS: usize> KeyScans<KEYS> {
     }
 
     /// Corrects the filter, which stands at `time`, by what the scan says of the distance since each key scan.
-    pub(crate) fn align<const BEAMS: usize, S: Slots>(
+    pub(crate) fn align(
         &self,
         filter: &mut Ekf<S>,
-        points: &PointScan<BEAMS>,
+        points: PointView<'_>,
         place: &Pose,
         laser: &Pose,
         parameters: &KeyScanParameters,
@@ -84,7 +88,7 @@ impl<const KEYS: usize> KeyScans<KEYS> {
     ) {
         let returns = points.ranges.iter().filter(|range| **range > 0.0).count();
         let from_place = place.inverse();
-        for (key, surfaces) in self.surfaces.iter().enumerate() {
+        for (key, surfaces) in self.surfaces.as_ref().iter().enumerate() {
             let Some(expected) = filter.expected_relative_pose(key, laser) else { continue };
             let start = expected.compose(&from_place);
             let Some(found) = align_to_surfaces(points, surfaces, &start, &parameters.alignment) else { continue };
@@ -113,10 +117,10 @@ impl<const KEYS: usize> KeyScans<KEYS> {
     }
 
     /// Makes the scan a key scan if the vehicle has come far enough from the newest one; it takes the place of the oldest.
-    pub(crate) fn keep<const BEAMS: usize, S: Slots>(
+    pub(crate) fn keep(
         &mut self,
         filter: &mut Ekf<S>,
-        points: &PointScan<BEAMS>,
+        points: PointView<'_>,
         place: &Pose,
         parameters: &KeyScanParameters,
     ) {
@@ -128,8 +132,9 @@ impl<const KEYS: usize> KeyScans<KEYS> {
         if !is_needed {
             return;
         }
-        let next = if self.newest + 1 < KEYS { self.newest + 1 } else { 0 };
-        if let Some(surfaces) = self.surfaces.get_mut(next) {
+        let places = self.surfaces.as_mut();
+        let next = if self.newest + 1 < places.len() { self.newest + 1 } else { 0 };
+        if let Some(surfaces) = places.get_mut(next) {
             surfaces.set(points, place, &parameters.surfaces);
             filter.remember_pose(next);
             self.newest = next;

@@ -1,5 +1,6 @@
 //! What is known of the landmarks in the state beside their positions.
 
+use crate::filter::{Slots, Storage};
 use crate::geometry::difference;
 use crate::maps::LandmarkKind;
 use crate::state::LandmarkSource;
@@ -21,23 +22,24 @@ pub(crate) struct Slot {
 
 /// One for each landmark's slot of the state.
 #[derive(Clone, Debug)]
-pub(crate) struct LandmarkSlots<const LANDMARKS: usize> {
-    slots: [Option<Slot>; LANDMARKS],
+pub(crate) struct LandmarkSlots<S: Slots> {
+    slots: S::PerLandmark<Option<Slot>>,
     next_id: u16,
 }
 
-impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
-    pub(crate) const fn new() -> Self {
-        Self { slots: [None; LANDMARKS], next_id: 0 }
+impl<S: Slots> LandmarkSlots<S> {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self { slots: S::PerLandmark::empty(), next_id: 0 }
     }
 
     pub(crate) fn clear(&mut self) {
-        self.slots.fill(None);
+        self.slots.as_mut().fill(None);
     }
 
     /// Forgets the landmarks that were given; `remove` is called with their slots.
     pub(crate) fn forget_given(&mut self, mut remove: impl FnMut(usize)) {
-        for (slot, landmark) in self.slots.iter_mut().enumerate() {
+        for (slot, landmark) in self.slots.as_mut().iter_mut().enumerate() {
             if landmark.take_if(|landmark| landmark.source == LandmarkSource::Fixed).is_some() {
                 remove(slot);
             }
@@ -46,7 +48,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
 
     /// The landmarks with their slots.
     pub(crate) fn occupied(&self) -> impl Iterator<Item = (usize, &Slot)> {
-        self.slots.iter().enumerate().filter_map(|(slot, landmark)| Some((slot, landmark.as_ref()?)))
+        self.slots.as_ref().iter().enumerate().filter_map(|(slot, landmark)| Some((slot, landmark.as_ref()?)))
     }
 
     pub(crate) fn has_fixed(&self, id: u16, kind: LandmarkKind) -> bool {
@@ -57,7 +59,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
     /// Finds a slot for a landmark: a free one, else that of the landmark that has not been seen for longest. None if all
     /// have been seen in this scan.
     pub(crate) fn free(&self) -> Option<usize> {
-        let free = self.slots.iter().position(Option::is_none);
+        let free = self.slots.as_ref().iter().position(Option::is_none);
         free.or_else(|| {
             let unseen = self.occupied().filter(|(_, landmark)| landmark.unseen > 0);
             unseen.max_by_key(|(_, landmark)| landmark.unseen).map(|(slot, _)| slot)
@@ -74,14 +76,14 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
                 (LandmarkSource::Dynamic, self.next_id)
             }
         };
-        if let Some(place) = self.slots.get_mut(slot) {
+        if let Some(place) = self.slots.as_mut().get_mut(slot) {
             *place = Some(Slot { source, id, kind, orientation, hits: 1, unseen: 0 });
         }
     }
 
     /// Notes that a landmark has been seen again.
     pub(crate) fn see(&mut self, slot: usize) {
-        if let Some(Some(landmark)) = self.slots.get_mut(slot) {
+        if let Some(Some(landmark)) = self.slots.as_mut().get_mut(slot) {
             landmark.hits = landmark.hits.saturating_add(1);
             landmark.unseen = 0;
         }
@@ -90,7 +92,7 @@ impl<const LANDMARKS: usize> LandmarkSlots<LANDMARKS> {
     /// Ends a scan of features, or one of reflectors, which may come apart; `remove` is called with the slots of landmarks
     /// that go.
     pub(crate) fn finish(&mut self, are_reflectors: bool, parameters: &SlamParameters, mut remove: impl FnMut(usize)) {
-        for (slot, place) in self.slots.iter_mut().enumerate() {
+        for (slot, place) in self.slots.as_mut().iter_mut().enumerate() {
             let Some(landmark) = place else { continue };
             if (landmark.kind == LandmarkKind::Reflector) != are_reflectors {
                 continue;

@@ -6,25 +6,22 @@ use crate::filter::{Cartesian, Observation};
 use crate::geometry::Pose;
 use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::{LaserId, ReflectorObservation, Time};
-use crate::sensing::{Keypoint, PointScan, SensorPath, falko};
+use crate::sensing::SensorPath;
 
 /// Observations of one event at the most.
 pub const OBSERVATIONS: usize = 128;
 
 /// Memory that is used within one event only.
-#[derive(Clone, Debug)]
-pub(crate) struct Workspace<const BEAMS: usize> {
-    pub points: PointScan<BEAMS>,
+#[derive(Clone, Debug, Default)]
+pub struct Workspace {
     pub path: SensorPath,
-    pub detector: falko::Detector<BEAMS>,
-    pub keypoints: Vec<Keypoint, OBSERVATIONS>,
     pub reflectors: Vec<ReflectorObservation, OBSERVATIONS>,
     pub sightings: Vec<Sighting, OBSERVATIONS>,
 }
 
 /// One observation of one event.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sighting {
+pub struct Sighting {
     pub time: Time,
     pub laser: LaserId,
     /// Where that laser is mounted in R.

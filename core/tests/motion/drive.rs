@@ -1,12 +1,12 @@
 //! A vehicle with an exact path, in a hall with reflectors, and the events that it gives.
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::localizer::{Event, Localizer, Parameters, PoseFix, PoseOutput};
+use agv_core::localizer::{CapacitiesOf, Event, Localizer, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderSample, PoseIncrement, ReflectorObservation, Reflectors, SpeedSample, Time};
 use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
 
-pub type Hall = Localizer<360, 128, 16, 16>;
+pub type Hall = Localizer<CapacitiesOf<360, 128, 16, 16>>;
 
 const WHEELBASE: f64 = 1.5;
 const TICK: f64 = 1e-4;

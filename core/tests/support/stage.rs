@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::filter::{packed_entries, slot_states};
+use agv_core::filter::{PoseAndSlots, packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose, Twist, difference};
-use agv_core::localizer::{Event, Localizer, Outputs, Parameters, PoseFix, PoseOutput};
+use agv_core::localizer::{CapacitiesOf, Event, Localizer, Outputs, Parameters, PoseFix, PoseOutput};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
 use agv_core::odometry::Vehicle;
@@ -15,7 +15,8 @@ pub const BEAMS: usize = 1440;
 const KEYS: usize = 2;
 const PLACES: usize = 24;
 const STATES: usize = slot_states(KEYS, PLACES);
-pub type Small = Localizer<BEAMS, 64, 64, 32, KEYS, PLACES, STATES, { packed_entries(STATES) }>;
+pub type Small =
+    Localizer<CapacitiesOf<BEAMS, 64, 64, 32, PoseAndSlots<KEYS, PLACES, STATES, { packed_entries(STATES) }>>>;
 
 /// Samples of the odometry in a revolution, and the time between them, us.
 const SAMPLES: u64 = 12;

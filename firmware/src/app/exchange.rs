@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 
-use agv_controller::{Estimate, PublishedPose, Told};
+use agv_controller::{Estimate, SentPose, Told};
 use agv_core::measurement::Time;
 use agv_core::state::LaserHealth;
 use agv_wire::nav350::{Revolution, SensorWatch};
@@ -23,7 +23,7 @@ pub static BUS_EVENTS: Channel<CriticalSectionRawMutex, Told, EVENTS> = Channel:
 const PUBLISHED_POSES: usize = 5;
 
 /// What the bus has published, for the log.
-static PUBLISHED: Channel<CriticalSectionRawMutex, PublishedPose, PUBLISHED_POSES> = Channel::new();
+static PUBLISHED: Channel<CriticalSectionRawMutex, SentPose, PUBLISHED_POSES> = Channel::new();
 
 /// The end of the revolutions' channel at the laser, and that at the localiser.
 pub type RevolutionSender = zerocopy_channel::Sender<'static, CriticalSectionRawMutex, Revolution>;
@@ -53,13 +53,13 @@ pub fn lost_events() -> u32 {
 }
 
 /// Leaves what was published to the log; without room it is left out, as records are that the network is too slow for.
-pub fn log_published(published: PublishedPose) {
+pub fn log_published(published: SentPose) {
     let _ = PUBLISHED.try_send(published);
 }
 
 /// The next pose that was published before the bus told more than so many events.
 #[must_use]
-pub fn published_until(told: u32) -> Option<PublishedPose> {
+pub fn published_until(told: u32) -> Option<SentPose> {
     let next = PUBLISHED.try_peek().ok()?;
     // The count wraps: what is ahead by less than half of its range is later.
     if next.progress.told.wrapping_sub(told) as i32 > 0 { None } else { PUBLISHED.try_receive().ok() }

@@ -2,9 +2,9 @@
 
 use agv_core::localizer::Event;
 
+use super::capacities::Localizer;
 use super::exchange::{self, BUS_EVENTS, RevolutionReceiver};
 use super::log_stream::LogWriter;
-use super::room::Localizer;
 use super::supervision::{self, Task};
 
 /// What handles events.

@@ -13,7 +13,7 @@ use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::room::Localizer;
+use super::capacities::Localizer;
 
 /// Bytes that wait for the network.
 const QUEUE: usize = 14 * 1024;

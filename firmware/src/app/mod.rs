@@ -2,11 +2,11 @@
 
 pub mod bus;
 pub mod can_port;
+pub mod capacities;
 pub mod exchange;
 pub mod laser;
 pub mod localize;
 pub mod log_stream;
-pub mod room;
 pub mod service;
 pub mod settings;
 pub mod supervision;

@@ -8,9 +8,9 @@ use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
+use super::capacities::HAS_SLAM;
 use super::exchange;
 use super::log_stream::SOFTWARE;
-use super::room::HAS_SLAM;
 
 static MAP: ConstStaticCell<Vec<Landmark, LANDMARKS>> = ConstStaticCell::new(Vec::new());
 
@@ -26,11 +26,17 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
     if let Some(store) = &mut store {
         match store.load(&mut settings, map) {
             Ok(loaded) => {
-                let is_sound = loaded.bad == 0 && !loaded.was_formatted && !loaded.is_map_damaged;
+                let is_sound = loaded.bad == 0
+                    && loaded.contradiction.is_none()
+                    && !loaded.was_formatted
+                    && !loaded.is_map_damaged;
                 exchange::set_settings_sound(is_sound);
                 defmt::info!("settings: {} read, {} landmarks", loaded.leaves, map.len());
                 if loaded.bad > 0 {
                     defmt::error!("settings: {} are bad and left at their defaults", loaded.bad);
+                }
+                if let Some(leaf) = loaded.contradiction {
+                    defmt::error!("settings: {} does not go with the others and is left at its default", leaf);
                 }
                 if loaded.was_formatted {
                     defmt::error!("settings: the flash held rubbish and was erased");

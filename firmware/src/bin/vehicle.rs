@@ -6,11 +6,11 @@ use core::panic::PanicInfo;
 
 use agv_controller::Troubles;
 use agv_core::localizer::Parameters;
+use agv_firmware::app::capacities::Localizer;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
 use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
-use agv_firmware::app::room::Localizer;
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::supervision::Supervisor;
 use agv_firmware::app::throttle::Throttle;

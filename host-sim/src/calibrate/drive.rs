@@ -113,6 +113,29 @@ pub struct Preparation<'a> {
     pub mend: bool,
 }
 
+/// The counters as ticks, and their faults; a driving wheel with a negative scale counts the other way.
+fn count_all(
+    input: &LogInput,
+    tricycle: &Tricycle,
+    is_drive_turned: bool,
+    mend: bool,
+) -> Result<(Vec<Counted>, Vec<CounterFault>), Refusal> {
+    if input.encoders.len() < 2 {
+        return Err(Refusal::NoEncoders);
+    }
+    let turned = |sample: &EncoderSample| EncoderSample { drive: opposite(sample.drive, tricycle), ..*sample };
+    let (counted, faults) = if is_drive_turned {
+        count(&input.encoders.iter().map(turned).collect::<Vec<_>>(), tricycle, mend)
+    } else {
+        count(&input.encoders, tricycle, mend)
+    };
+    let travelled: f64 = counted.windows(2).map(|pair| (pair[1].ticks - pair[0].ticks).abs()).sum();
+    if travelled < SHORTEST_WAY / tricycle.drive_scale {
+        return Err(Refusal::NoMotion);
+    }
+    Ok((counted, faults))
+}
+
 impl Drive {
     /// Counts, follows the reflectors, and cuts the drive.
     ///
@@ -122,22 +145,10 @@ impl Drive {
         let Vehicle::Tricycle(tricycle) = input.parameters.vehicle else {
             return Err(Refusal::OtherVehicle);
         };
-        if input.encoders.len() < 2 {
-            return Err(Refusal::NoEncoders);
-        }
         let is_drive_turned = tricycle.drive_scale < 0.0;
         let tricycle = Tricycle { drive_scale: tricycle.drive_scale.abs(), ..tricycle };
-        let turned = |sample: &EncoderSample| EncoderSample { drive: opposite(sample.drive, &tricycle), ..*sample };
-        let (counted, faults) = if is_drive_turned {
-            count(&input.encoders.iter().map(turned).collect::<Vec<_>>(), &tricycle, preparation.mend)
-        } else {
-            count(&input.encoders, &tricycle, preparation.mend)
-        };
+        let (counted, faults) = count_all(input, &tricycle, is_drive_turned, preparation.mend)?;
         let shortest = SHORTEST_WAY / tricycle.drive_scale;
-        let travelled: f64 = counted.windows(2).map(|pair| (pair[1].ticks - pair[0].ticks).abs()).sum();
-        if travelled < shortest {
-            return Err(Refusal::NoMotion);
-        }
         let nominal = VehicleModel::nominal(&tricycle, input.parameters.lasers.first());
         let mut drive = Self {
             nominal,
@@ -156,22 +167,7 @@ impl Drive {
             drive.remarks.push(format!("{} observations of reflectors are no numbers", input.bad_observations));
         }
         let direct = if input.laser_poses.len() >= 2 { &input.laser_poses } else { &input.given_poses };
-        let follow = |counted: &[Counted]| track(&input.revolutions, &OdometryPath::new(counted, &nominal));
-        let poses = |tracked: &[TrackedRevolution]| {
-            let located = located_poses(tracked);
-            if located.len() < FEWEST_STOPS { Some(direct.clone()) } else { is_followed(tracked).then_some(located) }
-        };
-        let mut tracked = follow(&drive.counted);
-        let seen = poses(&tracked);
-        let turned = wrong_direction(&drive.counted, &nominal, seen.as_deref(), |turned| poses(&follow(turned)));
-        if let Some((fault, turned)) = turned {
-            if !preparation.mend {
-                return Err(Refusal::WrongDirection(fault.to_string()));
-            }
-            drive.faults.push(fault);
-            tracked = follow(&turned);
-            drive.counted = turned;
-        }
+        let tracked = drive.follow(input, direct, preparation.mend)?;
         let located = located_poses(&tracked);
         if located.len() >= FEWEST_STOPS {
             drive.poses = located;
@@ -196,6 +192,31 @@ impl Drive {
         let source = if is_measured { MotionSource::LaserPoses } else { MotionSource::GivenPoses };
         drive.cut_by_poses(source, shortest);
         Ok(drive)
+    }
+
+    /// Follows the reflectors, and turns the counter that counts the wrong way; `direct` are poses that others have found.
+    fn follow(
+        &mut self,
+        input: &LogInput,
+        direct: &[LaserPose],
+        mend: bool,
+    ) -> Result<Vec<TrackedRevolution>, Refusal> {
+        let nominal = self.nominal;
+        let follow = |counted: &[Counted]| track(&input.revolutions, &OdometryPath::new(counted, &nominal));
+        let poses = |tracked: &[TrackedRevolution]| {
+            let located = located_poses(tracked);
+            if located.len() < FEWEST_STOPS { Some(direct.to_vec()) } else { is_followed(tracked).then_some(located) }
+        };
+        let tracked = follow(&self.counted);
+        let seen = poses(&tracked);
+        let turned = wrong_direction(&self.counted, &nominal, seen.as_deref(), |turned| poses(&follow(turned)));
+        let Some((fault, turned)) = turned else { return Ok(tracked) };
+        if !mend {
+            return Err(Refusal::WrongDirection(fault.to_string()));
+        }
+        self.faults.push(fault);
+        self.counted = turned;
+        Ok(follow(&self.counted))
     }
 
     /// The vehicle with parameters that were found: a counter that counts the wrong way has a negative scale.

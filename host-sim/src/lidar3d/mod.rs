@@ -9,12 +9,14 @@ pub mod place_map;
 pub mod refinement;
 pub mod revolution;
 pub mod setup;
+mod setup_options;
 pub mod signatures;
 pub mod source;
 pub mod stand;
 pub mod survey;
 
 pub use revolution::{Revolution, Revolutions};
-pub use setup::{Setup, SetupError, SetupOptions};
+pub use setup::Setup;
+pub use setup_options::{SetupError, SetupOptions};
 pub use source::{OpenSource, Source, SourceError};
 pub use survey::Survey;

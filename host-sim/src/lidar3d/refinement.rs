@@ -33,7 +33,7 @@ const LEAST_SHARE: f64 = 0.3;
 const LEAST_INFORMATION: f64 = 0.01;
 
 /// An end that lies so far away, m, and is nearly as good leaves it open where the scan lies.
-const ELSEWHERE: f64 = 1.0;
+const ANOTHER_POSE: f64 = 1.0;
 const RIVAL: f64 = 0.97;
 
 /// Points of a scan with their normals, in the frame of the sensor.
@@ -122,7 +122,7 @@ impl Target {
         let ends: Vec<(Isometry3<f64>, Sum)> = followed.collect();
         let (pose, sum) = ends.iter().max_by(|one, other| one.1.weights.total_cmp(&other.1.weights))?;
         let is_elsewhere =
-            |other: &Isometry3<f64>| (other.translation.vector - pose.translation.vector).norm() > ELSEWHERE;
+            |other: &Isometry3<f64>| (other.translation.vector - pose.translation.vector).norm() > ANOTHER_POSE;
         if ends.iter().any(|(other, rival)| is_elsewhere(other) && rival.weights > RIVAL * sum.weights) {
             return None;
         }

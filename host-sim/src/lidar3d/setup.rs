@@ -1,79 +1,15 @@
 //! Which sensor it is, and with which parameters its packets are decoded.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use agv_lidar3d::calibration::{Calibration, CalibrationError, Laser};
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::packet::{Filter, Sensor, ouster};
 
 use super::kind::Kind;
+use super::setup_options::{SetupError, SetupOptions};
 use super::survey::Survey;
-use crate::text_file::{self, TextFileError};
-
-/// What somebody states about a sensor.
-#[derive(Clone, Debug, Default)]
-pub struct SetupOptions {
-    /// Its kind, where the packets do not state it.
-    pub sensor: Option<Sensor>,
-    /// Its calibration file; of an Ouster, its metadata.
-    pub calibration: Option<PathBuf>,
-    /// UDP port of a capture; None for that of the first packet of a sensor.
-    pub port: Option<u16>,
-    /// How the offsets of its beams are measured.
-    pub offsets: Offsets,
-    /// Whether the maker's two-point correction is used where a laser states it.
-    pub two_points: bool,
-    /// Returns nearer than this are false, m; None for what the kind of sensor needs.
-    pub near: Option<f32>,
-    /// Returns farther than this are false, m; None for what the kind of sensor needs.
-    pub far: Option<f32>,
-}
-
-/// Why packets cannot be decoded.
-#[derive(Debug, thiserror::Error)]
-pub enum SetupError {
-    /// The calibration file cannot be read.
-    #[error(transparent)]
-    File(#[from] TextFileError),
-    /// The calibration file is none, or is of another sensor.
-    #[error("{}: {problem}", path.display())]
-    Calibration {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: CalibrationError,
-    },
-    /// The metadata of an Ouster are none.
-    #[error("{}: {problem}", path.display())]
-    Metadata {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: ouster::MetadataError,
-    },
-    /// The packets do not state what sends them.
-    #[error("the packets do not state which sensor sends them; name it with --sensor")]
-    UnknownSensor,
-    /// The packets state another sensor than somebody did.
-    #[error("the packets are of a {}, not of a {}", found.name(), stated.name())]
-    OtherSensor {
-        /// What somebody stated.
-        stated: Sensor,
-        /// What the packets state.
-        found: Kind,
-    },
-    /// A sensor whose calibration is nowhere.
-    #[error(
-        "a {} needs its calibration, and the {packets} packets do not carry a whole one; name a file with --calibration",
-        kind.name()
-    )]
-    NoCalibration {
-        /// The sensor.
-        kind: Kind,
-        /// Packets that there are.
-        packets: usize,
-    },
-}
+use crate::text_file;
 
 /// A sensor with its parameters.
 #[derive(Clone, Debug)]
@@ -105,28 +41,14 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, SetupError> {
     Calibration::read(&text).map_err(|problem| SetupError::Calibration { path: path.to_owned(), problem })
 }
 
-impl SetupOptions {
-    /// What an Ouster states about itself, if the calibration file is that: its name ends in .json.
-    ///
-    /// # Errors
-    /// See [`SetupError`].
-    pub fn ouster(&self) -> Result<Option<ouster::Sensor>, SetupError> {
-        let is_json = |path: &&PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-        let Some(path) = self.calibration.as_ref().filter(is_json) else { return Ok(None) };
-        let text = text_file::read(path, "the metadata of an Ouster (JSON)")?;
-        let sensor = ouster::Sensor::read(&text);
-        sensor.map(Some).map_err(|problem| SetupError::Metadata { path: path.clone(), problem })
-    }
-
-    /// The kind of sensor, which must be that of the packets where they state it.
-    fn kind(&self, survey: &Survey) -> Result<Kind, SetupError> {
-        match (self.sensor, survey.kind) {
-            (Some(stated), Some(found)) if found != Kind::Velodyne(stated) => {
-                Err(SetupError::OtherSensor { stated, found })
-            }
-            (Some(stated), _) => Ok(Kind::Velodyne(stated)),
-            (None, found) => found.ok_or(SetupError::UnknownSensor),
+/// The kind of sensor, which must be that of the packets where they state it.
+fn kind(options: &SetupOptions, survey: &Survey) -> Result<Kind, SetupError> {
+    match (options.sensor, survey.kind) {
+        (Some(stated), Some(found)) if found != Kind::Velodyne(stated) => {
+            Err(SetupError::OtherSensor { stated, found })
         }
+        (Some(stated), _) => Ok(Kind::Velodyne(stated)),
+        (None, found) => found.ok_or(SetupError::UnknownSensor),
     }
 }
 
@@ -141,7 +63,7 @@ impl Setup {
             let lasers = sensor.lasers().collect();
             return Ok(Self { ouster: Some(Box::new(sensor)), ..Self::bare(options, Kind::Ouster, lasers) });
         }
-        let kind = options.kind(survey)?;
+        let kind = kind(options, survey)?;
         match kind {
             Kind::Velodyne(sensor) => Self::of_velodyne(options, survey, sensor),
             Kind::Hesai(sensor) => {

@@ -13,7 +13,8 @@ use super::clouds;
 use super::kind::{Datagram, Kind};
 use super::live::Listener;
 use super::revolution::{Revolution, Revolutions};
-use super::setup::{Setup, SetupError, SetupOptions};
+use super::setup::Setup;
+use super::setup_options::{SetupError, SetupOptions};
 use super::survey::{Survey, SurveyError, Surveyor};
 use crate::import::range_image::{RangeImageError, RangeImages};
 

@@ -10,7 +10,7 @@ use agv_lidar3d::packet::{Packet, Sensor, Tail, counts_between, hesai};
 
 use super::capture::{self, CaptureError};
 use super::kind::{Datagram, Kind};
-use super::setup::{SetupError, SetupOptions};
+use super::setup_options::{SetupError, SetupOptions};
 
 /// Why nothing is known of a capture.
 #[derive(Debug, thiserror::Error)]

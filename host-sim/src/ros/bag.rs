@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use mcap::sans_io::linear_reader::LinearReaderOptions;
 use serde::Deserialize;
 
+use super::bag_message::BagMessage;
 use super::database::{self, DatabaseError};
 use crate::file_kind;
 
@@ -55,19 +56,6 @@ pub enum BagError {
         /// What is wrong.
         source: DatabaseError,
     },
-}
-
-/// One message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BagMessage<'a> {
-    /// Its topic.
-    pub topic: &'a str,
-    /// Name of its kind, such as `sensor_msgs/msg/LaserScan`.
-    pub kind: &'a str,
-    /// When it was recorded, ns.
-    pub time: u64,
-    /// Its bytes.
-    pub data: &'a [u8],
 }
 
 /// A recording.

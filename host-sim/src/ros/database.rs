@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rusqlite::{Connection, OpenFlags};
 
-use super::bag::BagMessage;
+use super::bag_message::BagMessage;
 
 /// Why a database cannot be read.
 pub type DatabaseError = rusqlite::Error;

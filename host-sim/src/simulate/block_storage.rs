@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::path::{Direction, Leg, Path, PathSegment};
 use super::random::{Random, Stream};
-use super::world::{Circle, Pallet, Rectangle, Reflector, World};
+use super::shape::{Circle, Pallet, Rectangle, Reflector};
+use super::world::World;
 
 /// Where the aisle and the lane have reflectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -13,23 +13,24 @@ pub mod random;
 pub mod raycast;
 pub mod reflector_detector;
 pub mod scenario;
+pub mod shape;
 pub mod speed_profile;
 pub mod vehicle;
 pub mod warehouse_hall;
 pub mod world;
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Parameters, PoseFix};
+use agv_core::localizer::PoseFix;
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::Time;
-use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
+use agv_core::odometry::{Ackermann, Tricycle};
 
 use crate::recording::{RecordedEvent, Recording, Truth};
 use laser::{LaserTrack, Revolution, Scene};
 use path::Path;
 use random::{Random, Stream};
 use raycast::RayCaster;
-use scenario::{MotionReport, Scenario, ScenarioError};
+use scenario::{MotionReport, Scenario, ScenarioError, believed_parameters, believed_tricycle};
 use vehicle::Motion;
 use world::World;
 
@@ -105,33 +106,6 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
         references: Vec::new(),
     };
     Ok(Simulation { recording, world, path, true_tricycle, true_laser })
-}
-
-/// What the localiser believes of vehicle and laser.
-#[must_use]
-pub fn believed_parameters(scenario: &Scenario) -> Parameters {
-    let believed = &scenario.vehicle.believed;
-    let vehicle = match scenario.vehicle.reports {
-        MotionReport::Encoders => Vehicle::Tricycle(believed_tricycle(scenario)),
-        MotionReport::Speed => {
-            Vehicle::Ackermann(Ackermann { wheelbase: believed.wheelbase, encoder_offset: believed.encoder_offset })
-        }
-        MotionReport::Increments => Vehicle::Increments,
-    };
-    Parameters::new(vehicle, scenario.laser.mounting.pose())
-}
-
-fn believed_tricycle(scenario: &Scenario) -> Tricycle {
-    let believed = &scenario.vehicle.believed;
-    Tricycle {
-        wheelbase: believed.wheelbase,
-        drive_scale: believed.drive_scale,
-        drive_range: CounterRange::new(believed.drive_counter).unwrap_or(CounterRange::BITS_32),
-        steering_scale: std::f64::consts::TAU / believed.steering_counter as f64,
-        steering_range: CounterRange::new(believed.steering_counter).unwrap_or(CounterRange::BITS_32),
-        steering_offset_forward: believed.steering_offset_forward_deg.to_radians(),
-        steering_offset_backward: believed.steering_offset_backward_deg.to_radians(),
-    }
 }
 
 fn true_tricycle(scenario: &Scenario) -> Tricycle {

@@ -3,7 +3,7 @@
 use agv_core::geometry::Point;
 use serde::{Deserialize, Serialize};
 
-use super::world::Circle;
+use super::shape::Circle;
 
 /// What the laser sees of a person.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,7 +2,8 @@
 
 use agv_core::geometry::Point;
 
-use super::world::{Circle, Segment, World};
+use super::shape::{Circle, Segment};
+use super::world::World;
 
 /// What was hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use super::laser::{FIRST_BEARING, LaserTrack, Revolution, beam_interval, bearing
 use super::random::Random;
 use super::raycast::Surface;
 use super::scenario::{LaserOptions, ReflectorOptions};
-use super::world::Reflector;
+use super::shape::Reflector;
 
 /// Steps of the search for the time at which the beam crosses a reflector; each reduces the error by the ratio of the
 /// vehicle's to the laser's rotation.

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::path::{Direction, Leg, Path, PathSegment};
 use super::random::{Random, Stream};
-use super::world::{Circle, Rectangle, Reflector, World};
+use super::shape::{Circle, Rectangle, Reflector};
+use super::world::World;
 
 /// What differs between halls.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -43,7 +43,7 @@ pub struct PoseMoment {
     pub reason: Reason,
     /// Reason in words.
     pub reason_name: &'static str,
-    /// Way since a landmark last corrected the pose, m.
+    /// Distance travelled since a landmark last corrected the pose, m.
     pub dead_reckoning_m: f64,
     /// Share of the observations that were accepted lately.
     pub acceptance: f64,

@@ -2,7 +2,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use agv_core::geometry::{Point, Pose};
 use agv_host_sim::simulate::raycast::RayCaster;
-use agv_host_sim::simulate::world::{Circle, Rectangle, World};
+use agv_host_sim::simulate::shape::{Circle, Rectangle};
+use agv_host_sim::simulate::world::World;
 use proptest::prelude::*;
 
 use super::support::crossing;

@@ -5,7 +5,7 @@ use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
 use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording, Truth};
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario, Shapes, WorldOptions};
-use agv_host_sim::simulate::world::Segment;
+use agv_host_sim::simulate::shape::Segment;
 
 /// Distance at which a ray crosses a segment, found in the frame of the ray; None if it passes beside it.
 pub fn crossing(origin: &Point, angle: f64, segment: &Segment) -> Option<f64> {

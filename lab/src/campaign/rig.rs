@@ -72,6 +72,24 @@ pub struct Heard<'a> {
     pub truth: &'a dyn Fn(Time) -> Option<Pose>,
 }
 
+/// Everything on the vehicle.
+struct Rig<'a> {
+    recording: &'a Recording,
+    faults: &'a [&'a Fault],
+    settings: Settings,
+    /// None while the power is cut.
+    controller: Option<Box<Controller>>,
+    pair: EmulatedPair,
+    sensor: Sensor,
+    connection: Option<Connection>,
+    from_laser: Line<Vec<u8>>,
+    to_laser: Line<Vec<u8>>,
+    from_bus: Line<Frame>,
+    receiver: PoseReceiver,
+    /// What the bus has said last, and the time that it states.
+    published: Option<(PublishedPose, Time)>,
+}
+
 /// Drives a recorded drive with faults. `recording` has what the sensors see, faults of measurements included.
 ///
 /// # Errors
@@ -82,117 +100,163 @@ pub fn drive(
     options: &RigOptions,
     mut hear: impl FnMut(&Heard),
 ) -> Result<(), RigError> {
-    let &RigOptions { seconds, seed, is_told } = options;
-    let settings = Settings::of(recording.parameters);
-    let node = |number| NodeId::new(number).ok_or(RigError::Pair(PairError::NoEncoders));
-    let mut pair =
-        EmulatedPair::new(recording, node(settings.nodes.drive)?, node(settings.nodes.steering)?)?.standing();
-    let drive = Drive::new(recording, SensorFrame::default())?;
-    let mut sensor = Sensor::new(drive, clock(faults), None, true);
-    let mut connection: Option<Connection> = None;
-    let mut from_laser: Line<Vec<u8>> = Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams));
-    let mut to_laser: Line<Vec<u8>> = Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams));
-    let mut from_bus: Line<Frame> = Line::new(BUS_LATENCY, Random::new(seed, Stream::Frames));
-    let new_controller = |now| {
-        let mut localizer = <Localizer>::new(settings.parameters);
-        localizer.add_landmarks(&recording.landmarks).map_err(RigError::Map)?;
-        Ok::<_, RigError>(Box::new(Controller::new(&settings, localizer, now)))
-    };
-    let mut controller = Some(new_controller(Time::default())?);
-    let mut receiver = PoseReceiver::new(node(settings.nodes.controller)?);
-    let mut published: Option<(PublishedPose, Time)> = None;
+    let mut rig = Rig::new(recording, faults, options.seed)?;
     let begin = Time::from_seconds(BEGIN);
-    let steps = ((BEGIN + seconds) * 1e6) as u64 / STEP;
+    let steps = ((BEGIN + options.seconds) * 1e6) as u64 / STEP;
     for step in 1..=steps {
         let now = Time::from_micros(step * STEP);
-        let (sensor_time, time) = (now.since(Time::default()), now.since(begin));
-        let is = |what: FaultKind| faults.iter().any(|fault| fault.what == what && fault.is_active(time));
+        let time = now.since(begin);
         if now == begin {
-            pair.begin(now);
-            sensor.begin(sensor_time);
-            if let (true, Some(controller), Some(RecordedEvent::SetPose(fix))) =
-                (is_told, &mut controller, recording.events.first())
-            {
-                let mut fix = *fix;
-                fix.time = now;
-                controller.tell(fix, |_| ());
-            }
+            rig.begin(now, options.is_told);
         }
-        if is(FaultKind::PowerCut) {
-            (controller, connection) = (None, None);
-            from_laser.clear();
-            to_laser.clear();
-        } else if controller.is_none() {
-            controller = Some(new_controller(now)?);
-        }
-        let is_unreachable = is(FaultKind::LaserUnreachable);
-        if is_unreachable && connection.take().is_some() {
-            from_laser.clear();
-            to_laser.clear();
-            if let Some(controller) = &mut controller {
-                controller.unreachable();
-            }
-        }
-        if let Some(controller) = &mut controller {
-            // The controller and its laser.
-            let mut wishes = Vec::new();
-            while let Some(bytes) = from_laser.receive(now) {
-                controller.hear_laser(&bytes, now, |order| wishes.push(Wish::of(order)), |_| ());
-            }
-            controller.poll_laser(now, |order| wishes.push(Wish::of(order)), |_| ());
-            for wish in wishes {
-                match wish {
-                    Wish::Connect if is_unreachable => controller.unreachable(),
-                    Wish::Connect => {
-                        connection = Some(Connection::default());
-                        controller.connected(now);
-                    }
-                    Wish::Disconnect => {
-                        connection = None;
-                        from_laser.clear();
-                        to_laser.clear();
-                    }
-                    Wish::Send(bytes) if is(FaultKind::LaserSilent) => drop(bytes),
-                    Wish::Send(bytes) => to_laser.send_telegram(now, time, bytes, &[]),
-                }
-            }
-            // The controller and its bus.
-            while let Some(frame) = from_bus.receive(now) {
-                // What answers a frame is no pose.
-                controller.hear_bus(&frame, now, |_| (), |_| ());
-            }
-            let answer = |frame: &Frame| {
-                if let Some(pose) = receiver.handle(frame) {
-                    published = Some((pose, stated(&pose, now)));
-                }
-                for answer in pair.handle(frame) {
-                    from_bus.send_frame(now, time, answer, faults);
-                }
-            };
-            controller.poll_bus(now, answer, |_| ());
-            controller.search(|_| ());
-        }
-        if let Some(connection) = &mut connection {
-            let mut answers = Vec::new();
-            while let Some(bytes) = to_laser.receive(now) {
-                answers.push(connection.receive(&mut sensor, &bytes, sensor_time));
-            }
-            answers.extend(connection.poll(&sensor, sensor_time));
-            for answer in answers {
-                from_laser.send_telegram(now, time, answer, faults);
-            }
-        }
-        for frame in pair.poll(now) {
-            from_bus.send_frame(now, time, frame, faults);
-        }
+        rig.switch(now, time)?;
+        rig.control(now, time);
+        rig.answer(now, time);
         if step % STEPS_A_POSE == 0 {
-            let output = controller.as_ref().and_then(|controller| controller.output());
+            let output = rig.controller.as_ref().and_then(|controller| controller.output());
             let truth = |at: Time| truth_at(&recording.truth, START.offset(at.since(begin).max(0.0)));
-            let published = published.as_ref().map(|(pose, stated)| (pose, *stated));
+            let published = rig.published.as_ref().map(|(pose, stated)| (pose, *stated));
             hear(&Heard { now, time, output: output.as_ref(), published, truth: &truth });
         }
     }
     Ok(())
+}
+
+impl<'a> Rig<'a> {
+    fn new(recording: &'a Recording, faults: &'a [&'a Fault], seed: u64) -> Result<Self, RigError> {
+        let settings = Settings::of(recording.parameters);
+        let node = |number| NodeId::new(number).ok_or(RigError::Pair(PairError::NoEncoders));
+        let pair =
+            EmulatedPair::new(recording, node(settings.nodes.drive)?, node(settings.nodes.steering)?)?.standing();
+        let drive = Drive::new(recording, SensorFrame::default())?;
+        let receiver = PoseReceiver::new(node(settings.nodes.controller)?);
+        let mut rig = Self {
+            recording,
+            faults,
+            settings,
+            controller: None,
+            pair,
+            sensor: Sensor::new(drive, clock(faults), None, true),
+            connection: None,
+            from_laser: Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams)),
+            to_laser: Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams)),
+            from_bus: Line::new(BUS_LATENCY, Random::new(seed, Stream::Frames)),
+            receiver,
+            published: None,
+        };
+        rig.power_on(Time::default())?;
+        Ok(rig)
+    }
+
+    fn has(&self, what: FaultKind, time: f64) -> bool {
+        self.faults.iter().any(|fault| fault.what == what && fault.is_active(time))
+    }
+
+    fn power_on(&mut self, now: Time) -> Result<(), RigError> {
+        let mut localizer = <Localizer>::new(self.settings.parameters);
+        localizer.add_landmarks(&self.recording.landmarks).map_err(RigError::Map)?;
+        self.controller = Some(Box::new(Controller::new(&self.settings, localizer, now)));
+        Ok(())
+    }
+
+    /// Lets the vehicle drive off.
+    fn begin(&mut self, now: Time, is_told: bool) {
+        self.pair.begin(now);
+        self.sensor.begin(now.since(Time::default()));
+        if let (true, Some(controller), Some(RecordedEvent::SetPose(fix))) =
+            (is_told, &mut self.controller, self.recording.events.first())
+        {
+            let mut fix = *fix;
+            fix.time = now;
+            controller.tell(fix, |_| ());
+        }
+    }
+
+    /// Cuts the power and the laser's network, and gives them back.
+    fn switch(&mut self, now: Time, time: f64) -> Result<(), RigError> {
+        if self.has(FaultKind::PowerCut, time) {
+            (self.controller, self.connection) = (None, None);
+            self.clear_laser_lines();
+        } else if self.controller.is_none() {
+            self.power_on(now)?;
+        }
+        if self.has(FaultKind::LaserUnreachable, time) && self.connection.take().is_some() {
+            self.clear_laser_lines();
+            if let Some(controller) = &mut self.controller {
+                controller.unreachable();
+            }
+        }
+        Ok(())
+    }
+
+    fn clear_laser_lines(&mut self) {
+        self.from_laser.clear();
+        self.to_laser.clear();
+    }
+
+    /// What the controller does.
+    fn control(&mut self, now: Time, time: f64) {
+        let Some(mut controller) = self.controller.take() else { return };
+        let mut orders = Vec::new();
+        while let Some(bytes) = self.from_laser.receive(now) {
+            controller.hear_laser(&bytes, now, |order| orders.push(order.map(<[u8]>::to_vec)), |_| ());
+        }
+        controller.poll_laser(now, |order| orders.push(order.map(<[u8]>::to_vec)), |_| ());
+        for order in orders {
+            self.obey(order, &mut controller, now, time);
+        }
+        while let Some(frame) = self.from_bus.receive(now) {
+            // What answers a frame is no pose.
+            controller.hear_bus(&frame, now, |_| (), |_| ());
+        }
+        let Self { receiver, published, pair, from_bus, faults, .. } = self;
+        let answer = |frame: &Frame| {
+            if let Some(pose) = receiver.handle(frame) {
+                *published = Some((pose, stated(&pose, now)));
+            }
+            for answer in pair.handle(frame) {
+                from_bus.send_frame(now, time, answer, faults);
+            }
+        };
+        controller.poll_bus(now, answer, |_| ());
+        controller.search(|_| ());
+        self.controller = Some(controller);
+    }
+
+    /// Does what the controller wants of its laser.
+    fn obey(&mut self, order: LaserOrder<Vec<u8>>, controller: &mut Controller, now: Time, time: f64) {
+        match order {
+            LaserOrder::Connect if self.has(FaultKind::LaserUnreachable, time) => controller.unreachable(),
+            LaserOrder::Connect => {
+                self.connection = Some(Connection::default());
+                controller.connected(now);
+            }
+            LaserOrder::Disconnect => {
+                self.connection = None;
+                self.clear_laser_lines();
+            }
+            LaserOrder::Send(bytes) if self.has(FaultKind::LaserSilent, time) => drop(bytes),
+            LaserOrder::Send(bytes) => self.to_laser.send_telegram(now, time, bytes, &[]),
+        }
+    }
+
+    /// What the sensors say.
+    fn answer(&mut self, now: Time, time: f64) {
+        let sensor_time = now.since(Time::default());
+        if let Some(connection) = &mut self.connection {
+            let mut answers = Vec::new();
+            while let Some(bytes) = self.to_laser.receive(now) {
+                answers.push(connection.receive(&mut self.sensor, &bytes, sensor_time));
+            }
+            answers.extend(connection.poll(&self.sensor, sensor_time));
+            for answer in answers {
+                self.from_laser.send_telegram(now, time, answer, self.faults);
+            }
+        }
+        for frame in self.pair.poll(now) {
+            self.from_bus.send_frame(now, time, frame, self.faults);
+        }
+    }
 }
 
 /// The time that a pose states, of which its frames carry the low 16 bits of the milliseconds.
@@ -200,23 +264,6 @@ fn stated(pose: &PublishedPose, now: Time) -> Time {
     let milliseconds = now.micros() / 1000;
     let age = (milliseconds as u16).wrapping_sub(pose.time) as i16;
     Time::from_micros(1000 * milliseconds.saturating_add_signed(-i64::from(age)))
-}
-
-/// What the controller wants of its laser, for later.
-enum Wish {
-    Connect,
-    Disconnect,
-    Send(Vec<u8>),
-}
-
-impl Wish {
-    fn of(order: LaserOrder) -> Self {
-        match order {
-            LaserOrder::Connect => Self::Connect,
-            LaserOrder::Disconnect => Self::Disconnect,
-            LaserOrder::Send(bytes) => Self::Send(bytes.to_vec()),
-        }
-    }
 }
 
 /// What the laser's clock shows.

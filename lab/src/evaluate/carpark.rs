@@ -73,7 +73,7 @@ pub struct Outcome {
 }
 
 /// A landmark that is further from every surveyed reflector, m, is none of them.
-const ELSEWHERE: f64 = 1.0;
+const FARTHEST_OF_ITS_REFLECTOR: f64 = 1.0;
 
 /// Why the experiment cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -171,7 +171,7 @@ fn judge_map(outcome: &mut Outcome, replay: &Replay, survey: &[Landmark]) {
             survey.iter().map(|landmark| (landmark.x - x).hypot(landmark.y - y)).fold(f64::INFINITY, f64::min)
         })
         .collect();
-    let found: Vec<f64> = nearest.iter().copied().filter(|distance| *distance <= ELSEWHERE).collect();
+    let found: Vec<f64> = nearest.iter().copied().filter(|distance| *distance <= FARTHEST_OF_ITS_REFLECTOR).collect();
     outcome.landmarks = nearest.len();
     outcome.landmarks_elsewhere = nearest.len() - found.len();
     outcome.map_error_m = (!found.is_empty()).then(|| root_mean_square(found.into_iter()));

@@ -200,7 +200,7 @@ fn perform<F: NorFlash>(
         Change::FinishMap => Kept::MapEnd,
         Change::Set(name, value) => {
             let leaf = Leaf::named(name).ok_or(Refusal::Name)?;
-            leaf.set(&mut controller.settings, value).map_err(|error| match error {
+            leaf.change(&mut controller.settings, value).map_err(|error| match error {
                 LeafError::Kind => Refusal::Kind,
                 LeafError::Bounds => Refusal::Bounds,
             })?;

@@ -137,6 +137,8 @@ pub fn changed(share: f64) -> Settings {
     let mut settings = Settings::default();
     for leaf in &LEAVES {
         let (least, most) = leaf.bounds;
+        // Settings of any two shares go together.
+        let share = if leaf.name == "features.nearest" { 0.1 * share } else { share };
         let value = match leaf.get(&settings).unwrap() {
             Value::Number(_) => Value::Number(least + share * (most - least)),
             Value::Whole(_) => Value::Whole((least + share * (most - least)) as u64),

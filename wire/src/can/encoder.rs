@@ -178,6 +178,19 @@ enum Step {
     WriteHeartbeat,
 }
 
+impl Step {
+    const fn is_write(self) -> bool {
+        matches!(
+            self,
+            Self::WriteTransmission
+                | Self::WriteInhibitTime
+                | Self::WriteEventTimer
+                | Self::WriteCyclicTimer
+                | Self::WriteHeartbeat
+        )
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     Waiting { next_reset: Time },
@@ -447,6 +460,9 @@ impl Encoder {
 
     /// Takes the answer of a step; gives the next one, or none if it was the last.
     fn after(&mut self, step: Step, value: Option<u32>, is_ok: bool) -> Result<Option<Step>, SetupError> {
+        if step.is_write() {
+            return Ok(self.after_write(step, is_ok));
+        }
         let identity = &mut self.identity;
         Ok(Some(match step {
             Step::ReadUnits => {
@@ -499,30 +515,34 @@ impl Encoder {
                 }
                 Step::WriteTransmission
             }
+            _ => return Ok(None),
+        }))
+    }
+
+    /// The same for a step that writes.
+    fn after_write(&mut self, step: Step, is_ok: bool) -> Option<Step> {
+        let identity = &mut self.identity;
+        // The event timer may be kept elsewhere.
+        if !matches!(step, Step::WriteEventTimer) {
+            identity.refused_settings += u8::from(!is_ok);
+        }
+        match step {
             Step::WriteTransmission => {
-                identity.refused_settings += u8::from(!is_ok);
                 identity.keeps_timer = is_ok;
                 if self.settings.reporting == Reporting::Synchronous {
-                    return Ok(self.write_heartbeat());
+                    return self.write_heartbeat();
                 }
-                Step::WriteInhibitTime
+                Some(Step::WriteInhibitTime)
             }
-            Step::WriteInhibitTime => {
-                identity.refused_settings += u8::from(!is_ok);
-                Step::WriteEventTimer
-            }
-            Step::WriteEventTimer if !is_ok => Step::WriteCyclicTimer,
-            Step::WriteEventTimer => return Ok(self.write_heartbeat()),
+            Step::WriteInhibitTime => Some(Step::WriteEventTimer),
+            Step::WriteEventTimer if !is_ok => Some(Step::WriteCyclicTimer),
+            Step::WriteEventTimer => self.write_heartbeat(),
             Step::WriteCyclicTimer => {
-                identity.refused_settings += u8::from(!is_ok);
                 identity.keeps_timer &= is_ok;
-                return Ok(self.write_heartbeat());
+                self.write_heartbeat()
             }
-            Step::WriteHeartbeat => {
-                identity.refused_settings += u8::from(!is_ok);
-                return Ok(None);
-            }
-        }))
+            _ => None,
+        }
     }
 
     /// The last step, unless the heartbeat is left as it is.

@@ -8,7 +8,7 @@ use super::{
 };
 use agv_core::geometry::{Pose, wrap};
 use agv_core::localizer::OBSERVATIONS;
-use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, ScanHead, Time};
 use agv_core::order::{Evenly, insertion_sort_by};
 
 /// Why an answer did not become a revolution.
@@ -33,13 +33,10 @@ pub struct SensorPose {
     pub mode: Option<PositionMode>,
 }
 
-/// What stands before the beams of a scan.
+/// A scan whose beams are elsewhere.
 #[derive(Clone, Copy, Debug)]
-struct ScanHead {
-    start: Time,
-    beam_interval: f64,
-    first_bearing: f64,
-    bearing_step: f64,
+struct TakenScan {
+    head: ScanHead,
     ranges: usize,
     intensities: usize,
 }
@@ -52,7 +49,7 @@ pub struct Revolution<const BEAMS: usize = 1440, const REFLECTORS: usize = { OBS
     laser: LaserId,
     ranges: [f32; BEAMS],
     intensities: [u16; BEAMS],
-    scan: Option<ScanHead>,
+    scan: Option<TakenScan>,
     reflectors: Option<Vec<ReflectorObservation, REFLECTORS>>,
     pose: Option<SensorPose>,
     error: ErrorCode,
@@ -88,16 +85,8 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> 
     /// The ranges, if the answer had any.
     #[must_use]
     pub fn scan(&self) -> Option<Scan<'_>> {
-        let head = self.scan?;
-        Some(Scan {
-            laser: self.laser,
-            start: head.start,
-            beam_interval: head.beam_interval,
-            first_bearing: head.first_bearing,
-            bearing_step: head.bearing_step,
-            ranges: self.ranges.get(..head.ranges)?,
-            intensities: self.intensities.get(..head.intensities)?,
-        })
+        let TakenScan { head, ranges, intensities } = self.scan?;
+        Some(head.scan(self.ranges.get(..ranges)?, self.intensities.get(..intensities)?))
     }
 
     /// The reflectors, if the answer had a list of them. It may be empty.
@@ -176,7 +165,7 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> 
         remission: Option<&Channel<u16>>,
         clock: &SensorClock,
         frame: &SensorFrame,
-    ) -> Result<ScanHead, RevolutionError> {
+    ) -> Result<TakenScan, RevolutionError> {
         let is_scaled = distances.scale.is_finite() && distances.scale > 0.0 && distances.offset.is_finite();
         if !is_scaled || distances.resolution == 0 {
             return Err(RevolutionError::Channel);
@@ -189,11 +178,15 @@ impl<const BEAMS: usize, const REFLECTORS: usize> Revolution<BEAMS, REFLECTORS> 
             }
             _ => 0,
         };
-        Ok(ScanHead {
+        let head = ScanHead {
+            laser: self.laser,
             start: clock.to_local(distances.start).ok_or(RevolutionError::Clock)?,
             beam_interval: frame.interval(step),
             first_bearing: frame.bearing(distances.first.radians()),
             bearing_step: frame.step(step),
+        };
+        Ok(TakenScan {
+            head,
             ranges: distances.copy_metres(&mut self.ranges).ok_or(RevolutionError::Beams)?,
             intensities,
         })
@@ -211,7 +204,7 @@ fn sensor_pose(report: &PoseReport, clock: &SensorClock, frame: &SensorFrame) ->
 /// Reflectors without a place, or without a time and a scan that tells it, are left out.
 fn take_reflectors<const N: usize>(
     list: &ReflectorList,
-    scan: Option<&ScanHead>,
+    scan: Option<&TakenScan>,
     clock: &SensorClock,
     frame: &SensorFrame,
 ) -> Result<Vec<ReflectorObservation, N>, RevolutionError> {
@@ -231,7 +224,7 @@ fn take_reflectors<const N: usize>(
 
 fn observation(
     reflector: &Reflector,
-    scan: Option<&ScanHead>,
+    scan: Option<&TakenScan>,
     clock: &SensorClock,
     frame: &SensorFrame,
 ) -> Option<ReflectorObservation> {
@@ -244,10 +237,10 @@ fn observation(
     let bearing = wrap(frame.bearing(angle));
     let time = match (reflector.details, scan) {
         (Some(details), _) => clock.to_local(details.time)?,
-        (None, Some(scan)) => {
-            let turn = libm::remainder((bearing - scan.first_bearing) / scan.bearing_step, scan.ranges as f64);
-            let beam = if turn < 0.0 { turn + scan.ranges as f64 } else { turn };
-            scan.start.offset(beam * scan.beam_interval)
+        (None, Some(TakenScan { head, ranges, .. })) => {
+            let turn = libm::remainder((bearing - head.first_bearing) / head.bearing_step, *ranges as f64);
+            let beam = if turn < 0.0 { turn + *ranges as f64 } else { turn };
+            head.start.offset(beam * head.beam_interval)
         }
         (None, None) => return None,
     };

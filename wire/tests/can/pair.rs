@@ -1,7 +1,7 @@
 //! Two encoders as one measurement.
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Event, Localizer, Mode, Parameters, PoseFix, Reason};
+use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, Reason};
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_wire::can::canopen::NodeId;
@@ -231,7 +231,7 @@ fn faults_are_told_when_they_change_and_while_they_last() {
     assert_eq!(last.time, at(400));
 }
 
-fn localizer() -> Box<Localizer<16, 16, 16, 16>> {
+fn localizer() -> Box<Localizer<CapacitiesOf<16, 16, 16, 16>>> {
     let vehicle = Vehicle::Tricycle(Tricycle {
         wheelbase: 1.5,
         drive_scale: 1e-4,

@@ -8,9 +8,8 @@ use agv_host_sim::calibrate::model::VehicleModel;
 use agv_host_sim::calibrate::plan::{Means, Plan as Planned, plan};
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::output_file;
-use agv_host_sim::simulate::believed_parameters;
 use agv_host_sim::simulate::path::Direction;
-use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::scenario::{Scenario, believed_parameters};
 use anyhow::{Context, ensure};
 use serde::Serialize;
 

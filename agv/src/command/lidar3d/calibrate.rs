@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use agv_host_sim::lidar3d::kind::Kind;
-use agv_host_sim::lidar3d::{Source, setup, stand};
+use agv_host_sim::lidar3d::{SetupOptions, Source, setup, stand};
 use agv_host_sim::output_file;
 use agv_host_sim::report::{Page, PointSet, Table, scatter_chart};
 use agv_lidar3d::calibration::{Calibration, Laser};
@@ -82,36 +82,22 @@ struct Wall {
     sum_of_squares_after_m2: f64,
 }
 
+/// What the scans of the stands show.
+struct Stands {
+    names: Vec<String>,
+    /// Parameters before the calibration.
+    start: Vec<Laser>,
+    targets: Vec<Target>,
+}
+
 impl Calibrate {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let write = writer(&self.output)?;
-        let stop = stop::on_interrupt()?;
         let options = self.sensor.options();
-        let bar = progress::bar("reading", self.sources.len() as u64);
-        let mut start: Option<Vec<Laser>> = None;
-        let mut targets = Vec::new();
-        let mut names = Vec::new();
-        for (number, source) in self.sources.into_iter().enumerate() {
-            let name = source.name();
-            let source = source.open(&options, &stop)?;
-            let setup = source.setup().with_context(|| name.clone())?;
-            ensure!(
-                matches!(setup.kind, Kind::Velodyne(_)),
-                "{name}: only a Velodyne is calibrated; this is a {}",
-                setup.kind.name()
-            );
-            let lasers = setup.lasers;
-            let returns = stand::returns(source, &stop).with_context(|| name.clone())?;
-            let target = intrinsic::segment(&lasers, options.offsets, &returns, number as u64);
-            targets.push(target.with_context(|| name.clone())?);
-            names.push(name);
-            start.get_or_insert(lasers);
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
-        let start = start.unwrap_or_default();
-        let found = intrinsic::calibrate(&start, options.offsets, self.residual.into(), &targets)?;
+        let stands = read_stands(&self.sources, &options)?;
+        let Stands { names, start, targets } = &stands;
+        let found = intrinsic::calibrate(start, options.offsets, self.residual.into(), targets)?;
         // What the file states beside the lasers stays as it is.
         let resolution = match &options.calibration {
             Some(path) => setup::read_calibration(path)?.distance_resolution,
@@ -119,67 +105,110 @@ impl Calibrate {
         };
         let calibration = Calibration { distance_resolution: resolution, lasers: found.lasers.clone() };
         output_file::write(&self.output, write(&calibration)).with_context(|| self.output.display().to_string())?;
-        let walls = walls(&names, &targets, options.offsets, (&start, &found));
+        let walls = walls(names, targets, options.offsets, (start, &found));
         let points_known = held::point_deviations(&found, options.offsets);
         if let Some(folder) = &self.report {
             let path = folder.join("index.html");
-            let page = page(&start, &found, &walls, &targets, options.offsets)?;
+            let page = page(&stands, &found, &walls, options.offsets)?;
             page.write(&path).with_context(|| path.display().to_string())?;
         }
-        let not_observed: Vec<usize> =
-            (0..found.lasers.len()).filter(|laser| found.deviations[*laser].is_none()).collect();
-        let worst =
-            |value: fn(&intrinsic::Deviation) -> f64| found.deviations.iter().flatten().map(value).fold(0.0, f64::max);
-        let [distance, elevation, rotation] = [
-            worst(|deviation| deviation.distance),
-            worst(|deviation| deviation.elevation.to_degrees()),
-            worst(|deviation| deviation.rotation.to_degrees()),
-        ];
         if self.json {
-            let summary = json!({
-                "stands": targets.len(),
-                "lasers": found.lasers.len() - not_observed.len(),
-                "not_observed": not_observed,
-                "held": held::object(&found),
-                "noise_m": found.noise,
-                "range_error_m": found.range_error,
-                "points": points_known,
-                "factory": {
-                    "distance_m": found.start_deviation.distance,
-                    "elevation_deg": found.start_deviation.elevation.to_degrees(),
-                    "rotation_deg": found.start_deviation.rotation.to_degrees(),
-                },
-                "rounds": found.rounds,
-                "worst_deviation": { "distance_m": distance, "elevation_deg": elevation, "rotation_deg": rotation },
-                "walls": walls,
-            });
-            println!("{}", serde_json::to_string_pretty(&summary)?);
-            return Ok(());
+            println!("{}", serde_json::to_string_pretty(&summary(&found, &walls, &points_known))?);
+        } else {
+            print(&found, &walls, &points_known);
         }
-        let total = |value: fn(&Wall) -> f64| walls.iter().map(value).sum::<f64>();
-        let (before, after) = (total(|wall| wall.sum_of_squares_before_m2), total(|wall| wall.sum_of_squares_after_m2));
-        let points: usize = walls.iter().map(|wall| wall.points).sum();
-        let thickness = |sum: f64| 1000.0 * (sum / points.max(1) as f64).sqrt();
-        let listed = not_observed.iter().map(usize::to_string).collect::<Vec<_>>().join(" ");
-        let mut rows = vec![
-            ["stands".to_owned(), targets.len().to_string()],
-            ["lasers".to_owned(), (found.lasers.len() - not_observed.len()).to_string()],
-            ["noise".to_owned(), format!("{:.1} mm", 1000.0 * found.noise)],
-            [
-                "standard deviations".to_owned(),
-                format!("at most {:.2} mm, theta {elevation:.4} deg, alpha {rotation:.4} deg", 1000.0 * distance),
-            ],
-            held::point_row(&points_known),
-            ["walls".to_owned(), format!("{:.1} -> {:.1} mm thick", thickness(before), thickness(after))],
-        ];
-        rows.extend(contradiction(&walls));
-        rows.extend(held::rows(&found));
-        if !not_observed.is_empty() {
-            rows.push(["not observed".to_owned(), listed]);
-        }
-        output::print_rows(&rows);
         Ok(())
     }
+}
+
+fn read_stands(sources: &[Source], options: &SetupOptions) -> anyhow::Result<Stands> {
+    let stop = stop::on_interrupt()?;
+    let bar = progress::bar("reading", sources.len() as u64);
+    let mut start: Option<Vec<Laser>> = None;
+    let mut stands = Stands { names: Vec::new(), start: Vec::new(), targets: Vec::new() };
+    for (number, source) in sources.iter().enumerate() {
+        let name = source.name();
+        let source = source.clone().open(options, &stop)?;
+        let setup = source.setup().with_context(|| name.clone())?;
+        ensure!(
+            matches!(setup.kind, Kind::Velodyne(_)),
+            "{name}: only a Velodyne is calibrated; this is a {}",
+            setup.kind.name()
+        );
+        let lasers = setup.lasers;
+        let returns = stand::returns(source, &stop).with_context(|| name.clone())?;
+        let target = intrinsic::segment(&lasers, options.offsets, &returns, number as u64);
+        stands.targets.push(target.with_context(|| name.clone())?);
+        stands.names.push(name);
+        start.get_or_insert(lasers);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    stands.start = start.unwrap_or_default();
+    Ok(stands)
+}
+
+fn not_observed(found: &Adjustment) -> Vec<usize> {
+    (0..found.lasers.len()).filter(|laser| found.deviations[*laser].is_none()).collect()
+}
+
+/// Largest standard deviations: distance, m; elevation and rotation, deg.
+fn worst_deviation(found: &Adjustment) -> [f64; 3] {
+    let worst =
+        |value: fn(&intrinsic::Deviation) -> f64| found.deviations.iter().flatten().map(value).fold(0.0, f64::max);
+    [
+        worst(|deviation| deviation.distance),
+        worst(|deviation| deviation.elevation.to_degrees()),
+        worst(|deviation| deviation.rotation.to_degrees()),
+    ]
+}
+
+fn summary(found: &Adjustment, walls: &[Wall], points_known: &[held::PointDeviation]) -> serde_json::Value {
+    let not_observed = not_observed(found);
+    let [distance, elevation, rotation] = worst_deviation(found);
+    json!({
+        "stands": found.common_range_errors.len(),
+        "lasers": found.lasers.len() - not_observed.len(),
+        "not_observed": not_observed,
+        "held": held::object(found),
+        "noise_m": found.noise,
+        "range_error_m": found.range_error,
+        "points": points_known,
+        "factory": {
+            "distance_m": found.start_deviation.distance,
+            "elevation_deg": found.start_deviation.elevation.to_degrees(),
+            "rotation_deg": found.start_deviation.rotation.to_degrees(),
+        },
+        "rounds": found.rounds,
+        "worst_deviation": { "distance_m": distance, "elevation_deg": elevation, "rotation_deg": rotation },
+        "walls": walls,
+    })
+}
+
+fn print(found: &Adjustment, walls: &[Wall], points_known: &[held::PointDeviation]) {
+    let not_observed = not_observed(found);
+    let [distance, elevation, rotation] = worst_deviation(found);
+    let total = |value: fn(&Wall) -> f64| walls.iter().map(value).sum::<f64>();
+    let (before, after) = (total(|wall| wall.sum_of_squares_before_m2), total(|wall| wall.sum_of_squares_after_m2));
+    let points: usize = walls.iter().map(|wall| wall.points).sum();
+    let thickness = |sum: f64| 1000.0 * (sum / points.max(1) as f64).sqrt();
+    let mut rows = vec![
+        ["stands".to_owned(), found.common_range_errors.len().to_string()],
+        ["lasers".to_owned(), (found.lasers.len() - not_observed.len()).to_string()],
+        ["noise".to_owned(), format!("{:.1} mm", 1000.0 * found.noise)],
+        [
+            "standard deviations".to_owned(),
+            format!("at most {:.2} mm, theta {elevation:.4} deg, alpha {rotation:.4} deg", 1000.0 * distance),
+        ],
+        held::point_row(points_known),
+        ["walls".to_owned(), format!("{:.1} -> {:.1} mm thick", thickness(before), thickness(after))],
+    ];
+    rows.extend(contradiction(walls));
+    rows.extend(held::rows(found));
+    if !not_observed.is_empty() {
+        rows.push(["not observed".to_owned(), not_observed.iter().map(usize::to_string).collect::<Vec<_>>().join(" ")]);
+    }
+    output::print_rows(&rows);
 }
 
 fn writer(path: &Path) -> anyhow::Result<fn(&Calibration) -> String> {
@@ -226,26 +255,19 @@ fn contradiction(walls: &[Wall]) -> Option<[String; 2]> {
 /// Points of a wall in a picture, at the most.
 const DRAWN: usize = 3000;
 
-fn page(
-    start: &[Laser],
-    found: &Adjustment,
-    walls: &[Wall],
-    targets: &[Target],
-    offsets: Offsets,
-) -> anyhow::Result<Page> {
+fn page(stands: &Stands, found: &Adjustment, walls: &[Wall], offsets: Offsets) -> anyhow::Result<Page> {
     let mut page = Page::new("Calibration of a multi-beam lidar");
     page.section("Walls");
+    let row = |wall: &Wall| {
+        let millimetres = |value: f64| format!("{:.1}", 1000.0 * value);
+        let (before, after) = (millimetres(wall.thickness_before_m), millimetres(wall.thickness_after_m));
+        vec![wall.stand.clone(), wall.points.to_string(), before, after]
+    };
     page.table(&Table {
         heading: ["stand", "points", "before, mm", "after, mm"].map(str::to_owned).to_vec(),
-        rows: walls
-            .iter()
-            .map(|wall| {
-                let millimetres = |value: f64| format!("{:.1}", 1000.0 * value);
-                let (before, after) = (millimetres(wall.thickness_before_m), millimetres(wall.thickness_after_m));
-                vec![wall.stand.clone(), wall.points.to_string(), before, after]
-            })
-            .collect(),
+        rows: walls.iter().map(row).collect(),
     });
+    let Stands { start, targets, .. } = stands;
     if let Some(target) = targets.get(targets.len() / 2) {
         let off = |lasers: &[Laser]| -> Vec<(f64, f64)> {
             let points = || target.returns.iter().filter_map(|seen| seen.point(lasers, offsets));
@@ -260,30 +282,34 @@ fn page(
         page.figure(&chart, "Points of one wall, laser by laser, before and after.");
     }
     page.section("Lasers");
-    let rows =
-        start.iter().zip(&found.lasers).zip(&found.deviations).enumerate().map(|(number, ((old, new), known))| {
-            let change = |old: f64, new: f64, scale: f64, digits: usize| format!("{:.digits$}", scale * (new - old));
-            let degrees = 1f64.to_degrees();
-            let mut row = vec![
-                number.to_string(),
-                change(old.distance, new.distance, 1000.0, 2),
-                change(old.elevation, new.elevation, degrees, 4),
-                change(old.rotation, new.rotation, degrees, 4),
-            ];
-            row.extend(match known {
-                Some(known) => [
-                    format!("{:.2}", 1000.0 * known.distance),
-                    format!("{:.4}", known.elevation.to_degrees()),
-                    format!("{:.4}", known.rotation.to_degrees()),
-                ],
-                None => ["not observed".to_owned(), String::new(), String::new()],
-            });
-            row
-        });
     page.paragraph("Changes of the parameters, and the standard deviations of what was found.");
-    page.table(&Table {
-        heading: ["laser", "D mm", "theta deg", "alpha deg", "+- mm", "+- deg", "+- deg"].map(str::to_owned).to_vec(),
-        rows: rows.collect(),
-    });
+    page.table(&laser_table(start, found));
     Ok(page)
+}
+
+fn laser_table(start: &[Laser], found: &Adjustment) -> Table {
+    let row = |(number, ((old, new), known)): (usize, ((&Laser, &Laser), &Option<intrinsic::Deviation>))| {
+        let change = |old: f64, new: f64, scale: f64, digits: usize| format!("{:.digits$}", scale * (new - old));
+        let degrees = 1f64.to_degrees();
+        let mut row = vec![
+            number.to_string(),
+            change(old.distance, new.distance, 1000.0, 2),
+            change(old.elevation, new.elevation, degrees, 4),
+            change(old.rotation, new.rotation, degrees, 4),
+        ];
+        row.extend(match known {
+            Some(known) => [
+                format!("{:.2}", 1000.0 * known.distance),
+                format!("{:.4}", known.elevation.to_degrees()),
+                format!("{:.4}", known.rotation.to_degrees()),
+            ],
+            None => ["not observed".to_owned(), String::new(), String::new()],
+        });
+        row
+    };
+    let lasers = start.iter().zip(&found.lasers).zip(&found.deviations).enumerate();
+    Table {
+        heading: ["laser", "D mm", "theta deg", "alpha deg", "+- mm", "+- deg", "+- deg"].map(str::to_owned).to_vec(),
+        rows: lasers.map(row).collect(),
+    }
 }

@@ -4,11 +4,15 @@
 //! that its maker's client makes at start-up. The drive begins with the first question for data, or when it is told to;
 //! until then the first revolution is repeated, and the last one when it is over.
 
+mod connection;
 mod drive;
+mod encoding;
 mod factory;
 mod mapping;
+mod method;
 mod pending;
 mod promise;
+mod request;
 mod seen;
 mod sensor;
 
@@ -21,8 +25,9 @@ use std::time::{Duration, Instant};
 use agv_wire::cola::Dialect;
 use agv_wire::nav350::{IdentifiedLandmark, SpeedReport};
 
+pub use connection::Connection;
 pub use drive::{Drive, DriveError, Turn};
-pub use sensor::{Connection, Sensor, SensorClockOptions};
+pub use sensor::{Sensor, SensorClockOptions};
 
 /// How the sensor behaves.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,14 +2,14 @@
 
 use agv_wire::cola::{Dialect, Sequence};
 use agv_wire::nav350::{
-    Answer, Channel, ErrorCode, LandmarkData, MethodName, MethodResult, NavigationData, OperatingMode, PoseAnswer,
-    PoseReport, ReflectorList,
+    Answer, Channel, ErrorCode, LandmarkData, MethodResult, NavigationData, OperatingMode, PoseAnswer, PoseReport,
+    ReflectorList,
 };
 
 use super::drive::Turn;
-use super::pending::Pending;
+use super::encoding::encode;
 use super::seen::SeenScan;
-use super::sensor::{Sensor, encode};
+use super::sensor::Sensor;
 
 /// A question that is answered later.
 #[derive(Clone, Copy)]
@@ -30,36 +30,30 @@ pub(super) enum PromisedMethod {
     Mapping,
 }
 
-impl Sensor {
-    /// Accepts a slow method, to be answered at the end of a turn.
-    pub(super) fn promise(
-        &mut self,
-        dialect: Dialect,
-        name: MethodName,
-        method: PromisedMethod,
-        wait: bool,
-        now: f64,
-        pending: &mut Pending,
-    ) -> Vec<u8> {
-        let needed = match method {
-            PromisedMethod::Data { .. } | PromisedMethod::Pose { .. } => OperatingMode::Navigation,
-            PromisedMethod::Landmarks { .. } => OperatingMode::LandmarkDetection,
-            PromisedMethod::Mapping => OperatingMode::Mapping,
-        };
-        let problem = if pending.promise.is_some() {
-            Some(ErrorCode::ALREADY_ACTIVE)
-        } else {
-            (self.mode != needed).then_some(ErrorCode::WRONG_MODE)
-        };
-        if let Some(error) = problem {
-            return self.accept(dialect, name, failure(dialect, method, error), now, pending);
+impl PromisedMethod {
+    /// The mode in which it is answered.
+    pub(super) const fn needed_mode(self) -> OperatingMode {
+        match self {
+            Self::Data { .. } | Self::Pose { .. } => OperatingMode::Navigation,
+            Self::Landmarks { .. } => OperatingMode::LandmarkDetection,
+            Self::Mapping => OperatingMode::Mapping,
         }
+    }
+
+    /// The result that says why there is none.
+    pub(super) fn failure(self, dialect: Dialect, error: ErrorCode) -> Vec<u8> {
+        encode_result(dialect, self, error, None, None, heapless::Vec::new(), None)
+    }
+}
+
+impl Sensor {
+    /// A question that is answered at the end of a turn.
+    pub(super) fn promised(&mut self, dialect: Dialect, method: PromisedMethod, wait: bool, now: f64) -> Promise {
         let (due, turn, start) = match method {
             PromisedMethod::Mapping => self.mapping_turn(now),
             _ => self.turn(wait, now),
         };
-        pending.promise = Some(Promise { due: due.max(now + self.gap), turn, start, method, dialect });
-        encode(dialect, &Answer::Accepted(name))
+        Promise { due: due.max(now + self.gap), turn, start, method, dialect }
     }
 
     /// When a question is answered, which turn answers it, and when that turn began.
@@ -127,10 +121,6 @@ impl Sensor {
         let list = wants_reflectors.then_some(list);
         encode_result(dialect, method, error, pose, list, scan.channels(&seen), scan.remission(&seen))
     }
-}
-
-fn failure(dialect: Dialect, method: PromisedMethod, error: ErrorCode) -> Vec<u8> {
-    encode_result(dialect, method, error, None, None, heapless::Vec::new(), None)
 }
 
 fn encode_result(

@@ -1,5 +1,6 @@
 //! Whether a scenario makes sense.
 
+use super::believed::believed_parameters;
 use super::keys::{self, Key};
 use super::{PathKind, Scenario, ScenarioError, WorldOptions};
 
@@ -16,7 +17,8 @@ impl Scenario {
         demand("people.phase", phases.all(|phase| (0.0..=1.0).contains(&phase)), "between 0 and 1")?;
         demand("people.way", self.people.iter().all(|person| !person.way.is_empty()), "a list of at least one point")?;
         self.check_path()?;
-        self.check_world()
+        self.check_world()?;
+        believed_parameters(self).check().map_err(ScenarioError::Parameters)
     }
 
     /// Every number against the table of keys.

@@ -3,6 +3,7 @@
 //! Lengths are in metres, times in seconds, angles in degrees where the key ends in `_deg`. Whatever a file leaves out has
 //! the value of the project's standard block storage, which is also what `Scenario::default` is.
 
+mod believed;
 mod check;
 pub mod keys;
 mod line;
@@ -12,6 +13,7 @@ mod vehicle;
 mod way;
 mod world;
 
+pub use believed::{believed_parameters, believed_tricycle};
 pub use sensors::{DirtySector, Knock, LaserOptions, ReflectorOptions};
 pub use start::{PersonOptions, StartOptions};
 pub use vehicle::{BelievedVehicle, Carry, DriveOptions, MotionReport, OdometryOptions, VehicleErrors, VehicleOptions};
@@ -21,6 +23,7 @@ pub use world::{CircleOptions, RectangleOptions, ReflectorShape, Shapes, WorldOp
 use std::path::{Path as FilePath, PathBuf};
 
 use agv_core::geometry::Point;
+use agv_core::localizer::ParameterError;
 use serde::{Deserialize, Serialize};
 
 use super::block_storage::{BlockStorage, BlockStoragePath, ReflectorPlacement};
@@ -65,6 +68,9 @@ pub enum ScenarioError {
         /// What it must be.
         demand: String,
     },
+    /// What the localiser would have to believe cannot be.
+    #[error("the scenario's vehicle cannot be: {0}")]
+    Parameters(ParameterError),
     /// A line of a file cannot be used.
     #[error("{}:{line}: {problem}", path.display())]
     Line {

@@ -4,8 +4,9 @@ use agv_core::geometry::{Point, Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::simulate::block_storage::BlockStorage;
+use crate::simulate::shape::{Circle, Rectangle, Reflector, Sector};
 use crate::simulate::warehouse_hall::WarehouseHall;
-use crate::simulate::world::{Circle, Rectangle, Reflector, Sector, World};
+use crate::simulate::world::World;
 
 /// What stands where.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -13,8 +13,8 @@ use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
-use agv_core::filter::{packed_entries, slot_states};
-use agv_core::localizer;
+use agv_core::filter::{PoseAndSlots, packed_entries, slot_states};
+use agv_core::localizer::{self, CapacitiesOf};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -26,10 +26,10 @@ use drive::{Drive, Lists};
 const KEYS: usize = 2;
 const LANDMARKS: usize = 8;
 const STATES: usize = slot_states(KEYS, LANDMARKS);
-const ENTRIES: usize = packed_entries(STATES);
+type Slots = PoseAndSlots<KEYS, LANDMARKS, STATES, { packed_entries(STATES) }>;
 
 /// A localiser with so little room that all of it is filled.
-pub type SmallLocalizer = localizer::Localizer<512, 40, 40, 16, KEYS, LANDMARKS, STATES, ENTRIES>;
+pub type SmallLocalizer = localizer::Localizer<CapacitiesOf<512, 40, 40, 16, Slots>>;
 
 /// Events of an episode at the most.
 const EPISODE: u64 = 500;

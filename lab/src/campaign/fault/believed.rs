@@ -1,6 +1,7 @@
 //! Faults of what is believed before the vehicle drives.
 
 use agv_core::geometry::Pose;
+use agv_core::maps::Landmark;
 use agv_core::odometry::Vehicle;
 
 use super::{Fault, FaultKind};
@@ -10,9 +11,41 @@ use agv_host_sim::simulate::random::Random;
 impl Fault {
     /// Makes what the localiser is told before the drive wrong.
     pub fn mislead(&self, recording: &mut Recording, random: &mut Random) {
+        if let FaultKind::ReflectorMoved { metres } = self.what {
+            move_one(recording, metres, random);
+        }
+        self.move_landmarks(&mut recording.landmarks, random);
+        let tricycle = match &mut recording.parameters.vehicle {
+            Vehicle::Tricycle(tricycle) => Some(tricycle),
+            _ => None,
+        };
+        match (self.what, tricycle) {
+            (FaultKind::MountingWrong { deg, x, y }, _) => {
+                let laser = recording.parameters.lasers.first_mut();
+                *laser = Pose::new(laser.x + x, laser.y + y, laser.theta + deg.to_radians());
+            }
+            (FaultKind::SteeringOffsetWrong { deg }, Some(tricycle)) => {
+                tricycle.steering_offset_forward += deg.to_radians();
+                tricycle.steering_offset_backward += deg.to_radians();
+            }
+            (FaultKind::WheelbaseWrong { metres }, Some(tricycle)) => tricycle.wheelbase += metres,
+            (FaultKind::DriveScaleWrong { share }, Some(tricycle)) => tricycle.drive_scale *= 1.0 + share,
+            (FaultKind::StartWrong { x, y, deg }, _) => {
+                for event in &mut recording.events {
+                    if let RecordedEvent::SetPose(fix) = event {
+                        fix.pose = fix.pose.compose(&Pose::new(x, y, deg.to_radians()));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Makes the map wrong.
+    fn move_landmarks(&self, landmarks: &mut [Landmark], random: &mut Random) {
         match self.what {
             FaultKind::ReflectorsMoved { share, metres } => {
-                for landmark in &mut recording.landmarks {
+                for landmark in landmarks {
                     let (is_moved, angle) = (random.happens(share), random.between(0.0, std::f64::consts::TAU));
                     if is_moved {
                         let (sine, cosine) = libm::sincos(angle);
@@ -23,71 +56,37 @@ impl Fault {
             }
             FaultKind::ReflectorsMovedAlike { share, metres } => {
                 let (sine, cosine) = libm::sincos(random.between(0.0, std::f64::consts::TAU));
-                for landmark in &mut recording.landmarks {
+                for landmark in landmarks {
                     if random.happens(share) {
                         landmark.x += metres * cosine;
                         landmark.y += metres * sine;
                     }
                 }
             }
-            FaultKind::ReflectorMoved { metres } => move_one(recording, metres, random),
             FaultKind::LayoutSheared { share } => {
-                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.y));
-                for landmark in &mut recording.landmarks {
-                    landmark.x += share * (landmark.y - middle);
-                }
+                let middle = mean(landmarks.iter().map(|landmark| landmark.y));
+                landmarks.iter_mut().for_each(|landmark| landmark.x += share * (landmark.y - middle));
             }
             FaultKind::WallMoved { metres } => {
-                let low = recording.landmarks.iter().map(|landmark| landmark.y).fold(f64::INFINITY, f64::min);
-                for landmark in recording.landmarks.iter_mut().filter(|landmark| landmark.y < low + NEAR_WALL) {
+                let low = landmarks.iter().map(|landmark| landmark.y).fold(f64::INFINITY, f64::min);
+                for landmark in landmarks.iter_mut().filter(|landmark| landmark.y < low + NEAR_WALL) {
                     landmark.x += metres;
                 }
             }
             FaultKind::LayoutMirrored => {
-                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.x));
-                for landmark in &mut recording.landmarks {
-                    landmark.x = 2.0 * middle - landmark.x;
-                }
+                let middle = mean(landmarks.iter().map(|landmark| landmark.x));
+                landmarks.iter_mut().for_each(|landmark| landmark.x = 2.0 * middle - landmark.x);
             }
             FaultKind::LayoutOfAnotherHall => {
-                let mean_y = mean(recording.landmarks.iter().map(|landmark| landmark.y));
-                for landmark in &mut recording.landmarks {
+                let mean_y = mean(landmarks.iter().map(|landmark| landmark.y));
+                for landmark in landmarks {
                     landmark.x += random.between(-3.0, 3.0);
                     landmark.y = 2.0 * mean_y - landmark.y + random.between(-3.0, 3.0);
                 }
             }
             FaultKind::LayoutStretched { share } => {
-                let middle = mean(recording.landmarks.iter().map(|landmark| landmark.x));
-                for landmark in &mut recording.landmarks {
-                    landmark.x += share * (landmark.x - middle);
-                }
-            }
-            FaultKind::MountingWrong { deg, x, y } => {
-                let laser = recording.parameters.lasers.first_mut();
-                *laser = Pose::new(laser.x + x, laser.y + y, laser.theta + deg.to_radians());
-            }
-            FaultKind::SteeringOffsetWrong { deg } => {
-                if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {
-                    tricycle.steering_offset_forward += deg.to_radians();
-                    tricycle.steering_offset_backward += deg.to_radians();
-                }
-            }
-            FaultKind::WheelbaseWrong { metres } => {
-                if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {
-                    tricycle.wheelbase += metres;
-                }
-            }
-            FaultKind::DriveScaleWrong { share } => {
-                if let Vehicle::Tricycle(tricycle) = &mut recording.parameters.vehicle {
-                    tricycle.drive_scale *= 1.0 + share;
-                }
-            }
-            FaultKind::StartWrong { x, y, deg } => {
-                for event in &mut recording.events {
-                    if let RecordedEvent::SetPose(fix) = event {
-                        fix.pose = fix.pose.compose(&Pose::new(x, y, deg.to_radians()));
-                    }
-                }
+                let middle = mean(landmarks.iter().map(|landmark| landmark.x));
+                landmarks.iter_mut().for_each(|landmark| landmark.x += share * (landmark.x - middle));
             }
             _ => {}
         }

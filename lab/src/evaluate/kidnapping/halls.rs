@@ -4,8 +4,9 @@ use agv_core::geometry::{Point, Pose};
 
 use super::Layout;
 use agv_host_sim::simulate::random::{Random, Stream};
+use agv_host_sim::simulate::shape::{Circle, Rectangle, Reflector};
 use agv_host_sim::simulate::warehouse_hall::WarehouseHall;
-use agv_host_sim::simulate::world::{Circle, Rectangle, Reflector, World};
+use agv_host_sim::simulate::world::World;
 
 /// A hall and where a vehicle may stand in it.
 pub(super) struct Hall {

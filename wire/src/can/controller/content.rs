@@ -39,7 +39,7 @@ pub enum Content {
         heading: f64,
         /// Low 16 bits of the controller's clock, ms.
         time: u16,
-        /// Way since a landmark last corrected the pose, m.
+        /// Distance travelled since a landmark last corrected the pose, m.
         dead_reckoning_distance: f64,
     },
     /// Standard deviations in W and their correlations.

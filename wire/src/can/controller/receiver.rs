@@ -17,7 +17,7 @@ pub struct PublishedPose {
     pub pose: Pose,
     /// Low 16 bits of the controller's clock, ms.
     pub time: u16,
-    /// Way since a landmark last corrected the pose, m.
+    /// Distance travelled since a landmark last corrected the pose, m.
     pub dead_reckoning_distance: f64,
     /// Standard deviations of x (m), y (m), heading (rad).
     pub deviations: [f64; 3],

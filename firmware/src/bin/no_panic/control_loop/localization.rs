@@ -2,7 +2,7 @@
 
 use core::hint::black_box;
 
-use agv_controller::{BusEvent, Progress, PublishedPose, Told};
+use agv_controller::{BusEvent, Progress, SentPose, Told};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{self, Event, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
@@ -11,7 +11,7 @@ use agv_core::measurement::{
     WheelSample,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
-use agv_firmware::app::room;
+use agv_firmware::app::capacities::Localizer;
 use agv_settings::Settings;
 
 use super::any;
@@ -28,7 +28,7 @@ type SlamLocalizer = localizer::Localizer;
 
 /// The localisers of an image with the feature `slam` and of one without.
 pub struct Localization {
-    localization: agv_controller::Localization<room::Localizer>,
+    localization: agv_controller::Localization<Localizer>,
     slam: SlamLocalizer,
     frame: [u8; MAX_FRAME],
 }
@@ -67,7 +67,7 @@ impl Localization {
         let settings: Settings = any(Settings::default());
         let parameters = settings.parameters;
         Self {
-            localization: agv_controller::Localization::new(room::Localizer::new(parameters), &settings),
+            localization: agv_controller::Localization::new(Localizer::new(parameters), &settings),
             slam: SlamLocalizer::new(parameters),
             frame: [0; MAX_FRAME],
         }
@@ -85,7 +85,7 @@ impl Localization {
             |record| log(frame, record),
         );
         localization.published(
-            &any(PublishedPose { pose: localization.estimate().pose, progress: Progress::default() }),
+            &any(SentPose { pose: localization.estimate().pose, progress: Progress::default() }),
             |record| {
                 log(frame, record);
             },
