@@ -96,8 +96,8 @@ fn the_map_s_share_is_the_scatter_of_fits_in_wrong_maps() {
     let mut random = Random::new(3);
     let sensor = Pose::new(2.0, 1.0, 0.7);
     let all: Vec<Seen> = (0..4).map(|_| landmark(&mut random, &sensor, 0.0)).collect();
-    assert_eq!(sum(&all[..1], &sensor).map_variances(1.0), None, "one landmark leaves a circle");
-    let (position, heading) = sum(&all, &sensor).map_variances(1.0).unwrap();
+    assert_eq!(sum(&all[..1], &sensor).map_variances(1.0, 0.0), None, "one landmark leaves a circle");
+    let (position, heading) = sum(&all, &sensor).map_variances(1.0, 0.0).unwrap();
     let (mut scatter, mut of_heading) = (Matrix2::zeros(), 0.0);
     const DRAWS: u32 = 20_000;
     for _ in 0..DRAWS {
@@ -120,6 +120,33 @@ fn the_map_s_share_is_the_scatter_of_fits_in_wrong_maps() {
     let largest = scatter.symmetric_eigenvalues().max();
     assert!((position / largest - 1.0).abs() < 0.05, "{position} {largest}");
     assert!((heading / of_heading - 1.0).abs() < 0.05, "{heading} {of_heading}");
+}
+
+#[test]
+fn a_misfit_is_what_the_best_pose_leaves() {
+    let mut random = Random::new(4);
+    let sensor = Pose::new(2.0, 1.0, 0.7);
+    for count in 1..8 {
+        let all: Vec<Seen> = (0..count).map(|_| landmark(&mut random, &sensor, 0.02)).collect();
+        let (square, freedom) = sum(&all, &sensor).misfit();
+        let (matrix, vector) = normal_equations(&all, &sensor);
+        // With one landmark the heading stays where it is.
+        let beside = if count == 1 { Vector3::zeros() } else { matrix.try_inverse().unwrap() * vector };
+        let rotation = nalgebra::Rotation2::new(sensor.theta).matrix().to_owned();
+        let left: f64 = all
+            .iter()
+            .map(|seen| {
+                let weight = rotation * seen.covariance * rotation.transpose() + Matrix2::identity() * 4e-6;
+                // The model is linear in the small angle.
+                let turned = rotation * seen.position;
+                let by_turn = Vector2::new(-turned.y, turned.x) * beside[2];
+                let miss = Vector2::from(miss(seen, &sensor, &[beside[0], beside[1], 0.0])) + by_turn;
+                miss.dot(&(weight.try_inverse().unwrap() * miss))
+            })
+            .sum();
+        assert_eq!(freedom, f64::from(2 * count - if count == 1 { 2 } else { 3 }));
+        assert!(count == 1 && square < 1e-9 || (square - left).abs() < 1e-6 * left.max(1e-3), "{square} {left}");
+    }
 }
 
 /// The model of a solution, written down once more: where R goes, and where the laser is when it sees.
@@ -264,6 +291,8 @@ struct Drive {
     true_mount: Pose,
     /// The pose that is published, here that of the laser as it is believed to be mounted.
     published: Pose,
+    /// By which share the map is sheared.
+    shear: f64,
 }
 
 impl Drive {
@@ -276,7 +305,29 @@ impl Drive {
         let mut monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
         monitor.begin(Time::from_seconds(1.0), &truth, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &truth);
         let time = Time::from_seconds(1.0);
-        Self { monitor, reflectors, truth, odometry: truth, time, random, mount, true_mount: mount, published: truth }
+        Self {
+            monitor,
+            reflectors,
+            truth,
+            odometry: truth,
+            time,
+            random,
+            mount,
+            true_mount: mount,
+            published: truth,
+            shear: 0.0,
+        }
+    }
+
+    /// The pose of least squares in the map, with the weights of the monitor, near the published one.
+    fn fit(&self, seen: &[Seen]) -> Pose {
+        let mut sensor = self.published.compose(&self.mount);
+        for _ in 0..3 {
+            let (matrix, vector) = normal_equations(seen, &sensor);
+            let beside = matrix.try_inverse().unwrap() * vector;
+            sensor = Pose::new(sensor.x + beside[0], sensor.y + beside[1], sensor.theta + beside[2]);
+        }
+        sensor.compose(&self.mount.inverse())
     }
 
     /// One revolution later.
@@ -298,15 +349,22 @@ impl Drive {
         self.monitor.step(end, &self.odometry);
         let sensor = self.truth.compose(&self.true_mount);
         self.published = sensor.compose(&self.mount.inverse());
-        let laser = self.monitor.laser(&self.mount, &self.published);
-        self.monitor.begin_event();
-        for (id, landmark) in self.reflectors.clone().into_iter().enumerate().take(6) {
-            let seen = sensor.inverse_transform(&landmark);
+        let mut all = Vec::new();
+        for standing in self.reflectors.iter().take(6) {
+            let seen = sensor.inverse_transform(standing);
             let mut noise = || 0.008 * self.random.normal();
             let position = Point::new(seen.x + noise(), seen.y + noise());
             let covariance = Matrix2::identity() * 1e-4;
-            let seen = Seen { position, covariance, landmark, landmark_variance: 4e-6 };
-            self.monitor.see(LandmarkKey::Reflector(id as u16), &seen, &laser);
+            let landmark = Point::new(standing.x + self.shear * standing.y, standing.y);
+            all.push(Seen { position, covariance, landmark, landmark_variance: 4e-6 });
+        }
+        if self.shear != 0.0 {
+            self.published = self.fit(&all);
+        }
+        let laser = self.monitor.laser(&self.mount, &self.published);
+        self.monitor.begin_event();
+        for (id, seen) in (0..).zip(&all) {
+            self.monitor.see(LandmarkKey::Reflector(id), seen, &laser);
         }
         self.monitor.end_event(&self.published, &laser, 1.0);
     }
@@ -386,6 +444,27 @@ fn a_mounting_that_was_changed_while_the_vehicle_was_off_is_held_once_it_can_be_
                 number < hidden || position <= level.position && heading <= level.heading,
                 "{off:?}, revolution {number}: {position} m, {heading} rad, {level:?}"
             );
+        }
+    }
+}
+
+/// No single reflector is wrong in a map that is sheared, and every solution rests on most of it.
+#[test]
+fn a_sheared_map_is_held() {
+    for seed in 1..=6 {
+        for shear in [0.002, 0.003, 0.005, 0.008, 0.012, -0.005] {
+            let mut drive = Drive::new(seed);
+            drive.shear = shear;
+            let (straight, bend) = (Pose::new(0.125, 0.0, 0.0), Pose::new(0.1, 0.002, 0.04));
+            for number in 0..120 {
+                drive.revolve(if number % 60 < 30 { &straight } else { &bend });
+                let (position, heading) = drive.error();
+                let level = drive.monitor.level();
+                assert!(
+                    number < 8 || position <= level.position && heading <= level.heading,
+                    "{shear}, seed {seed}, revolution {number}: {position} m, {heading} rad, {level:?}"
+                );
+            }
         }
     }
 }

@@ -8,6 +8,7 @@
 mod assumed;
 mod contradiction;
 mod hypothesis;
+mod misfit;
 mod sensor_information;
 mod solution;
 
@@ -18,6 +19,7 @@ pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, fault_free}
 use contradiction::Contradiction;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
+use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 pub use solution::{Laser, Solution, Step};
 
@@ -91,6 +93,7 @@ pub struct SolutionSeparation {
     odometry: Solution,
     told: SensorInformation,
     contradiction: Contradiction,
+    misfit: Misfit,
     map_variances: (f64, f64),
     /// The pose that is bounded, how much larger innovations are than expected, and the bound, all at the last step.
     pose: Pose,
@@ -123,6 +126,7 @@ impl SolutionSeparation {
             odometry: nowhere,
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
+            misfit: Misfit::NONE,
             map_variances: (0.0, 0.0),
             pose: Pose::default(),
             surprise: 1.0,
@@ -150,6 +154,7 @@ impl SolutionSeparation {
         self.time = time;
         self.odometry_pose = *odometry_pose;
         self.pending = Pending::NONE;
+        self.misfit = Misfit::NONE;
         self.map_variances = (0.0, 0.0);
         self.contradiction = Contradiction::new();
         self.rest_on(pose, 1.0);
@@ -292,9 +297,11 @@ impl SolutionSeparation {
     /// as the filter expects, or as it expects them (1).
     pub fn end_event(&mut self, pose: &Pose, laser: &Laser, surprise: f64) {
         let is_contradicted = self.contradiction.end_event();
+        self.misfit.add(&self.told);
         if self.told.is_any() && !is_contradicted {
             self.correct(laser);
-            self.map_variances = self.told.map_variances(WELL_SEEN * WELL_SEEN).unwrap_or(self.map_variances);
+            let by_map = self.told.map_variances(WELL_SEEN * WELL_SEEN, self.misfit.excess());
+            self.map_variances = by_map.unwrap_or(self.map_variances);
         }
         self.rest_on(pose, surprise);
     }

@@ -14,6 +14,9 @@ pub struct SensorInformation {
     vector: Vector3<f64>,
     /// Variance of the information's own vector by errors of the map that all landmarks keep for ever.
     by_map: Matrix3<f64>,
+    /// Sum of the normalised squares of how far landmarks are from where they should be, and of how many numbers.
+    square: f64,
+    numbers: f64,
 }
 
 /// A landmark that was seen, in the frame of the laser at the time for which the information is.
@@ -34,7 +37,8 @@ pub type Told = (Vector3<f64>, f64, f64);
 
 impl SensorInformation {
     /// Nothing is seen.
-    pub const NONE: Self = Self { matrix: ZERO, vector: Vector3::new(0.0, 0.0, 0.0), by_map: ZERO };
+    pub const NONE: Self =
+        Self { matrix: ZERO, vector: Vector3::new(0.0, 0.0, 0.0), by_map: ZERO, square: 0.0, numbers: 0.0 };
 
     /// What one landmark says of a laser that is about at `sensor` in W.
     #[must_use]
@@ -55,6 +59,8 @@ impl SensorInformation {
             matrix: weighted * by_pose,
             vector: weighted * residual,
             by_map: weighted * weighted.transpose() * seen.landmark_variance,
+            square: residual.dot(&(weight * residual)),
+            numbers: 2.0,
         }
     }
 
@@ -65,6 +71,8 @@ impl SensorInformation {
             matrix: self.matrix + other.matrix,
             vector: self.vector + other.vector,
             by_map: self.by_map + other.by_map,
+            square: self.square + other.square,
+            numbers: self.numbers + other.numbers,
         }
     }
 
@@ -75,6 +83,8 @@ impl SensorInformation {
             matrix: self.matrix - other.matrix,
             vector: self.vector - other.vector,
             by_map: self.by_map - other.by_map,
+            square: self.square - other.square,
+            numbers: self.numbers - other.numbers,
         }
     }
 
@@ -84,16 +94,27 @@ impl SensorInformation {
         self.matrix.trace() > LEAST
     }
 
-    /// Variances of the position's larger axis, m^2, and of the heading, rad^2, that the errors of the map alone make of a
-    /// pose found from this alone; none if its position's larger axis has more than the variance `most`, m^2.
+    /// How badly the landmarks fit each other, wherever the laser is: the normalised square that the best pose leaves, and
+    /// its degrees of freedom.
     #[must_use]
-    pub fn map_variances(&self, most: f64) -> Option<(f64, f64)> {
+    pub fn misfit(&self) -> (f64, f64) {
+        let told = self.told();
+        let explained = told.iter().flatten().fold(0.0, |sum, (_, value, variance)| sum + value * value / variance);
+        (not_negative(self.square - explained), (self.numbers - told.iter().flatten().count() as f64).max(0.0))
+    }
+
+    /// Variances of the position's larger axis, m^2, and of the heading, rad^2, that the errors of the map alone make of a
+    /// pose found from this alone; none if its position's larger axis has more than the variance `most`, m^2. `excess` is
+    /// the share by which landmarks have fitted each other worse than they should, which is an error of the map, too: with
+    /// the weights of least squares it makes that share of the pose's own covariance.
+    #[must_use]
+    pub fn map_variances(&self, most: f64, excess: f64) -> Option<(f64, f64)> {
         let [_, _, Some(_)] = self.told() else { return None };
         let inverse = self.matrix.try_inverse()?;
         if !(0.0..=most).contains(&larger_axis(inverse.m11, inverse.m12, inverse.m22)) {
             return None;
         }
-        let covariance = inverse * self.by_map * inverse;
+        let covariance = inverse * self.by_map * inverse + inverse * excess;
         Some((not_negative(larger_axis(covariance.m11, covariance.m12, covariance.m22)), covariance.m33.max(0.0)))
     }
 
