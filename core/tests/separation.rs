@@ -96,8 +96,8 @@ fn the_map_s_share_is_the_scatter_of_fits_in_wrong_maps() {
     let mut random = Random::new(3);
     let sensor = Pose::new(2.0, 1.0, 0.7);
     let all: Vec<Seen> = (0..4).map(|_| landmark(&mut random, &sensor, 0.0)).collect();
-    assert_eq!(sum(&all[..1], &sensor).map_variances(1.0, 0.0), None, "one landmark leaves a circle");
-    let (position, heading) = sum(&all, &sensor).map_variances(1.0, 0.0).unwrap();
+    assert_eq!(sum(&all[..1], &sensor).map_variances(1.0), None, "one landmark leaves a circle");
+    let (position, heading) = sum(&all, &sensor).map_variances(1.0).unwrap();
     let (mut scatter, mut of_heading) = (Matrix2::zeros(), 0.0);
     const DRAWS: u32 = 20_000;
     for _ in 0..DRAWS {
@@ -147,6 +147,21 @@ fn a_misfit_is_what_the_best_pose_leaves() {
         assert_eq!(freedom, f64::from(2 * count - if count == 1 { 2 } else { 3 }));
         assert!(count == 1 && square < 1e-9 || (square - left).abs() < 1e-6 * left.max(1e-3), "{square} {left}");
     }
+}
+
+#[test]
+fn the_means_are_those_of_the_landmarks() {
+    let sensor = Pose::new(2.0, 1.0, 0.7);
+    let seen = |x: f64, y: f64| Seen {
+        position: Point::new(x, y),
+        covariance: Matrix2::identity() * 5e-5,
+        landmark: sensor.transform(&Point::new(x, y)),
+        landmark_variance: 3e-5,
+    };
+    let (variance, distance) = sum(&[seen(3.0, 4.0), seen(-5.0, 12.0)], &sensor).means().unwrap();
+    assert!((variance / 8e-5 - 1.0).abs() < 1e-9, "{variance}");
+    assert!((distance / (0.5 * (25.0 + 169.0)) - 1.0).abs() < 1e-9, "{distance}");
+    assert_eq!(SensorInformation::NONE.means(), None);
 }
 
 /// The model of a solution, written down once more: where R goes, and where the laser is when it sees.

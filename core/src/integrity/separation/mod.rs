@@ -300,8 +300,7 @@ impl SolutionSeparation {
         self.misfit.add(&self.told);
         if self.told.is_any() && !is_contradicted {
             self.correct(laser);
-            let by_map = self.told.map_variances(WELL_SEEN * WELL_SEEN, self.misfit.excess());
-            self.map_variances = by_map.unwrap_or(self.map_variances);
+            self.map_variances = self.told.map_variances(WELL_SEEN * WELL_SEEN).unwrap_or(self.map_variances);
         }
         self.rest_on(pose, surprise);
     }
@@ -423,8 +422,11 @@ impl SolutionSeparation {
             .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
                 level.or(&solution.bound(pose, &one_fault, self.map_variances))
             });
-        let wider = self.contradiction.widening();
-        ProtectionLevel { position: level.position + wider.position, heading: level.heading + wider.heading }
+        let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
+        ProtectionLevel {
+            position: level.position + contradiction.position + misfit.position,
+            heading: level.heading + contradiction.heading + misfit.heading,
+        }
     }
 
     /// The protection level of the pose that the odometry has led on to since the last step.

@@ -103,18 +103,24 @@ impl SensorInformation {
         (not_negative(self.square - explained), (self.numbers - told.iter().flatten().count() as f64).max(0.0))
     }
 
-    /// Variances of the position's larger axis, m^2, and of the heading, rad^2, that the errors of the map alone make of a
-    /// pose found from this alone; none if its position's larger axis has more than the variance `most`, m^2. `excess` is
-    /// the share by which landmarks have fitted each other worse than they should, which is an error of the map, too: with
-    /// the weights of least squares it makes that share of the pose's own covariance.
+    /// Mean variance of a number that a landmark tells, m^2, and mean square of the distance to landmarks, m^2; none if
+    /// nothing is seen.
     #[must_use]
-    pub fn map_variances(&self, most: f64, excess: f64) -> Option<(f64, f64)> {
+    pub fn means(&self) -> Option<(f64, f64)> {
+        let weight = self.matrix.m11 + self.matrix.m22;
+        self.is_any().then(|| (self.numbers / weight, 2.0 * self.matrix.m33 / weight))
+    }
+
+    /// Variances of the position's larger axis, m^2, and of the heading, rad^2, that the errors of the map alone make of a
+    /// pose found from this alone; none if its position's larger axis has more than the variance `most`, m^2.
+    #[must_use]
+    pub fn map_variances(&self, most: f64) -> Option<(f64, f64)> {
         let [_, _, Some(_)] = self.told() else { return None };
         let inverse = self.matrix.try_inverse()?;
         if !(0.0..=most).contains(&larger_axis(inverse.m11, inverse.m12, inverse.m22)) {
             return None;
         }
-        let covariance = inverse * self.by_map * inverse + inverse * excess;
+        let covariance = inverse * self.by_map * inverse;
         Some((not_negative(larger_axis(covariance.m11, covariance.m12, covariance.m22)), covariance.m33.max(0.0)))
     }
 
