@@ -2,8 +2,8 @@
 
 use super::encoder::{Encoder, EncoderEvent, EncoderReading, EncoderSettings, EncoderState, Reporting};
 use super::frame::Frame;
-use super::nmt::SyncProducer;
 use super::supervision::{SupervisionLimits, Supervisor};
+use super::sync::SyncProducer;
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use agv_core::odometry::CounterRange;
 

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | classic and FD frames | [`frame`] |
 //! | frames as text on a serial line | [`slcan`] |
-//! | CANopen: identifiers and the messages behind them | [`canopen`], [`nmt`], [`sdo`], [`emcy`], [`pdo`] |
+//! | CANopen: identifiers and the messages behind them | [`canopen`], [`nmt`], [`sync`], [`sdo`], [`emcy`], [`pdo`] |
 //! | one CiA 406 encoder and its states | [`encoder`] |
 //! | is the encoder to be believed | [`supervision`] |
 //! | two encoders as one measurement | [`encoder_pair`] |
@@ -29,3 +29,4 @@ pub mod sdo;
 pub mod signal;
 pub mod slcan;
 pub mod supervision;
+pub mod sync;
