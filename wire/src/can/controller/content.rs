@@ -61,15 +61,15 @@ pub enum Content {
         normalised_square: f64,
         /// State of encoders, laser and search.
         health: Health,
-        /// Whether the pose is good enough to leave the reflectors: [`PoseOutput::is_good`].
+        /// Whether the pose is good enough to leave the reflectors: [`agv_core::state::PoseOutput::is_good`].
         is_good: bool,
-        /// Whether landmarks have moved the position notably: [`PoseOutput::has_jumped`].
+        /// Whether landmarks have moved the position notably: [`agv_core::state::PoseOutput::has_jumped`].
         has_jumped: bool,
-        /// How often the position was reset: [`PoseOutput::resets`].
+        /// How often the position was reset: [`agv_core::state::PoseOutput::resets`].
         resets: u8,
         /// By how far the last time, m.
         last_reset: f64,
-        /// How often there was not room for all that was seen, modulo 4: [`PoseOutput::overflows`].
+        /// How often there was not room for all that was seen, modulo 4: [`agv_core::state::PoseOutput::overflows`].
         overflows: u8,
     },
     /// How wrong the pose may be.
