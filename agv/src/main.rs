@@ -1,4 +1,5 @@
 //! The command `agv`.
+#![allow(rustdoc::broken_intra_doc_links, reason = "brackets of help texts are no links")]
 
 mod command;
 

@@ -9,7 +9,7 @@ use agv_wire::can::controller::OrderReceiver;
 use agv_wire::can::encoder::{EncoderSettings, Reporting};
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_wire::can::frame::Frame;
-use agv_wire::can::supervision::SupervisionLimits;
+use agv_wire::can::plausibility::PlausibilityLimits;
 
 /// Time between SYNC messages if encoders want them, s; and between their positions then.
 const SYNC_PERIOD: f64 = 0.010;
@@ -66,7 +66,7 @@ pub fn channels(nodes: &EncoderNodes, parameters: &Parameters) -> [ChannelSettin
     };
     let channel = |node, range, (fastest, braking): (f64, f64), scale: f64| ChannelSettings {
         encoder: EncoderSettings { reporting: nodes.reporting, range, ..EncoderSettings::new(node) },
-        limits: SupervisionLimits::every(period, fastest / scale.abs(), braking / scale.abs()),
+        limits: PlausibilityLimits::every(period, fastest / scale.abs(), braking / scale.abs()),
     };
     let Vehicle::Tricycle(Tricycle { drive_scale, steering_scale, drive_range, steering_range, .. }) =
         parameters.vehicle

@@ -8,7 +8,7 @@ use agv_wire::can::encoder::{EncoderSettings, Reporting};
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::sdo::{Request, Response};
-use agv_wire::can::supervision::SupervisionLimits;
+use agv_wire::can::plausibility::PlausibilityLimits;
 use libfuzzer_sys::fuzz_target;
 
 /// Bytes of one frame: 2 of time, 2 of identifier and kind, 1 of length, 8 of data.
@@ -51,7 +51,7 @@ fn decode(frame: &Frame) {
 fuzz_target!(|bytes: &[u8]| {
     let channel = |number, reporting| ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(node(number)) },
-        limits: SupervisionLimits::every(0.01, 20_000.0, 25_000.0),
+        limits: PlausibilityLimits::every(0.01, 20_000.0, 25_000.0),
     };
     let mut now = Time::from_micros(1_000_000);
     let drive = channel(1, Reporting::Synchronous);

@@ -370,7 +370,7 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), LogError> {
     write_with_outputs(path, recording, |_| None)
 }
 
-/// Writes a drive as [`write`] does, and after each event what the localiser answered to it. `output` gives the answer to
+/// Writes a drive as [`write()`] does, and after each event what the localiser answered to it. `output` gives the answer to
 /// the event of that index.
 ///
 /// # Errors

@@ -27,7 +27,7 @@ use agv_wire::can::controller_node::ControllerNode;
 use agv_wire::can::encoder::{EncoderSettings, EncoderState};
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_wire::can::frame::{Frame, Id};
-use agv_wire::can::supervision::SupervisionLimits;
+use agv_wire::can::plausibility::PlausibilityLimits;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -218,7 +218,7 @@ fn channels(recording: &Recording) -> [ChannelSettings; 2] {
     let (drive, steering) = (vehicle.drive_scale.abs(), vehicle.steering_scale.abs());
     let channel = |number, fastest, braking| ChannelSettings {
         encoder: EncoderSettings::new(node(number)),
-        limits: SupervisionLimits::every(0.010, fastest, braking),
+        limits: PlausibilityLimits::every(0.010, fastest, braking),
     };
     [channel(1, recording.parameters.limits.fastest / drive, 2.5 / drive), channel(2, 3.0 / steering, 100.0 / steering)]
 }

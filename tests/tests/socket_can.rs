@@ -21,7 +21,7 @@ use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::EncoderSettings;
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_wire::can::frame::{AnyFrame, FdFrame, Frame, extended_id, standard_id};
-use agv_wire::can::supervision::SupervisionLimits;
+use agv_wire::can::plausibility::PlausibilityLimits;
 
 /// Names the interface to the program inside.
 const INTERFACE: &str = "AGV_CAN_INTERFACE";
@@ -206,7 +206,7 @@ fn encoders_are_set_up_and_read(interface: &str) {
         });
         // Only values are judged: a busy machine may be late by any time.
         let patient =
-            SupervisionLimits { late_after: 60.0, missing_after: 60.0, ..SupervisionLimits::every(0.010, 1e6, 1e6) };
+            PlausibilityLimits { late_after: 60.0, missing_after: 60.0, ..PlausibilityLimits::every(0.010, 1e6, 1e6) };
         let channel = |number| ChannelSettings {
             encoder: EncoderSettings { answer_timeout: 2.0, heartbeat: 0, ..EncoderSettings::new(node(number)) },
             limits: patient,

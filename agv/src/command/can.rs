@@ -15,8 +15,8 @@ use agv_wire::can::controller::{Content, PoseReceiver, PublishedPose};
 use agv_wire::can::encoder::{EncoderSettings, Reporting};
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
 use agv_wire::can::frame::{AnyFrame, Frame};
+use agv_wire::can::plausibility::PlausibilityLimits;
 use agv_wire::can::sdo::{Object, Request, Response};
-use agv_wire::can::supervision::SupervisionLimits;
 use anyhow::Context;
 use serde_json::json;
 
@@ -239,7 +239,7 @@ impl Encoders {
         let reporting = if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
         let channel = |node| ChannelSettings {
             encoder: EncoderSettings { reporting, ..EncoderSettings::new(node) },
-            limits: SupervisionLimits::every(0.010, self.fastest, self.braking),
+            limits: PlausibilityLimits::every(0.010, self.fastest, self.braking),
         };
         let mut pair = EncoderPair::new(&channel(self.drive), &channel(self.steering), 0.010, clock.now());
         let mut known = None;

@@ -139,10 +139,13 @@ impl Map {
 /// Poses, and what they are called.
 type NamedPoses = (Vec<Truth>, &'static str);
 
+/// Key scans, and loops that were closed.
+type SlamCounts = (usize, usize);
+
 impl Map {
     /// From which poses the map is made, with what they are called; none for those of the localiser. Then the key scans and
     /// loops of SLAM.
-    fn known_poses(&self, recording: &Recording) -> anyhow::Result<(Option<NamedPoses>, Option<(usize, usize)>)> {
+    fn known_poses(&self, recording: &Recording) -> anyhow::Result<(Option<NamedPoses>, Option<SlamCounts>)> {
         let mut slam = None;
         let default = match self.kind {
             Kind::Features => Poses::Localiser,
@@ -185,7 +188,7 @@ impl Map {
         Ok(landmarks)
     }
 
-    fn map_contours(&self, recording: &Recording, poses: &[Truth], slam: Option<(usize, usize)>) -> anyhow::Result<()> {
+    fn map_contours(&self, recording: &Recording, poses: &[Truth], slam: Option<SlamCounts>) -> anyhow::Result<()> {
         let mapping = progress::spinner().with_message("mapping contours");
         mapping.tick();
         let map = contour_map::map_contours_at(recording, poses, self.cell.unwrap_or(contour_map::CELL));

@@ -8,8 +8,8 @@ use agv_wire::can::canopen::{Message, NodeId};
 use agv_wire::can::encoder::EncoderSettings;
 use agv_wire::can::encoder_pair::ChannelSettings;
 use agv_wire::can::frame::{FdFrame, Frame, extended_id, standard_id};
+use agv_wire::can::plausibility::PlausibilityLimits;
 use agv_wire::can::sdo::{Object, Response, Value};
-use agv_wire::can::supervision::SupervisionLimits;
 
 fn seen(micros: u64, frame: impl Into<agv_wire::can::frame::AnyFrame>) -> SeenFrame {
     SeenFrame { time: Some(Time::from_micros(micros)), interface: "vcan0".to_owned(), frame: frame.into() }
@@ -97,7 +97,7 @@ fn encoders_are_read_from_a_log_without_their_setup() {
             range: agv_core::odometry::CounterRange::new(1 << 24),
             ..EncoderSettings::new(NodeId::new(number).unwrap())
         },
-        limits: SupervisionLimits::every(0.010, 1e6, 1e6),
+        limits: PlausibilityLimits::every(0.010, 1e6, 1e6),
     };
     let mut frames = Vec::new();
     for step in 0..50u32 {

@@ -13,7 +13,7 @@ use agv_host_sim::simulate::{odometer, vehicle};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
-use agv_wire::can::supervision::SupervisionLimits;
+use agv_wire::can::plausibility::PlausibilityLimits;
 
 /// The counters of a simulated drive, one sample every 10 ms, and their ranges.
 fn simulated() -> (Vec<EncoderSample>, CounterRange, CounterRange) {
@@ -31,7 +31,7 @@ fn simulated() -> (Vec<EncoderSample>, CounterRange, CounterRange) {
 fn channel(number: u8, reporting: Reporting, fastest: f64, braking: f64) -> ChannelSettings {
     ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
-        limits: SupervisionLimits::every(0.010, fastest, braking),
+        limits: PlausibilityLimits::every(0.010, fastest, braking),
     }
 }
 

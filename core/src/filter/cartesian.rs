@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix2;
 
-use super::observation::{Believed, Model, Viewpoint, left};
+use super::viewpoint::{Believed, Model, Viewpoint, left};
 use crate::geometry::Point;
 
 /// Position of a landmark in S.

@@ -10,9 +10,9 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::biases::{BiasModel, SCALE, STEERING, YAW};
 use super::cholesky::Root;
-use super::observation::{Believed, Viewpoint};
 use super::positive_semidefinite::make_positive_semidefinite;
 use super::slots::{PastPose, PoseOnly, Slots, StateLandmark, Storage, pose_state, slot_states};
+use super::viewpoint::{Believed, Viewpoint};
 use super::{Linearisation, Observation, PackedCovariance};
 use crate::geometry::{Point, Pose, larger_axis, wrap};
 use crate::measurement::LaserId;

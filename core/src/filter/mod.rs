@@ -13,14 +13,16 @@ mod relative_pose;
 mod slot_states;
 mod slots;
 mod timeline;
+mod viewpoint;
 
 pub use biases::{BiasDeviations, BiasModel, BiasWalk};
 pub use cartesian::Cartesian;
 pub use ekf::{Ekf, Innovation, Landmark};
 pub use linearisation::{Linearisation, TERMS};
-pub use observation::{Observation, Viewpoint};
+pub use observation::Observation;
 pub use packed_covariance::PackedCovariance;
 pub use range_bearing::RangeBearing;
 pub use relative_pose::RelativePose;
 pub use slots::{Empty, PoseAndSlots, PoseOnly, Slots, Storage, packed_entries, slot_states};
 pub use timeline::{Correction, Timeline, TimelineError};
+pub use viewpoint::Viewpoint;

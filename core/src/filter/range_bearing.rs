@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::Cartesian;
-use super::observation::{Believed, Model, Viewpoint};
+use super::viewpoint::{Believed, Model, Viewpoint};
 use crate::geometry::{Point, difference};
 
 /// Nearer than this, m, the direction of a landmark means nothing.

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::biases::YAW;
-use super::observation::{Viewpoint, left};
 use super::slots::{Slots, pose_state};
+use super::viewpoint::{Viewpoint, left};
 use super::{Ekf, Linearisation};
 use crate::geometry::{Point, Pose, difference};
 use crate::measurement::LaserId;

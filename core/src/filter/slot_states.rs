@@ -3,8 +3,8 @@
 use nalgebra::Matrix2;
 
 use super::biases::{BiasDeviations, SCALE, STEERING, YAW};
-use super::observation::{Viewpoint, left};
 use super::slots::{PastPose, Slots, StateLandmark, pose_state};
+use super::viewpoint::{Viewpoint, left};
 use super::{Cartesian, Ekf};
 use crate::geometry::{Point, Pose};
 

@@ -92,14 +92,7 @@ async fn next(
                 defmt::warn!("nav350: {}", defmt::Display2Format(&reason));
             }
             Step::Send(bytes) => {
-                let mut rest = bytes;
-                let mut is_sent = *is_open;
-                while is_sent && !rest.is_empty() {
-                    match with_timeout(SEND, socket.write(rest)).await {
-                        Ok(Ok(count)) if count > 0 => rest = rest.get(count..).unwrap_or_default(),
-                        _ => is_sent = false,
-                    }
-                }
+                let is_sent = *is_open && send(socket, bytes).await;
                 if !is_sent {
                     *is_open = false;
                     laser.unreachable();
@@ -116,13 +109,7 @@ async fn next(
                 }
                 match select(socket.read(read), alarm).await {
                     Either::First(Ok(count)) if count > 0 => {
-                        let mut rest = read.get(..count).unwrap_or_default();
-                        let time = now();
-                        while !rest.is_empty() {
-                            // A telegram is shorter than the session's room, so it always takes some.
-                            let taken = laser.receive(rest, time);
-                            rest = rest.get(taken..).unwrap_or_default();
-                        }
+                        receive(laser, read.get(..count).unwrap_or_default());
                     }
                     Either::First(_) => {
                         *is_open = false;
@@ -132,5 +119,28 @@ async fn next(
                 }
             }
         }
+    }
+}
+
+/// Sends all of the bytes; false if they do not leave in time.
+async fn send(socket: &mut TcpSocket<'_>, bytes: &[u8]) -> bool {
+    let mut rest = bytes;
+    while !rest.is_empty() {
+        match with_timeout(SEND, socket.write(rest)).await {
+            Ok(Ok(count)) if count > 0 => rest = rest.get(count..).unwrap_or_default(),
+            _ => return false,
+        }
+    }
+    true
+}
+
+/// Gives the session what has come.
+fn receive(laser: &mut Laser<TELEGRAM>, bytes: &[u8]) {
+    let mut rest = bytes;
+    let time = now();
+    while !rest.is_empty() {
+        // A telegram is shorter than the session's room, so it always takes some.
+        let taken = laser.receive(rest, time);
+        rest = rest.get(taken..).unwrap_or_default();
     }
 }

@@ -43,7 +43,6 @@ fn a_vehicle_that_no_localiser_can_have_is_refused_by_name() {
     for (text, leaf) in [
         ("[vehicle.believed]\nsteering_counter = 4", "vehicle.steering_scale"),
         ("[vehicle.believed]\nsteering_offset_forward_deg = 500.0", "vehicle.steering_offset_forward"),
-        ("[laser.mounting]\nheading_deg = -500.0", "laser.theta"),
     ] {
         let error = Scenario::parse(text).unwrap_err().to_string();
         assert_eq!(error, format!("the scenario's vehicle cannot be: {leaf} is out of its bounds"));

@@ -239,26 +239,9 @@ impl Test<'_> {
         })
         .unwrap_or(0.0);
         answers.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let score = |given: usize| {
-            let right = answers[..given].iter().filter(|(_, is_right)| *is_right).count();
-            let precision = if given > 0 { right as f64 / given as f64 } else { 1.0 };
-            (precision, right as f64 / answerable.max(1) as f64)
-        };
-        // Answers at the same distance are given together.
-        let thresholds: Vec<usize> =
-            (1..=answers.len()).filter(|n| *n == answers.len() || answers[*n].0 > answers[n - 1].0).collect();
-        let mut recall_at_full_precision = 0.0f64;
-        let mut max_f1 = 0.0f64;
-        for given in thresholds {
-            let (precision, recall) = score(given);
-            if precision >= 1.0 {
-                recall_at_full_precision = recall_at_full_precision.max(recall);
-            }
-            if precision + recall > 0.0 {
-                max_f1 = max_f1.max(2.0 * precision * recall / (precision + recall));
-            }
-        }
-        let (learned_precision, learned_recall) = score(answers.partition_point(|(distance, _)| *distance < threshold));
+        let (recall_at_full_precision, max_f1) = best_scores(&answers, answerable);
+        let learned = answers.partition_point(|(distance, _)| *distance < threshold);
+        let (learned_precision, learned_recall) = score(&answers[..learned], answerable);
         let mut seconds: Vec<f64> = self.asked.iter().map(|described| experiment.seconds(described)).collect();
         seconds.sort_by(f64::total_cmp);
         Outcome {
@@ -277,6 +260,30 @@ impl Test<'_> {
             answerable,
         }
     }
+}
+
+/// Precision and recall of answers, each with its distance and whether it is right.
+fn score(answers: &[(f64, bool)], answerable: usize) -> (f64, f64) {
+    let right = answers.iter().filter(|(_, is_right)| *is_right).count();
+    let precision = if answers.is_empty() { 1.0 } else { right as f64 / answers.len() as f64 };
+    (precision, right as f64 / answerable.max(1) as f64)
+}
+
+/// Over all thresholds of the distance: the recall at full precision, and the largest F1.
+fn best_scores(answers: &[(f64, bool)], answerable: usize) -> (f64, f64) {
+    // Answers at the same distance are given together.
+    let thresholds = (1..=answers.len()).filter(|n| *n == answers.len() || answers[*n].0 > answers[n - 1].0);
+    let (mut recall_at_full_precision, mut max_f1) = (0.0f64, 0.0f64);
+    for given in thresholds {
+        let (precision, recall) = score(&answers[..given], answerable);
+        if precision >= 1.0 {
+            recall_at_full_precision = recall_at_full_precision.max(recall);
+        }
+        if precision + recall > 0.0 {
+            max_f1 = max_f1.max(2.0 * precision * recall / (precision + recall));
+        }
+    }
+    (recall_at_full_precision, max_f1)
 }
 
 /// Share of the true pairs whose turn is found within 2 degrees. `turned` are the queries, each turned by its angle.

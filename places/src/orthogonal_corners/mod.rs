@@ -6,7 +6,9 @@
 
 mod detector;
 mod hough_spectrum;
+mod parameters;
 mod surface_run;
 
-pub use detector::{OrthogonalCornerParameters, OrthogonalCorners};
+pub use detector::OrthogonalCorners;
 pub use hough_spectrum::HoughSpectrum;
+pub use parameters::OrthogonalCornerParameters;

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::OrthogonalCornerParameters;
+use super::parameters::OrthogonalCornerParameters;
 use agv_core::geometry::ScanPoint;
 use agv_core::sensing::PointScan;
 

@@ -314,12 +314,12 @@ impl Encoder {
     /// The next frame to send, or what the passing of time meant. Call until both are none.
     pub fn poll(&mut self, now: Time) -> (Option<Frame>, Option<EncoderEvent>) {
         if let Some(command) = self.command.take() {
-            return (Some(command.frame(Some(self.settings.node))), None);
+            return (Some(self.command(command)), None);
         }
         match self.phase {
             Phase::Waiting { next_reset } if now >= next_reset => {
                 self.phase = Phase::Waiting { next_reset: now.offset(BOOT_TIME) };
-                return (Some(NmtCommand::ResetCommunication.frame(Some(self.settings.node))), None);
+                return (Some(self.command(NmtCommand::ResetCommunication)), None);
             }
             Phase::Waiting { .. } => return (None, None),
             Phase::Setup(step) => {
@@ -456,6 +456,10 @@ impl Encoder {
             }
             _ => None,
         }
+    }
+
+    fn command(&self, command: NmtCommand) -> Frame {
+        Message::Nmt { command, node: Some(self.settings.node) }.encode()
     }
 
     /// Takes the answer of a step; gives the next one, or none if it was the last.

@@ -2,8 +2,8 @@
 
 use super::encoder::{Encoder, EncoderEvent, EncoderReading, EncoderSettings, EncoderState, Reporting};
 use super::frame::Frame;
-use super::nmt::SyncProducer;
-use super::supervision::{SupervisionLimits, Supervisor};
+use super::plausibility::{PlausibilityLimits, PlausibilityMonitor};
+use super::sync::SyncProducer;
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use agv_core::odometry::CounterRange;
 
@@ -13,13 +13,13 @@ pub struct ChannelSettings {
     /// How it is set up.
     pub encoder: EncoderSettings,
     /// What it does on a sound vehicle.
-    pub limits: SupervisionLimits,
+    pub limits: PlausibilityLimits,
 }
 
 #[derive(Clone, Debug)]
 struct Channel {
     encoder: Encoder,
-    supervisor: Supervisor,
+    monitor: PlausibilityMonitor,
     range: CounterRange,
     has_error: bool,
     before: Option<EncoderReading>,
@@ -31,7 +31,7 @@ impl Channel {
         let range = settings.encoder.range.unwrap_or(CounterRange::BITS_32);
         Self {
             encoder: Encoder::new(settings.encoder, start),
-            supervisor: Supervisor::new(settings.limits, range, start),
+            monitor: PlausibilityMonitor::new(settings.limits, range, start),
             range,
             has_error: false,
             before: None,
@@ -42,7 +42,7 @@ impl Channel {
     /// Whether there is a new reading that can be used.
     fn handle(&mut self, frame: &Frame, time: Time) -> Option<Result<EncoderReading, (EncoderFault, EncoderReading)>> {
         match self.encoder.handle(frame, time)? {
-            EncoderEvent::Reading(reading) => Some(match self.supervisor.reading(reading.time, reading.position) {
+            EncoderEvent::Reading(reading) => Some(match self.monitor.reading(reading.time, reading.position) {
                 None => {
                     self.before = self.latest.replace(reading);
                     Ok(reading)
@@ -56,7 +56,7 @@ impl Channel {
             EncoderEvent::Started => {
                 if let Some(identity) = self.encoder.identity() {
                     self.range = identity.range;
-                    self.supervisor.set_range(identity.range);
+                    self.monitor.set_range(identity.range);
                 }
                 None
             }
@@ -75,13 +75,13 @@ impl Channel {
 
     fn check(&mut self, now: Time) -> Option<EncoderFault> {
         if self.encoder.identity().is_some_and(|identity| identity.tells_other_range) {
-            self.supervisor.raise(EncoderFault::WrongRange, now);
+            self.monitor.raise(EncoderFault::WrongRange, now);
         } else if self.has_error {
-            self.supervisor.raise(EncoderFault::Reported, now);
+            self.monitor.raise(EncoderFault::Reported, now);
         } else if self.encoder.is_heartbeat_lost(now) {
-            self.supervisor.raise(EncoderFault::HeartbeatLost, now);
+            self.monitor.raise(EncoderFault::HeartbeatLost, now);
         }
-        self.supervisor.check(now)
+        self.monitor.check(now)
     }
 
     /// The counter at `time`, if it lies between the last two readings or at one of them.
@@ -218,12 +218,12 @@ impl EncoderPair {
 
     /// Others know that the vehicle stands still.
     pub fn expect_standstill(&mut self) {
-        self.drive.supervisor.expect_standstill();
-        self.steering.supervisor.expect_standstill();
+        self.drive.monitor.expect_standstill();
+        self.steering.monitor.expect_standstill();
     }
 
     /// Others know that the driving wheel turns at least so fast, ticks/s of either sign; 0 if nobody knows.
     pub fn expect_motion(&mut self, drive_speed: f64, now: Time) {
-        self.drive.supervisor.expect_motion(drive_speed, now);
+        self.drive.monitor.expect_motion(drive_speed, now);
     }
 }

@@ -4,9 +4,9 @@
 //! |---|---|
 //! | classic and FD frames | [`frame`] |
 //! | frames as text on a serial line | [`slcan`] |
-//! | CANopen: identifiers and the messages behind them | [`canopen`], [`nmt`], [`sdo`], [`emcy`], [`pdo`] |
+//! | CANopen: identifiers and the messages behind them | [`canopen`], [`nmt`], [`sync`], [`sdo`], [`emcy`], [`pdo`] |
 //! | one CiA 406 encoder and its states | [`encoder`] |
-//! | is the encoder to be believed | [`supervision`] |
+//! | is the encoder to be believed | [`plausibility`] |
 //! | two encoders as one measurement | [`encoder_pair`] |
 //! | numbers in frames of unknown makers | [`signal`], [`drive_unit`] |
 //! | what the controller says and hears | [`controller`] |
@@ -24,8 +24,9 @@ pub mod encoder_pair;
 pub mod frame;
 pub mod nmt;
 pub mod pdo;
+pub mod plausibility;
 pub mod report_clock;
 pub mod sdo;
 pub mod signal;
 pub mod slcan;
-pub mod supervision;
+pub mod sync;

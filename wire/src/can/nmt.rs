@@ -1,7 +1,5 @@
-//! Network management (CiA 301, 7.2.8 and 7.3.2): commands, states, heartbeats; and the producer of SYNC.
+//! Network management (CiA 301, 7.2.8 and 7.3.2): commands, states, heartbeats.
 
-use super::canopen::{Message, NodeId};
-use super::frame::Frame;
 use agv_core::measurement::Time;
 
 /// What a master tells nodes to do.
@@ -43,12 +41,6 @@ impl NmtCommand {
             Self::ResetNode => 0x81,
             Self::ResetCommunication => 0x82,
         }
-    }
-
-    /// The frame that tells one node, or all of them.
-    #[must_use]
-    pub fn frame(self, node: Option<NodeId>) -> Frame {
-        Message::Nmt { command: self, node }.encode()
     }
 }
 
@@ -119,36 +111,5 @@ impl HeartbeatConsumer {
     #[must_use]
     pub fn is_lost(&self, now: Time) -> bool {
         self.last.is_some_and(|last| now.since(last) > self.longest_gap)
-    }
-}
-
-/// Says when synchronous nodes read their inputs.
-#[derive(Clone, Copy, Debug)]
-pub struct SyncProducer {
-    period: f64,
-    next: Time,
-}
-
-impl SyncProducer {
-    /// A producer that begins at `start` and repeats every `period` seconds (at least a millisecond).
-    #[must_use]
-    pub fn new(period: f64, start: Time) -> Self {
-        Self { period: period.max(1e-3), next: start }
-    }
-
-    /// The SYNC frame, if one is due. Moments that were missed are left out, so that a late caller makes no burst.
-    pub fn poll(&mut self, now: Time) -> Option<Frame> {
-        if now < self.next {
-            return None;
-        }
-        let following = self.next.offset(self.period);
-        self.next = if following <= now { now.offset(self.period) } else { following };
-        Some(Message::Sync { counter: None }.encode())
-    }
-
-    /// When the next one is due.
-    #[must_use]
-    pub const fn next(&self) -> Time {
-        self.next
     }
 }

@@ -4,9 +4,10 @@ use agv_core::measurement::Time;
 use agv_wire::can::canopen::{CanopenError, Message, NodeId, receive_pdo_id, transmit_pdo_id};
 use agv_wire::can::emcy::Emergency;
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
-use agv_wire::can::nmt::{HeartbeatConsumer, NmtCommand, NmtState, SyncProducer};
+use agv_wire::can::nmt::{HeartbeatConsumer, NmtCommand, NmtState};
 use agv_wire::can::pdo::{MappingEntry, PdoMapping};
 use agv_wire::can::sdo::{AbortCode, Object, Request, Response, SdoClient, SdoError, TransferError, Value};
+use agv_wire::can::sync::SyncProducer;
 use proptest::prelude::*;
 
 use super::frames::{any_classic, frame};

@@ -10,6 +10,6 @@ mod encoder;
 mod frames;
 mod node;
 mod pair;
+mod plausibility;
 mod report_clock;
 mod slcan;
-mod supervision;

@@ -8,7 +8,7 @@ use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
 use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair, FAULT_PERIOD};
 use agv_wire::can::frame::Frame;
-use agv_wire::can::supervision::SupervisionLimits;
+use agv_wire::can::plausibility::PlausibilityLimits;
 
 use super::frames::frame;
 use super::node::Node;
@@ -20,7 +20,7 @@ fn at(milliseconds: u64) -> Time {
 fn channel(number: u8, reporting: Reporting) -> ChannelSettings {
     ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
-        limits: SupervisionLimits::every(0.010, 20_000.0, 25_000.0),
+        limits: PlausibilityLimits::every(0.010, 20_000.0, 25_000.0),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use agv_lab::evaluate::features::{DetectorKind, Disturbance, page, run};
+use agv_lab::evaluate::features::{DetectorKind, Disturbance, Outcome, page, run};
 use agv_lab::evaluate::{falko, repeatability};
 use anyhow::Context;
 
@@ -49,60 +49,79 @@ impl Features {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());
         }
-        println!("detector  keypoints/scan  repeatability  counting empty  us/scan");
-        for outcome in &outcomes {
+        print_detectors(&outcomes);
+        print_levels(&outcomes);
+        print_stability(&outcomes);
+        print_descriptors(&outcomes);
+        Ok(())
+    }
+}
+
+fn detector(outcome: &Outcome) -> String {
+    format!("{:?}", outcome.detector).to_lowercase()
+}
+
+fn print_detectors(outcomes: &[Outcome]) {
+    println!("detector  keypoints/scan  repeatability  counting empty  us/scan");
+    for outcome in outcomes {
+        println!(
+            "{:<9} {:>14.1} {:>14.3} {:>15.3} {:>8.1}",
+            detector(outcome),
+            outcome.keypoints_per_scan,
+            outcome.repeatability,
+            outcome.repeatability_counting_empty,
+            outcome.us_per_scan
+        );
+    }
+}
+
+fn print_levels([falko, oc]: &[Outcome; 2]) {
+    println!("\ntest          level  repeatability, counting empty");
+    println!("{:>21}{:>8}{:>8}", "", "falko", "oc");
+    for level in &falko.levels {
+        let other = oc.levels.iter().find(|other| other.test == level.test && other.level == level.level);
+        println!(
+            "{:<13} {:>5.2} {:>8.3}{:>8.3}",
+            level.test,
+            level.level,
+            level.counting_empty,
+            other.map_or(f64::NAN, |other| other.counting_empty)
+        );
+    }
+}
+
+fn print_stability(outcomes: &[Outcome]) {
+    println!("\ndetector  association  landmarks  seen once  mean      max");
+    for outcome in outcomes {
+        for row in &outcome.stability {
             println!(
-                "{:<9} {:>14.1} {:>14.3} {:>15.3} {:>8.1}",
-                format!("{:?}", outcome.detector).to_lowercase(),
-                outcome.keypoints_per_scan,
-                outcome.repeatability,
-                outcome.repeatability_counting_empty,
-                outcome.us_per_scan
+                "{:<9} {:>9.2} m {:>10} {:>8.1} % {:>6.3} m {:>6.3} m",
+                detector(outcome),
+                row.association_m,
+                row.landmarks,
+                100.0 * row.single_share,
+                row.lambda_mean_m,
+                row.lambda_max_m
             );
         }
-        println!("\ntest          level  repeatability, counting empty");
-        let [falko, oc] = &outcomes;
-        println!("{:>21}{:>8}{:>8}", "", "falko", "oc");
-        for level in &falko.levels {
-            let other = oc.levels.iter().find(|other| other.test == level.test && other.level == level.level);
-            println!(
-                "{:<13} {:>5.2} {:>8.3}{:>8.3}",
-                level.test,
-                level.level,
-                level.counting_empty,
-                other.map_or(f64::NAN, |other| other.counting_empty)
-            );
-        }
-        println!("\ndetector  association  landmarks  seen once  mean      max");
-        for outcome in &outcomes {
-            for row in &outcome.stability {
+    }
+}
+
+fn print_descriptors(outcomes: &[Outcome]) {
+    println!("\ndetector  descriptor  radius  us/scan  test          nearest correct");
+    for outcome in outcomes {
+        for descriptor in &outcome.descriptors {
+            for test in &descriptor.tests {
                 println!(
-                    "{:<9} {:>9.2} m {:>10} {:>8.1} % {:>6.3} m {:>6.3} m",
-                    format!("{:?}", outcome.detector).to_lowercase(),
-                    row.association_m,
-                    row.landmarks,
-                    100.0 * row.single_share,
-                    row.lambda_mean_m,
-                    row.lambda_max_m
+                    "{:<9} {:<10} {:>6.1} m {:>7.1}  {:<13} {:>15.3}",
+                    detector(outcome),
+                    descriptor.descriptor,
+                    descriptor.radius_m,
+                    descriptor.us_per_scan,
+                    test.test,
+                    test.nearest_correct
                 );
             }
         }
-        println!("\ndetector  descriptor  radius  us/scan  test          nearest correct");
-        for outcome in &outcomes {
-            for descriptor in &outcome.descriptors {
-                for test in &descriptor.tests {
-                    println!(
-                        "{:<9} {:<10} {:>6.1} m {:>7.1}  {:<13} {:>15.3}",
-                        format!("{:?}", outcome.detector).to_lowercase(),
-                        descriptor.descriptor,
-                        descriptor.radius_m,
-                        descriptor.us_per_scan,
-                        test.test,
-                        test.nearest_correct
-                    );
-                }
-            }
-        }
-        Ok(())
     }
 }

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use agv_host_sim::export::point_cloud::{self, Format};
-use agv_host_sim::lidar3d::Source;
+use agv_host_sim::export::point_cloud::{self, Format, PointCloudError};
+use agv_host_sim::lidar3d::{Revolution, Source};
 use agv_lidar3d::cloud::RingOrder;
 use anyhow::ensure;
 use serde_json::json;
@@ -60,7 +60,7 @@ impl Decode {
         ensure!(!self.organised || format == Format::Pcd, "--organised goes with a name that ends in .pcd");
         ensure!(self.count != Some(0), "--count must be at least 1");
         let stop = stop::on_interrupt()?;
-        let source = self.source.open(&self.sensor.options(), &stop)?;
+        let source = self.source.clone().open(&self.sensor.options(), &stop)?;
         let setup = source.setup()?;
         let order = RingOrder::new(&setup.lasers);
         if let Some(warning) = &setup.warning {
@@ -82,13 +82,7 @@ impl Decode {
                 return ControlFlow::Continue(());
             }
             let path = if is_single { self.output.clone() } else { numbered(&self.output, index) };
-            let outcome = if self.organised {
-                let columns = revolution.columns();
-                point_cloud::write_organised(&path, &revolution.organised(&order, columns), order.rings())
-            } else {
-                point_cloud::write(&path, &revolution.points)
-            };
-            if let Err(error) = outcome {
+            if let Err(error) = self.write(&path, &revolution, &order) {
                 failure = Some(error);
                 return ControlFlow::Break(());
             }
@@ -116,6 +110,14 @@ impl Decode {
             output::print_rows(&rows);
         }
         Ok(())
+    }
+
+    fn write(&self, path: &Path, revolution: &Revolution, order: &RingOrder) -> Result<(), PointCloudError> {
+        if !self.organised {
+            return point_cloud::write(path, &revolution.points);
+        }
+        let columns = revolution.columns();
+        point_cloud::write_organised(path, &revolution.organised(order, columns), order.rings())
     }
 }
 

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use agv_host_sim::lidar3d::kind::Kind;
+use agv_host_sim::lidar3d::survey::Survey;
 use agv_host_sim::lidar3d::{SetupError, Source};
 use agv_lidar3d::packet::Sensor;
 use serde_json::json;
@@ -60,7 +61,7 @@ impl Info {
         };
         bar.finish_and_clear();
         let duration = survey.duration();
-        let rate = if duration > 0.0 { survey.turns / duration } else { 0.0 };
+        let rate = turn_rate(&survey);
         if self.json {
             let object = json!({
                 "sensor": sensor,
@@ -86,26 +87,39 @@ impl Info {
             ["source".to_owned(), name],
             ["sensor".to_owned(), sensor.unwrap_or("unknown; name it with --sensor").to_owned()],
         ];
-        rows.extend(survey.return_mode.map(|mode| ["returns of a firing".to_owned(), mode]));
-        rows.extend(survey.port.map(|port| ["UDP port".to_owned(), port.to_string()]));
-        rows.extend(survey.version.map(|version| ["version".to_owned(), version]));
-        rows.extend(warning.map(|warning| ["warning".to_owned(), warning]));
-        if survey.packets > 0 {
-            rows.push(["packets".to_owned(), survey.packets.to_string()]);
-            rows.push(["not of a sensor".to_owned(), format!("{} come near, {} others", survey.refused, survey.other)]);
-            rows.push(["turns".to_owned(), format!("{:.2} in {duration:.2} s, {rate:.2} a second", survey.turns)]);
-        }
-        if survey.is_cut {
-            rows.push(["end".to_owned(), "in the middle of a packet".to_owned()]);
-        }
-        if survey.kind == Some(Kind::Velodyne(Sensor::Hdl64e)) {
-            let found = if survey.calibration.is_some() { "in the packets" } else { "not in the packets" };
-            rows.push(["calibration".to_owned(), found.to_owned()]);
-        }
-        if let Some(tally) = tally {
-            rows.extend(tally_rows(tally));
-        }
+        rows.extend(survey_rows(&survey, warning));
+        rows.extend(tally.into_iter().flat_map(tally_rows));
         output::print_rows(&rows);
         Ok(())
     }
+}
+
+/// What the stream says about itself.
+fn survey_rows(survey: &Survey, warning: Option<String>) -> Vec<[String; 2]> {
+    let duration = survey.duration();
+    let rate = turn_rate(survey);
+    let mut rows = Vec::new();
+    rows.extend(survey.return_mode.iter().map(|mode| ["returns of a firing".to_owned(), mode.clone()]));
+    rows.extend(survey.port.map(|port| ["UDP port".to_owned(), port.to_string()]));
+    rows.extend(survey.version.iter().map(|version| ["version".to_owned(), version.clone()]));
+    rows.extend(warning.map(|warning| ["warning".to_owned(), warning]));
+    if survey.packets > 0 {
+        rows.push(["packets".to_owned(), survey.packets.to_string()]);
+        rows.push(["not of a sensor".to_owned(), format!("{} come near, {} others", survey.refused, survey.other)]);
+        rows.push(["turns".to_owned(), format!("{:.2} in {duration:.2} s, {rate:.2} a second", survey.turns)]);
+    }
+    if survey.is_cut {
+        rows.push(["end".to_owned(), "in the middle of a packet".to_owned()]);
+    }
+    if survey.kind == Some(Kind::Velodyne(Sensor::Hdl64e)) {
+        let found = if survey.calibration.is_some() { "in the packets" } else { "not in the packets" };
+        rows.push(["calibration".to_owned(), found.to_owned()]);
+    }
+    rows
+}
+
+/// Turns a second.
+fn turn_rate(survey: &Survey) -> f64 {
+    let duration = survey.duration();
+    if duration > 0.0 { survey.turns / duration } else { 0.0 }
 }

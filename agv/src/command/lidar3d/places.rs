@@ -274,27 +274,7 @@ impl Find {
             refine(&map, Drive { source, sensor }, &stop, &mut answers)?;
         }
         if self.json {
-            let objects: Vec<_> = answers
-                .iter()
-                .map(|found| {
-                    let Found { scan, answer, alignment, .. } = found;
-                    let place = &map.places[answer.place];
-                    let pose = found.pose(place);
-                    json!({
-                        "scan": scan,
-                        "answer": if answer.is_believed { "found" } else { "unsure" },
-                        "place": answer.place,
-                        "place_scan": place.scan,
-                        "distance": answer.distance,
-                        "turn_deg": found.turn().to_degrees(),
-                        "x_m": pose.map(|pose| pose[0]),
-                        "y_m": pose.map(|pose| pose[1]),
-                        "heading_deg": pose.map(|pose| pose[2].to_degrees()),
-                        "share_on_surfaces": alignment.map(|alignment| alignment.share),
-                        "deviation_m": alignment.map(|alignment| alignment.deviation),
-                    })
-                })
-                .collect();
+            let objects: Vec<_> = answers.iter().map(|found| found.object(&map.places)).collect();
             println!("{}", serde_json::to_string_pretty(&objects)?);
             return Ok(());
         }
@@ -321,6 +301,25 @@ struct Found {
 }
 
 impl Found {
+    fn object(&self, places: &[StoredPlace]) -> serde_json::Value {
+        let Self { scan, answer, alignment, .. } = self;
+        let place = &places[answer.place];
+        let pose = self.pose(place);
+        json!({
+            "scan": scan,
+            "answer": if answer.is_believed { "found" } else { "unsure" },
+            "place": answer.place,
+            "place_scan": place.scan,
+            "distance": answer.distance,
+            "turn_deg": self.turn().to_degrees(),
+            "x_m": pose.map(|pose| pose[0]),
+            "y_m": pose.map(|pose| pose[1]),
+            "heading_deg": pose.map(|pose| pose[2].to_degrees()),
+            "share_on_surfaces": alignment.map(|alignment| alignment.share),
+            "deviation_m": alignment.map(|alignment| alignment.deviation),
+        })
+    }
+
     /// By which the sensor has turned to the left since, rad.
     fn turn(&self) -> f64 {
         self.alignment.map_or(self.answer.turn, |alignment| alignment.turn())

@@ -6,6 +6,7 @@
 
 use super::parameters::{EndPointParameters, Parameters};
 use super::runs::{Beams, Runs};
+use crate::geometry::ScanPoint;
 use crate::sensing::line::{Line, Moments, largest_variance};
 use crate::sensing::{Keypoint, KeypointKind, PointScan};
 
@@ -102,11 +103,7 @@ fn end_of_face<const BEAMS: usize>(
     if let Some((background_steps, other)) = background {
         steps = background_steps;
         let beyond = *scan.points.get(other)?;
-        let direction = beyond / beyond.norm().max(1e-6);
-        let approach = normal.dot(&direction);
-        let crossing = normal.dot(&(last + line.centroid)) / approach;
-        // A line that the background's beam does not meet lies behind the sensor or runs along the beam.
-        if crossing > 0.0 && beyond.norm() - crossing < wanted.depth {
+        if hides_too_little(&line, last, beyond, wanted.depth) {
             return None;
         }
     }
@@ -141,6 +138,17 @@ fn end_of_face<const BEAMS: usize>(
         radius: extent,
         score: 0.0,
     })
+}
+
+/// Whether what is seen beside the face lies less than `depth` (m) behind the line of the face.
+#[inline(always)]
+fn hides_too_little(line: &Line, last: ScanPoint, beyond: ScanPoint, depth: f32) -> bool {
+    let normal = line.normal();
+    let direction = beyond / beyond.norm().max(1e-6);
+    let approach = normal.dot(&direction);
+    let crossing = normal.dot(&(last + line.centroid)) / approach;
+    // A line that the background's beam does not meet lies behind the sensor or runs along the beam.
+    crossing > 0.0 && beyond.norm() - crossing < depth
 }
 
 /// The line through the face from its last beam inwards, relative to the last return, and how far it goes, m.

@@ -10,8 +10,8 @@ use agv_settings::{LEAVES, Settings};
 
 use super::dice::{Dice, Source};
 
-/// Parameters: the default ones, or each setting drawn from all that may be set.
-pub fn parameters(dice: &mut Dice<impl Source>) -> Parameters {
+/// The default settings, or each drawn from all that may be set.
+fn settings(dice: &mut Dice<impl Source>) -> Settings {
     let mut settings = Settings::default();
     let share = [255, 20, 4, 1][usize::from(dice.below(4))];
     for leaf in &LEAVES {
@@ -35,7 +35,12 @@ pub fn parameters(dice: &mut Dice<impl Source>) -> Parameters {
         // What does not fit stays as it was.
         let _ = leaf.set(&mut settings, value);
     }
-    let mut parameters = settings.parameters;
+    settings
+}
+
+/// Parameters: those of drawn settings, and what no setting reaches.
+pub fn parameters(dice: &mut Dice<impl Source>) -> Parameters {
+    let mut parameters = settings(dice).parameters;
     match dice.below(8) {
         0 => parameters.vehicle = Vehicle::Increments,
         1 => {

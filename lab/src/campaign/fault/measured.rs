@@ -151,15 +151,7 @@ impl Fault {
                 }
             }
             FaultKind::Mirror { deg, distance } => {
-                let (sine, cosine) = libm::sincos(deg.to_radians());
-                let normal = Point::new(cosine, sine);
-                let images: Vec<Point> = seen
-                    .iter()
-                    .map(position)
-                    .filter(|point| point.dot(&normal) < distance)
-                    .map(|point| point + normal * (2.0 * (distance - point.dot(&normal))))
-                    .filter(|image| image.norm() < FARTHEST)
-                    .collect();
+                let images: Vec<Point> = images(seen, deg, distance);
                 for image in images {
                     add(seen, libm::atan2(image.y, image.x), image.norm());
                 }
@@ -213,6 +205,18 @@ impl Fault {
         }
         seen.sort_by_key(|observation| observation.time);
     }
+}
+
+/// Images of reflectors behind a mirror at a distance, m, in a direction, deg, as far as they can be seen, m in S.
+fn images(seen: &[ReflectorObservation], deg: f64, distance: f64) -> Vec<Point> {
+    let (sine, cosine) = libm::sincos(deg.to_radians());
+    let normal = Point::new(cosine, sine);
+    seen.iter()
+        .map(position)
+        .filter(|point| point.dot(&normal) < distance)
+        .map(|point| point + normal * (2.0 * (distance - point.dot(&normal))))
+        .filter(|image| image.norm() < FARTHEST)
+        .collect()
 }
 
 /// What the encoders' faults remember.

@@ -112,24 +112,7 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
         Observer::new(kind).observe_all(&changed)
     };
     let (us_per_scan, descriptor_us) = described::times(kind, scans);
-    let mut descriptors: Vec<_> = DESCRIPTOR_RADII
-        .into_iter()
-        .zip(descriptor_us)
-        .flat_map(|(radius_m, us)| {
-            let outcome =
-                |descriptor, us_per_scan| DescriptorOutcome { descriptor, radius_m, us_per_scan, tests: Vec::new() };
-            [outcome("bsc", us[0]), outcome("cgh", us[1])]
-        })
-        .collect();
-    let mut describe = |test, level, compared: &[Compared]| {
-        for (number, outcome) in descriptors.iter_mut().enumerate() {
-            let radius = number / 2;
-            outcome.tests.push(rate(test, level, compared, |a, i, b, j| match number % 2 {
-                0 => a.shapes[radius][i].distance(&b.shapes[radius][j]) as f32,
-                _ => a.histograms[radius][i].distance(&b.histograms[radius][j]),
-            }));
-        }
-    };
+    let mut descriptors = unrated(descriptor_us);
     let viewed: Vec<_> = pairs
         .iter()
         .map(|pair| {
@@ -137,7 +120,7 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
             (&frames[first], &frames[second], world[first].clone(), world[second].clone())
         })
         .collect();
-    describe("viewpoint", None, &viewed);
+    describe(&mut descriptors, "viewpoint", None, &viewed);
     done();
     for disturbance in Disturbance::ALL {
         let (test, level) = disturbance.name();
@@ -152,7 +135,7 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
         let shares = compared.iter().map(|(_, _, first, second)| share(first, second));
         levels.push(mean_level(test, level, shares.collect()));
         if DESCRIBED.contains(&disturbance) {
-            describe(test, Some(level), &compared);
+            describe(&mut descriptors, test, Some(level), &compared);
         }
         done();
     }
@@ -170,6 +153,29 @@ pub fn run(kind: DetectorKind, scans: &[PosedScan], pairs: &[OverlappingPair], d
         levels,
         stability,
         descriptors,
+    }
+}
+
+/// The descriptors, none of them rated yet.
+fn unrated(us: [[f64; 2]; DESCRIPTOR_RADII.len()]) -> Vec<DescriptorOutcome> {
+    let of_radius = |(radius_m, us): (_, [f64; 2])| {
+        [("bsc", us[0]), ("cgh", us[1])].map(|(descriptor, us_per_scan)| DescriptorOutcome {
+            descriptor,
+            radius_m,
+            us_per_scan,
+            tests: Vec::new(),
+        })
+    };
+    DESCRIPTOR_RADII.into_iter().zip(us).flat_map(of_radius).collect()
+}
+
+fn describe(outcomes: &mut [DescriptorOutcome], test: &'static str, level: Option<f64>, compared: &[Compared]) {
+    for (number, outcome) in outcomes.iter_mut().enumerate() {
+        let radius = number / 2;
+        outcome.tests.push(rate(test, level, compared, |a, i, b, j| match number % 2 {
+            0 => a.shapes[radius][i].distance(&b.shapes[radius][j]) as f32,
+            _ => a.histograms[radius][i].distance(&b.histograms[radius][j]),
+        }));
     }
 }
 

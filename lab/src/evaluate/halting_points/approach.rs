@@ -65,13 +65,38 @@ struct Plant<'a> {
     steering: f64,
     counted: f64,
     direction: Direction,
-    /// Errors that last for the way: of the steering angle (rad) and of the counted way (share).
+    /// Errors that last for the leg: of the steering angle (rad) and of the counted distance (share).
     lasting: [f64; 2],
     time: f64,
     seen: Vec<ReflectorObservation>,
 }
 
-impl Plant<'_> {
+impl<'a> Plant<'a> {
+    /// A vehicle that stands beside its start, as exactly as it is told where it is.
+    fn new(approach: &Approach, truth: &'a TrueVehicle, disturbance: &'a Disturbance, seed: u64) -> Self {
+        let mut random = Random::new(seed, Stream::Odometry);
+        let lasting = [
+            disturbance.segment_steering_error_deg.to_radians() * random.normal(),
+            disturbance.segment_slip * random.normal(),
+        ];
+        let counted = random.uniform();
+        let mut given = Random::new(seed, Stream::Start);
+        let mut off = |deviation: f64| deviation * given.normal();
+        let (position, heading) = START_DEVIATION;
+        Self {
+            truth,
+            disturbance,
+            random,
+            pose: approach.start.compose(&Pose::new(off(position), off(position), off(heading))),
+            steering: 0.0,
+            counted,
+            direction: approach.leg.direction,
+            lasting,
+            time: 0.0,
+            seen: Vec::new(),
+        }
+    }
+
     fn offset(&self) -> f64 {
         let tricycle = &self.truth.tricycle;
         match self.direction {
@@ -142,36 +167,15 @@ pub fn drive(
     let parameters = Parameters::new(Vehicle::Tricycle(tricycle), believed.laser);
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(parameters));
     localizer.add_landmarks(&approach.map).ok()?;
-    let mut random = Random::new(seed, Stream::Odometry);
-    let lasting = [
-        disturbance.segment_steering_error_deg.to_radians() * random.normal(),
-        disturbance.segment_slip * random.normal(),
-    ];
-    let counted = random.uniform();
     let direction = approach.leg.direction;
-    let mut given = Random::new(seed, Stream::Start);
-    let mut off = |deviation: f64| deviation * given.normal();
+    let mut plant = Plant::new(approach, truth, disturbance, seed);
     let (position_deviation, heading_deviation) = START_DEVIATION;
-    let start =
-        approach.start.compose(&Pose::new(off(position_deviation), off(position_deviation), off(heading_deviation)));
     localizer.handle(&Event::SetPose(PoseFix {
         time: Time::from_micros(START.micros()),
         pose: approach.start,
         position_deviation,
         heading_deviation,
     }));
-    let mut plant = Plant {
-        truth,
-        disturbance,
-        random,
-        pose: start,
-        steering: 0.0,
-        counted,
-        direction,
-        lasting,
-        time: 0.0,
-        seen: Vec::new(),
-    };
     let (mut way, mut speed) = (0.0, 0.0_f64);
     let mut steps = 0;
     loop {

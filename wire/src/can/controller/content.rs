@@ -61,15 +61,15 @@ pub enum Content {
         normalised_square: f64,
         /// State of encoders, laser and search.
         health: Health,
-        /// Whether the pose is good enough to leave the reflectors: [`PoseOutput::is_good`].
+        /// Whether the pose is good enough to leave the reflectors: [`agv_core::state::PoseOutput::is_good`].
         is_good: bool,
-        /// Whether landmarks have moved the position notably: [`PoseOutput::has_jumped`].
+        /// Whether landmarks have moved the position notably: [`agv_core::state::PoseOutput::has_jumped`].
         has_jumped: bool,
-        /// How often the position was reset: [`PoseOutput::resets`].
+        /// How often the position was reset: [`agv_core::state::PoseOutput::resets`].
         resets: u8,
         /// By how far the last time, m.
         last_reset: f64,
-        /// How often there was not room for all that was seen, modulo 4: [`PoseOutput::overflows`].
+        /// How often there was not room for all that was seen, modulo 4: [`agv_core::state::PoseOutput::overflows`].
         overflows: u8,
     },
     /// How wrong the pose may be.
@@ -137,37 +137,7 @@ impl Content {
                 let payload = CORRELATION_X_HEADING.put(payload, x_heading);
                 CORRELATION_Y_HEADING.put(payload, y_heading)
             }
-            Self::Status {
-                mode,
-                reason,
-                acceptance,
-                normalised_square,
-                health,
-                is_good,
-                has_jumped,
-                resets,
-                last_reset,
-                overflows,
-            } => {
-                let payload = MODE.put_raw(payload, number_of(&MODES, &mode, MODE));
-                let payload = REASON.put_raw(payload, number_of(&REASONS, &reason, REASON));
-                let payload = ACCEPTANCE.put(payload, acceptance);
-                let payload = NORMALISED_SQUARE.put_deviation(payload, normalised_square);
-                let fault = |fault: Option<EncoderFault>, field| match fault {
-                    Some(fault) => number_of(&FAULTS, &fault, field),
-                    None => 0,
-                };
-                let payload = DRIVE_FAULT.put_raw(payload, fault(health.drive, DRIVE_FAULT));
-                let payload = STEERING_FAULT.put_raw(payload, fault(health.steering, STEERING_FAULT));
-                let payload = LASER.put_raw(payload, number_of(&LASERS, &health.laser, LASER));
-                let payload = RESETS.put_raw(payload, u64::from(resets));
-                let payload = LAST_RESET.put_deviation(payload, last_reset);
-                let search = number_of(&RELOCALIZATIONS, &health.start_search, START_SEARCH);
-                let payload = START_SEARCH.put_raw(payload, search);
-                let payload = POSE_IS_GOOD.put_raw(payload, u64::from(is_good));
-                let payload = OVERFLOWS.put_raw(payload, u64::from(overflows));
-                CORRECTED.put_raw(payload, u64::from(has_jumped))
-            }
+            Self::Status { .. } => self.encode_status(payload),
             Self::Integrity { level, limit, alarm } => {
                 let payload = PROTECTION_POSITION.put_bound(payload, level.position);
                 let payload = PROTECTION_HEADING.put_bound(payload, level.heading);
@@ -183,6 +153,42 @@ impl Content {
             Self::Command { is_standstill } => STANDSTILL.put_raw(payload, u64::from(is_standstill)),
         };
         Frame::of(self.id(node), payload.to_le_bytes())
+    }
+
+    fn encode_status(&self, payload: u64) -> u64 {
+        let Self::Status {
+            mode,
+            reason,
+            acceptance,
+            normalised_square,
+            health,
+            is_good,
+            has_jumped,
+            resets,
+            last_reset,
+            overflows,
+        } = *self
+        else {
+            return payload;
+        };
+        let payload = MODE.put_raw(payload, number_of(&MODES, &mode, MODE));
+        let payload = REASON.put_raw(payload, number_of(&REASONS, &reason, REASON));
+        let payload = ACCEPTANCE.put(payload, acceptance);
+        let payload = NORMALISED_SQUARE.put_deviation(payload, normalised_square);
+        let fault = |fault: Option<EncoderFault>, field| match fault {
+            Some(fault) => number_of(&FAULTS, &fault, field),
+            None => 0,
+        };
+        let payload = DRIVE_FAULT.put_raw(payload, fault(health.drive, DRIVE_FAULT));
+        let payload = STEERING_FAULT.put_raw(payload, fault(health.steering, STEERING_FAULT));
+        let payload = LASER.put_raw(payload, number_of(&LASERS, &health.laser, LASER));
+        let payload = RESETS.put_raw(payload, u64::from(resets));
+        let payload = LAST_RESET.put_deviation(payload, last_reset);
+        let search = number_of(&RELOCALIZATIONS, &health.start_search, START_SEARCH);
+        let payload = START_SEARCH.put_raw(payload, search);
+        let payload = POSE_IS_GOOD.put_raw(payload, u64::from(is_good));
+        let payload = OVERFLOWS.put_raw(payload, u64::from(overflows));
+        CORRECTED.put_raw(payload, u64::from(has_jumped))
     }
 
     /// Content and counter of a frame of, or for, the controller at `node`.

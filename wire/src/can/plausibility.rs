@@ -2,7 +2,7 @@
 //!
 //! A counter cannot say that it is wrong, but a vehicle cannot do everything: it is no faster than its drive and cannot
 //! stop at once. What contradicts that, and silence, is a fault. With readings every 10 ms every fault is known at most
-//! 50 ms after it began, if [`Supervisor::check`] is called at least every 5 ms.
+//! 50 ms after it began, if [`PlausibilityMonitor::check`] is called at least every 5 ms.
 //!
 //! A counter that freezes is found by itself only while the vehicle is so fast that it could not have stopped within the
 //! time: from about 0.25 m/s if it brakes with 2.5 m/s^2. Below that it takes another's word that the vehicle moves.
@@ -12,7 +12,7 @@ use agv_core::odometry::CounterRange;
 
 /// What an encoder on a sound vehicle does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SupervisionLimits {
+pub struct PlausibilityLimits {
     /// Time between readings, s.
     pub period: f64,
     /// Silence after which a reading is late, s.
@@ -29,7 +29,7 @@ pub struct SupervisionLimits {
     pub recovery: f64,
 }
 
-impl SupervisionLimits {
+impl PlausibilityLimits {
     /// Limits for readings every `period` seconds, by default 10 ms: late after 2.5 periods, frozen after 3, missing after
     /// 4.5, sound again after 20. `fastest` in ticks/s, `hardest_braking` in ticks/s^2.
     #[must_use]
@@ -63,8 +63,8 @@ struct Reading {
 
 /// Watches one encoder's readings.
 #[derive(Clone, Copy, Debug)]
-pub struct Supervisor {
-    limits: SupervisionLimits,
+pub struct PlausibilityMonitor {
+    limits: PlausibilityLimits,
     range: CounterRange,
     last: Option<Reading>,
     /// Silence counts from here.
@@ -79,11 +79,11 @@ pub struct Supervisor {
     fault: Option<(EncoderFault, Time)>,
 }
 
-impl Supervisor {
-    /// A supervisor of an encoder with that range, which should be heard from `start` on. Steps of half the range and
+impl PlausibilityMonitor {
+    /// A monitor of an encoder with that range, which should be heard from `start` on. Steps of half the range and
     /// more cannot be told from steps the other way: `fastest` must be well below that for a few periods.
     #[must_use]
-    pub const fn new(limits: SupervisionLimits, range: CounterRange, start: Time) -> Self {
+    pub const fn new(limits: PlausibilityLimits, range: CounterRange, start: Time) -> Self {
         Self {
             limits,
             range,

@@ -3,7 +3,7 @@
 use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
 use agv_core::odometry::CounterRange;
-use agv_wire::can::supervision::{SupervisionLimits, Supervisor};
+use agv_wire::can::plausibility::{PlausibilityLimits, PlausibilityMonitor};
 use proptest::prelude::*;
 
 /// Ticks of a metre: a tick is a tenth of a millimetre.
@@ -11,8 +11,8 @@ const TICKS: f64 = 10_000.0;
 const RANGE: CounterRange = CounterRange::BITS_24;
 
 /// A vehicle of at most 2 m/s that brakes with at most 2.5 m/s^2.
-fn limits() -> SupervisionLimits {
-    SupervisionLimits::every(0.010, 2.0 * TICKS, 2.5 * TICKS)
+fn limits() -> PlausibilityLimits {
+    PlausibilityLimits::every(0.010, 2.0 * TICKS, 2.5 * TICKS)
 }
 
 fn at(milliseconds: f64) -> Time {
@@ -53,8 +53,8 @@ proptest! {
         delays in prop::collection::vec(0.0..4.0f64, 1000),
     ) {
         let sign = if is_backward { -1.0 } else { 1.0 };
-        let limits = SupervisionLimits::every(f64::from(period) * 1e-3, 2.0 * TICKS, 2.5 * TICKS);
-        let mut supervisor = Supervisor::new(limits, RANGE, at(0.0));
+        let limits = PlausibilityLimits::every(f64::from(period) * 1e-3, 2.0 * TICKS, 2.5 * TICKS);
+        let mut monitor = PlausibilityMonitor::new(limits, RANGE, at(0.0));
         for millisecond in 0..5000 {
             let now = at(f64::from(millisecond));
             let index = (millisecond / period) as usize;
@@ -62,9 +62,9 @@ proptest! {
             if millisecond % period == delay as i32 {
                 let measured = f64::from(millisecond / period * period);
                 let position = counter(sign * way(measured * 1e-3, top), start);
-                prop_assert_eq!(supervisor.reading(at(measured + delay), position), None);
+                prop_assert_eq!(monitor.reading(at(measured + delay), position), None);
             }
-            prop_assert_eq!(supervisor.check(now), None, "at {} ms", millisecond);
+            prop_assert_eq!(monitor.check(now), None, "at {} ms", millisecond);
         }
     }
 
@@ -76,7 +76,7 @@ proptest! {
         begin in 2800..3400i32,
         start in 0.0..16_777_216.0f64,
     ) {
-        let mut supervisor = Supervisor::new(limits(), RANGE, at(0.0));
+        let mut monitor = PlausibilityMonitor::new(limits(), RANGE, at(0.0));
         let mut found = None;
         for millisecond in 0..begin + 51 {
             let now = at(f64::from(millisecond));
@@ -90,9 +90,9 @@ proptest! {
                 _ => Some(counter(way(seconds, top), start)),
             };
             if let (0, Some(position)) = (millisecond % 10, position) {
-                supervisor.reading(now, position);
+                monitor.reading(now, position);
             }
-            let fault = supervisor.check(now);
+            let fault = monitor.check(now);
             if let (Some(fault), true) = (fault, found.is_none()) {
                 prop_assert!(is_faulty, "{fault:?} at {millisecond} ms");
                 found = Some(fault);
@@ -108,24 +108,24 @@ proptest! {
 
 #[test]
 fn an_encoder_that_never_spoke_is_missing() {
-    let mut supervisor = Supervisor::new(limits(), RANGE, at(0.0));
-    assert_eq!(supervisor.check(at(25.0)), None);
-    assert_eq!(supervisor.check(at(26.0)), Some(EncoderFault::Late));
-    assert_eq!(supervisor.check(at(46.0)), Some(EncoderFault::Missing));
+    let mut monitor = PlausibilityMonitor::new(limits(), RANGE, at(0.0));
+    assert_eq!(monitor.check(at(25.0)), None);
+    assert_eq!(monitor.check(at(26.0)), Some(EncoderFault::Late));
+    assert_eq!(monitor.check(at(46.0)), Some(EncoderFault::Missing));
 }
 
 #[test]
 fn a_counter_that_is_stuck_from_the_start_is_found_by_what_others_know() {
-    let mut supervisor = Supervisor::new(limits(), RANGE, at(0.0));
+    let mut monitor = PlausibilityMonitor::new(limits(), RANGE, at(0.0));
     let mut found = None;
     for step in 0..60 {
         let milliseconds = 10.0 * f64::from(step);
         if step == 50 {
-            supervisor.expect_motion(-0.1 * TICKS, at(milliseconds));
+            monitor.expect_motion(-0.1 * TICKS, at(milliseconds));
         }
-        supervisor.reading(at(milliseconds), 77);
-        if supervisor.check(at(milliseconds)).is_some() {
-            found = found.or(Some((step, supervisor.check(at(milliseconds)))));
+        monitor.reading(at(milliseconds), 77);
+        if monitor.check(at(milliseconds)).is_some() {
+            found = found.or(Some((step, monitor.check(at(milliseconds)))));
         }
     }
     assert_eq!(found, Some((53, Some(EncoderFault::Frozen))));
@@ -133,31 +133,31 @@ fn a_counter_that_is_stuck_from_the_start_is_found_by_what_others_know() {
 
 #[test]
 fn a_known_standstill_clears_a_frozen_counter() {
-    let mut supervisor = Supervisor::new(limits(), RANGE, at(0.0));
+    let mut monitor = PlausibilityMonitor::new(limits(), RANGE, at(0.0));
     let mut position = 0;
     for step in 0..100 {
         if step < 50 {
             position += 100;
         }
-        supervisor.reading(at(10.0 * f64::from(step)), position);
+        monitor.reading(at(10.0 * f64::from(step)), position);
     }
-    assert_eq!(supervisor.check(at(990.0)), Some(EncoderFault::Frozen));
-    supervisor.expect_standstill();
+    assert_eq!(monitor.check(at(990.0)), Some(EncoderFault::Frozen));
+    monitor.expect_standstill();
     for step in 100..140 {
-        supervisor.reading(at(10.0 * f64::from(step)), position);
+        monitor.reading(at(10.0 * f64::from(step)), position);
     }
-    assert_eq!(supervisor.check(at(1390.0)), None);
+    assert_eq!(monitor.check(at(1390.0)), None);
 }
 
 #[test]
 fn a_fault_is_withdrawn_after_sound_readings_only() {
-    let mut supervisor = Supervisor::new(limits(), RANGE, at(0.0));
-    supervisor.reading(at(0.0), 0);
-    assert_eq!(supervisor.reading(at(10.0), 100_000), Some(EncoderFault::Jumped));
+    let mut monitor = PlausibilityMonitor::new(limits(), RANGE, at(0.0));
+    monitor.reading(at(0.0), 0);
+    assert_eq!(monitor.reading(at(10.0), 100_000), Some(EncoderFault::Jumped));
     for step in 2..=21 {
-        assert_eq!(supervisor.reading(at(10.0 * f64::from(step)), 100_000), None);
-        assert_eq!(supervisor.check(at(10.0 * f64::from(step))), Some(EncoderFault::Jumped), "{step}");
+        assert_eq!(monitor.reading(at(10.0 * f64::from(step)), 100_000), None);
+        assert_eq!(monitor.check(at(10.0 * f64::from(step))), Some(EncoderFault::Jumped), "{step}");
     }
-    supervisor.reading(at(220.0), 100_000);
-    assert_eq!(supervisor.check(at(220.0)), None);
+    monitor.reading(at(220.0), 100_000);
+    assert_eq!(monitor.check(at(220.0)), None);
 }
