@@ -243,6 +243,8 @@ fn a_fault_is_found_when_the_bus_says_so() {
     };
     let found = outcome(Reason::MotionDisagrees, 250).found.unwrap();
     assert_eq!((found.after_ms, found.after_mm, found.by.as_str()), (500, 500, "motion"));
+    assert_eq!(outcome(Reason::MotionDisagrees, 250).alarms, [("motion".to_owned(), 1)].into());
+    assert!(outcome(Reason::NoLandmarks, 250).alarms.is_empty());
     assert_eq!(outcome(Reason::None, 250).found, None);
     assert_eq!(outcome(Reason::MotionDisagrees, 1000).found, None);
     // A protection level of 100 mm and an error of 12 mm.

@@ -47,6 +47,8 @@ pub struct Figures {
     pub availability_docking_of_all: Option<f64>,
     /// Losses of availability for 100 km.
     pub continuity_per_100km: Option<f64>,
+    /// How often each check has said that something is wrong without faults, in halls that commissioning accepts.
+    pub false_alarms: BTreeMap<String, u64>,
     /// Of the runs of which a recovery may be asked for, those that recovered.
     pub recovered_share: Option<f64>,
     /// The same share of all runs.
@@ -131,6 +133,7 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
             accepted.sum(|outcome| outcome.judged),
         ),
         continuity_per_100km: (km > 0.0).then(|| accepted.sum(|outcome| u64::from(outcome.losses)) as f64 / km * 100.0),
+        false_alarms: false_alarms(&accepted),
         recovered_share: share(ends_right(&recovering), recovering.len() as u64),
         recovered_share_of_all: ends_right(&all.rows) as f64 / rows.len().max(1) as f64,
         pl_nominal_mm: mark(&accepted, |outcome| &outcome.nominal_mm),
@@ -161,4 +164,12 @@ fn mark(of: &OfSize, values: fn(&Outcome) -> &BTreeMap<u32, u64>) -> Option<f64>
         below += count;
         (total > 0 && below * 100 >= total * 95).then_some(f64::from(value))
     })
+}
+
+fn false_alarms(of: &OfSize) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    for (check, count) in of.rows.iter().filter_map(|row| row.outcome.as_ref()).flat_map(|outcome| &outcome.alarms) {
+        *counts.entry(check.clone()).or_default() += count;
+    }
+    counts
 }

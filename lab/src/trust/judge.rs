@@ -81,6 +81,8 @@ pub struct Judge {
     right_since: Option<f64>,
     /// Time and distance since the fault began, s and m.
     begun: (f64, f64),
+    /// The check that said last that something is wrong.
+    said: Option<&'static str>,
     outcome: Outcome,
 }
 
@@ -96,6 +98,7 @@ impl Judge {
             was_available: false,
             right_since: None,
             begun: (0.0, 0.0),
+            said: None,
             outcome: Outcome::default(),
         }
     }
@@ -128,10 +131,17 @@ impl Judge {
             self.last_loss = Some(time);
         }
         self.was_available = is_available;
+        let said = moment.heard.and_then(|(pose, _)| said_by(pose));
+        if let Some(check) = said.filter(|check| outcome.first_claim.is_some() && self.said != Some(check)) {
+            *outcome.alarms.entry(check.to_owned()).or_default() += 1;
+        }
+        self.said = said;
         if moment.has_begun && outcome.found.is_none() {
-            outcome.found = moment.heard.and_then(|(pose, _)| found_by(pose, moment.is_bare)).map(|by| {
+            let is_wide = |pose: &PublishedPose| matches!(pose.alarm, Alarm::Travel | Alarm::NoPose) && !moment.is_bare;
+            let by = said.or(moment.heard.filter(|(pose, _)| is_wide(pose)).map(|_| "protection level"));
+            outcome.found = by.map(|by| {
                 let [after_ms, after_mm] = [self.begun.0, self.begun.1].map(|value| (1e3 * value).round() as u64);
-                Found { after_ms, after_mm, by }
+                Found { after_ms, after_mm, by: by.to_owned() }
             });
             self.begun = (self.begun.0 + STEP, self.begun.1 + moment.driven);
         }
@@ -172,9 +182,9 @@ impl Judge {
     }
 }
 
-/// What a pose on the bus says to be wrong; a protection level above the alert limit where no reflectors are says nothing.
-fn found_by(pose: &PublishedPose, is_bare: bool) -> Option<String> {
-    let by = match pose.reason {
+/// The check by which a pose on the bus says that something is wrong.
+fn said_by(pose: &PublishedPose) -> Option<&'static str> {
+    match pose.reason {
         Reason::None | Reason::NoPose | Reason::NoLandmarks | Reason::Uncertain => None,
         Reason::LandmarksRejected => Some("landmarks rejected"),
         Reason::InnovationsTooLarge => Some("innovations"),
@@ -184,9 +194,7 @@ fn found_by(pose: &PublishedPose, is_bare: bool) -> Option<String> {
         Reason::LaserMoved => Some("mounting"),
         Reason::OdometryDisagrees => Some("odometry"),
         Reason::OdometrySilent => Some("odometry silent"),
-    };
-    let is_wide = matches!(pose.alarm, Alarm::Travel | Alarm::NoPose) && !is_bare;
-    by.or(is_wide.then_some("protection level")).map(str::to_owned)
+    }
 }
 
 /// How wrong a pose is.

@@ -60,6 +60,8 @@ pub struct Outcome {
     /// How many claims had a protection level and an error of the position in which cells of [`CELL_MM`], as
     /// `CELLS * level + error`; the last cell of each has all that is larger.
     pub stanford: BTreeMap<u32, u64>,
+    /// How often each check has begun to say that something is wrong, from the first claim on.
+    pub alarms: BTreeMap<String, u64>,
     /// How the fault was found; none if it was not.
     pub found: Option<Found>,
     /// Whether the last 5 s are claims with the error within the protection level, and that within the alert limit.

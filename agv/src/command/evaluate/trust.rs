@@ -80,7 +80,7 @@ Examples:
 
 Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
-continuity_per_100km, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
+continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
 [95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
 pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
@@ -185,6 +185,9 @@ fn print(figures: &Figures) {
             let [(one, size), (other, other_size)] = &pair.kinds;
             println!("  {one} {size} with {other} {other_size}, seed {}, {:.2} s", pair.seed, pair.hmi_s);
         }
+    }
+    for (check, count) in &figures.false_alarms {
+        println!("without faults, {check}: {count} false alarms in {:.1} km", figures.nominal_km);
     }
     println!(
         "without faults, {:.1} h and {:.1} km: {} misleading outputs, available {} (travel) and {} (docking)",
