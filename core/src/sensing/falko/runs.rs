@@ -33,6 +33,11 @@ impl<const BEAMS: usize> Runs<BEAMS> {
         self.after.get(index).copied().map_or(0, usize::from)
     }
 
+    /// Beams before and after each of the first `count` beams on the same surface.
+    pub(super) fn lengths(&self, count: usize) -> impl Iterator<Item = (u16, u16)> {
+        self.before.iter().copied().zip(self.after.iter().copied()).take(count)
+    }
+
     /// Finds the surfaces of a scan; a surface ends where the range departs from it by more than `jump` (m).
     pub(super) fn find(&mut self, scan: &PointScan<BEAMS>, crosses_seam: bool, jump: f32) {
         let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
