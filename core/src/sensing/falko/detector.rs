@@ -6,7 +6,7 @@ use super::corner::Corner;
 use super::end_point;
 use super::parameters::{Parameters, SuppressionRule};
 use super::runs::Runs;
-use super::score::{SectorCounts, Sectors};
+use super::score::{PairSum, Sectors};
 use super::suppression::{Cost, is_best_within, walk};
 use crate::geometry::ScanPoint;
 use crate::sensing::keypoint::keep_best;
@@ -170,9 +170,9 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         let Some(orientation) = self.orientation(&around, &before, &after) else { return Cost::NONE };
         let origin = self.sectors.origin(orientation);
         let score = [before, after].map(|side| {
-            let mut counts = SectorCounts::default();
-            side.visit(&around.disc, |relative| counts.add(self.sectors.index(origin, relative)));
-            counts.pair_sum(self.sectors.count())
+            let mut sum = PairSum::new(&self.sectors, origin);
+            side.visit(&around.disc, |relative| sum.add(relative));
+            sum.value()
         });
         Cost { cost: (score[0] + score[1]) as f32, height: around.height }
     }
