@@ -21,10 +21,7 @@ pub struct SensorPath {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     time: f64,
-    x: f64,
-    y: f64,
-    sine: f64,
-    cosine: f64,
+    transform: Transform,
 }
 
 /// A pose as the matrix that it stands for.
@@ -46,7 +43,7 @@ impl SensorPath {
         let node = |time: f64, displacement: &Pose| {
             let pose = back.compose(&displacement.compose(laser));
             let (sine, cosine) = libm::sincos(pose.theta);
-            Node { time, x: pose.x, y: pose.y, sine, cosine }
+            Node { time, transform: Transform { x: pose.x, y: pose.y, sine, cosine } }
         };
         let mut skipped = None;
         for (time, displacement) in displacements {
@@ -84,59 +81,99 @@ impl SensorPath {
     /// Where the sensor was `time` seconds after the first beam, in its frame at the first beam.
     #[must_use]
     pub fn place(&self, time: f64) -> Pose {
-        let transform = self.transform(time, &mut 0);
+        let transform = self.transform(time);
         Pose::new(transform.x, transform.y, libm::atan2(transform.sine, transform.cosine))
     }
 
     /// Where a point that was seen `time` seconds after the first beam is in the frame of the first beam, m.
     #[must_use]
     pub fn to_start(&self, time: f64, point: &Point) -> Point {
-        self.transform(time, &mut 0).apply(point)
+        self.transform(time).apply(point)
     }
 
     /// Where a point of the frame of the first beam is seen from the sensor `time` seconds later, m.
     #[must_use]
     pub fn from_start(&self, time: f64, point: &Point) -> Point {
-        let transform = self.transform(time, &mut 0);
+        let transform = self.transform(time);
         let (dx, dy) = (point.x - transform.x, point.y - transform.y);
         Point::new(transform.cosine * dx + transform.sine * dy, transform.cosine * dy - transform.sine * dx)
     }
 
     /// Moves all points of a scan into the frame of its first beam.
     pub fn correct<const BEAMS: usize>(&self, scan: &Scan, points: &mut PointScan<BEAMS>) {
-        let mut segment = 0;
+        let mut segment = self.segment(0);
         let interval = scan.beam_interval * PointScan::<BEAMS>::stride(scan) as f64;
         for (beam, (point, range)) in points.points.iter_mut().zip(&points.ranges).enumerate() {
             if *range > 0.0 {
-                let transform = self.transform(beam as f64 * interval, &mut segment);
-                *point = transform.apply_single(point);
+                let time = beam as f64 * interval;
+                while segment.end < time {
+                    segment = self.segment(segment.index + 1);
+                }
+                *point = segment.transform(time).apply_single(point);
             }
         }
     }
 
-    /// The sensor's pose `time` seconds after the first beam; `segment` is where the search begins and where it ended.
-    fn transform(&self, time: f64, segment: &mut usize) -> Transform {
-        while self.nodes.get(*segment + 1).is_some_and(|node| node.time < time) {
-            *segment += 1;
+    /// The sensor's pose `time` seconds after the first beam.
+    fn transform(&self, time: f64) -> Transform {
+        let mut segment = self.segment(0);
+        while segment.end < time {
+            segment = self.segment(segment.index + 1);
         }
-        match (self.nodes.get(*segment), self.nodes.get(*segment + 1)) {
-            (Some(before), Some(after)) => {
-                let share = ((time - before.time) / (after.time - before.time)).clamp(0.0, 1.0);
-                let between = |from: f64, to: f64| from + share * (to - from);
-                Transform {
-                    x: between(before.x, after.x),
-                    y: between(before.y, after.y),
-                    sine: between(before.sine, after.sine),
-                    cosine: between(before.cosine, after.cosine),
-                }
-            }
-            (Some(only), None) => Transform { x: only.x, y: only.y, sine: only.sine, cosine: only.cosine },
-            _ => Transform { x: 0.0, y: 0.0, sine: 0.0, cosine: 1.0 },
+        segment.transform(time)
+    }
+
+    /// The path from a node to the one after it; behind the last one it stays.
+    fn segment(&self, index: usize) -> Segment {
+        let still =
+            |from| Segment { index, end: f64::INFINITY, start: 0.0, duration: 1.0, from, change: Transform::ZERO };
+        match (self.nodes.get(index), self.nodes.get(index + 1)) {
+            (Some(before), Some(after)) => Segment {
+                index,
+                end: after.time,
+                start: before.time,
+                duration: after.time - before.time,
+                from: before.transform,
+                change: Transform {
+                    x: after.transform.x - before.transform.x,
+                    y: after.transform.y - before.transform.y,
+                    sine: after.transform.sine - before.transform.sine,
+                    cosine: after.transform.cosine - before.transform.cosine,
+                },
+            },
+            (Some(only), None) => still(only.transform),
+            _ => still(Transform::NONE),
+        }
+    }
+}
+
+/// A part of a path: linear from `start` on, s since the first beam, up to its end.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    index: usize,
+    end: f64,
+    start: f64,
+    duration: f64,
+    from: Transform,
+    change: Transform,
+}
+
+impl Segment {
+    fn transform(&self, time: f64) -> Transform {
+        let share = ((time - self.start) / self.duration).clamp(0.0, 1.0);
+        Transform {
+            x: self.from.x + share * self.change.x,
+            y: self.from.y + share * self.change.y,
+            sine: self.from.sine + share * self.change.sine,
+            cosine: self.from.cosine + share * self.change.cosine,
         }
     }
 }
 
 impl Transform {
+    const ZERO: Self = Self { x: 0.0, y: 0.0, sine: 0.0, cosine: 0.0 };
+    const NONE: Self = Self { cosine: 1.0, ..Self::ZERO };
+
     fn apply(&self, point: &Point) -> Point {
         Point::new(
             self.x + self.cosine * point.x - self.sine * point.y,
