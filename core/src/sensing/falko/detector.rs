@@ -30,10 +30,18 @@ const AHEAD: usize = 16;
 /// Where neighbours of a candidate may be.
 #[derive(Clone, Copy, Debug)]
 struct Window {
-    disc: Disc,
-    reach: Reach,
+    /// Radius of the disc, m.
+    radius: f32,
     /// Shortest base and height of the triangle, m.
     shortest: f32,
+    /// Beams before the candidate; none if it is no candidate.
+    before: u16,
+    /// Beams after it.
+    after: u16,
+}
+
+impl Window {
+    const NONE: Self = Self { radius: 0.0, shortest: 0.0, before: 0, after: 0 };
 }
 
 /// A candidate's neighbourhood.
@@ -123,12 +131,12 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         let mut worst = 0.0_f32;
         for start in (0..count).step_by(AHEAD) {
             let beams = start..(start + AHEAD).min(count);
-            let mut windows = [None; AHEAD];
+            let mut windows = [Window::NONE; AHEAD];
             for (window, index) in windows.iter_mut().zip(beams.clone()) {
                 *window = self.window(scan, index, crosses_seam);
             }
             for (window, index) in windows.iter().zip(beams) {
-                let cost = window.as_ref().map_or(Cost::NONE, |window| self.cost(scan, index, window));
+                let cost = self.cost(scan, index, window);
                 if cost.is_candidate() {
                     worst = worst.max(cost.cost);
                 }
@@ -140,13 +148,12 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         worst
     }
 
-    /// Where neighbours of beam `index` may be. None if the beam is no candidate.
+    /// Where neighbours of beam `index` may be; nowhere if the beam is no candidate.
     #[inline]
-    fn window(&self, scan: &PointScan<BEAMS>, index: usize, crosses_seam: bool) -> Option<Window> {
-        let range = *scan.ranges.get(index)?;
-        let centre = *scan.points.get(index)?;
+    fn window(&self, scan: &PointScan<BEAMS>, index: usize, crosses_seam: bool) -> Window {
+        let Some(range) = scan.ranges.get(index).copied() else { return Window::NONE };
         if range <= 0.0 || range > self.parameters.farthest {
-            return None;
+            return Window::NONE;
         }
         let count = scan.ranges.len();
         let most = if crosses_seam { (count - 1) / 2 } else { count };
@@ -159,12 +166,18 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         };
         let least = self.least();
         if limits.0 < least || limits.1 < least {
-            return None;
+            return Window::NONE;
         }
         let radius = self.radius(range);
         let beams = beams_within(radius / range, scan.bearing_step);
-        let reach = Reach { before: beams.min(limits.0), after: beams.min(limits.1) };
-        Some(Window { disc: Disc { centre, range, radius }, reach, shortest: radius / self.parameters.triangle_ratio })
+        // No scan has more beams than that.
+        let reach = |limit: usize| beams.min(limit) as u16;
+        Window {
+            radius,
+            before: reach(limits.0),
+            after: reach(limits.1),
+            shortest: radius / self.parameters.triangle_ratio,
+        }
     }
 
     /// Fewest neighbours on each side.
@@ -174,10 +187,12 @@ impl<const BEAMS: usize> Detector<BEAMS> {
 
     /// The neighbourhood of beam `index`. None if the beam is no candidate.
     fn neighbourhood(&self, scan: &PointScan<BEAMS>, index: usize, window: &Window) -> Option<Neighbourhood> {
-        let Window { disc, reach, shortest } = *window;
+        let Window { radius, before, after, shortest } = *window;
+        let (range, centre) = (*scan.ranges.get(index)?, *scan.points.get(index)?);
+        let disc = Disc { centre, range, radius };
         let least = self.least();
-        let before = Side::before(scan, index, reach.before).farthest_before(&disc)?;
-        let after = Side::after(scan, index, reach.after).farthest_after(&disc)?;
+        let before = Side::before(scan, index, usize::from(before)).farthest_before(&disc)?;
+        let after = Side::after(scan, index, usize::from(after)).farthest_after(&disc)?;
         if before.0 < least || after.0 < least {
             return None;
         }
@@ -196,6 +211,9 @@ impl<const BEAMS: usize> Detector<BEAMS> {
 
     /// What the detector holds against beam `index` being a corner.
     fn cost(&self, scan: &PointScan<BEAMS>, index: usize, window: &Window) -> Cost {
+        if window.before == 0 {
+            return Cost::NONE;
+        }
         let Some(around) = self.neighbourhood(scan, index, window) else { return Cost::NONE };
         if self.parameters.gate.is_some() {
             let corner = self.corner(scan, index, &around);
@@ -260,7 +278,7 @@ impl<const BEAMS: usize> Detector<BEAMS> {
     }
 
     fn keypoint(&self, scan: &PointScan<BEAMS>, index: usize, score: f32, crosses_seam: bool) -> Option<Keypoint> {
-        let around = self.neighbourhood(scan, index, &self.window(scan, index, crosses_seam)?)?;
+        let around = self.neighbourhood(scan, index, &self.window(scan, index, crosses_seam))?;
         let before = Side::before(scan, index, around.reach.before);
         let after = Side::after(scan, index, around.reach.after);
         let orientation = self.orientation(&around, &before, &after)?;
