@@ -260,7 +260,8 @@ impl<const BEAMS: usize> Detector<BEAMS> {
             if self.parameters.lines_include_corner {
                 moments.add(ScanPoint::zeros());
             }
-            is_enough.then(|| moments.line()).flatten()
+            let line = is_enough.then(|| moments.line()).flatten();
+            line.filter(|line| self.parameters.gate.is_none_or(|gate| gate.is_straight(line)))
         };
         let before = fit(Side::before(scan, index, around.reach.before))?;
         let after = fit(Side::after(scan, index, around.reach.after))?;
