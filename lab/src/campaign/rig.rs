@@ -3,7 +3,7 @@
 
 use agv_controller::{Controller, LaserOrder};
 use agv_core::geometry::Pose;
-use agv_core::localizer::Localizer;
+use agv_core::localizer::{Localizer, PoseFix};
 use agv_core::maps::MapError;
 use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
@@ -72,6 +72,25 @@ pub struct Heard<'a> {
     pub truth: &'a dyn Fn(Time) -> Option<Pose>,
 }
 
+/// What the controller is given, call by call.
+#[derive(Clone, Copy, Debug)]
+pub enum Given<'a> {
+    /// Where the vehicle is.
+    Told(PoseFix),
+    /// Bytes of the laser.
+    LaserBytes(&'a [u8]),
+    /// Time for the laser.
+    LaserPolled,
+    /// The connection to the laser.
+    Connected,
+    /// A frame of the bus.
+    BusFrame(&'a Frame),
+    /// Time for the bus.
+    BusPolled,
+    /// Time to search.
+    Searched,
+}
+
 /// Drives a recorded drive with faults. `recording` has what the sensors see, faults of measurements included.
 ///
 /// # Errors
@@ -80,7 +99,21 @@ pub fn drive(
     recording: &Recording,
     faults: &[&Fault],
     options: &RigOptions,
+    hear: impl FnMut(&Heard),
+) -> Result<(), RigError> {
+    drive_listening(recording, faults, options, hear, |_, _| ())
+}
+
+/// The same; `listen` gets all that the controller is given, and when.
+///
+/// # Errors
+/// See [`RigError`].
+pub fn drive_listening(
+    recording: &Recording,
+    faults: &[&Fault],
+    options: &RigOptions,
     mut hear: impl FnMut(&Heard),
+    mut listen: impl FnMut(Time, Given),
 ) -> Result<(), RigError> {
     let &RigOptions { seconds, seed, is_told } = options;
     let settings = Settings::of(recording.parameters);
@@ -93,12 +126,7 @@ pub fn drive(
     let mut from_laser: Line<Vec<u8>> = Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams));
     let mut to_laser: Line<Vec<u8>> = Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams));
     let mut from_bus: Line<Frame> = Line::new(BUS_LATENCY, Random::new(seed, Stream::Frames));
-    let new_controller = |now| {
-        let mut localizer = <Localizer>::new(settings.parameters);
-        localizer.add_landmarks(&recording.landmarks).map_err(RigError::Map)?;
-        Ok::<_, RigError>(Box::new(Controller::new(&settings, localizer, now)))
-    };
-    let mut controller = Some(new_controller(Time::default())?);
+    let mut controller = Some(new_controller(recording, Time::default())?);
     let mut receiver = PoseReceiver::new(node(settings.nodes.controller)?);
     let mut published: Option<(PublishedPose, Time)> = None;
     let begin = Time::from_seconds(BEGIN);
@@ -115,6 +143,7 @@ pub fn drive(
             {
                 let mut fix = *fix;
                 fix.time = now;
+                listen(now, Given::Told(fix));
                 controller.tell(fix, |_| ());
             }
         }
@@ -123,7 +152,7 @@ pub fn drive(
             from_laser.clear();
             to_laser.clear();
         } else if controller.is_none() {
-            controller = Some(new_controller(now)?);
+            controller = Some(new_controller(recording, now)?);
         }
         let is_unreachable = is(FaultKind::LaserUnreachable);
         if is_unreachable && connection.take().is_some() {
@@ -137,14 +166,17 @@ pub fn drive(
             // The controller and its laser.
             let mut wishes = Vec::new();
             while let Some(bytes) = from_laser.receive(now) {
+                listen(now, Given::LaserBytes(&bytes));
                 controller.hear_laser(&bytes, now, |order| wishes.push(Wish::of(order)), |_| ());
             }
+            listen(now, Given::LaserPolled);
             controller.poll_laser(now, |order| wishes.push(Wish::of(order)), |_| ());
             for wish in wishes {
                 match wish {
                     Wish::Connect if is_unreachable => controller.unreachable(),
                     Wish::Connect => {
                         connection = Some(Connection::default());
+                        listen(now, Given::Connected);
                         controller.connected(now);
                     }
                     Wish::Disconnect => {
@@ -158,6 +190,7 @@ pub fn drive(
             }
             // The controller and its bus.
             while let Some(frame) = from_bus.receive(now) {
+                listen(now, Given::BusFrame(&frame));
                 // What answers a frame is no pose.
                 controller.hear_bus(&frame, now, |_| (), |_| ());
             }
@@ -169,7 +202,9 @@ pub fn drive(
                     from_bus.send_frame(now, time, answer, faults);
                 }
             };
+            listen(now, Given::BusPolled);
             controller.poll_bus(now, answer, |_| ());
+            listen(now, Given::Searched);
             controller.search(|_| ());
         }
         if let Some(connection) = &mut connection {
@@ -193,6 +228,16 @@ pub fn drive(
         }
     }
     Ok(())
+}
+
+/// A controller with the map of a recording, that is switched on at `now`.
+///
+/// # Errors
+/// [`RigError::Map`] if the map does not fit.
+pub fn new_controller(recording: &Recording, now: Time) -> Result<Box<Controller>, RigError> {
+    let mut localizer = <Localizer>::new(recording.parameters);
+    localizer.add_landmarks(&recording.landmarks).map_err(RigError::Map)?;
+    Ok(Box::new(Controller::new(&Settings::of(recording.parameters), localizer, now)))
 }
 
 /// The time that a pose states, of which its frames carry the low 16 bits of the milliseconds.
