@@ -89,7 +89,7 @@ impl Bus {
     /// The localiser has said something.
     pub fn update(&mut self, estimate: &Estimate) {
         // Only the search may have got further. Before the first answer a vehicle without a pose is published.
-        let is_first = self.predictor.output().is_none();
+        let is_first = !self.predictor.has_output();
         if core::mem::replace(&mut self.progress.answered, estimate.answered) != estimate.answered || is_first {
             self.predictor.update(&estimate.pose, &estimate.bias);
         }
@@ -135,6 +135,9 @@ impl Bus {
             for code in self.troubles.codes() {
                 take(BusOutput::Send(self.emergency(code)));
             }
+        }
+        if now < self.publisher.next() {
+            return;
         }
         let Some(output) = self.predictor.output() else { return };
         let EncoderFaults { drive, steering, .. } = self.faults;

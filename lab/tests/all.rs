@@ -3,6 +3,7 @@
 mod event_fuzz;
 mod faults;
 mod features;
+mod tape;
 mod trust;
 
 /// A file that is no module of this program would be no test, and nobody would notice.

@@ -35,7 +35,7 @@ impl BinaryShapeContext {
         visit_around(scan, usize::from(keypoint.beam), radius, |relative| {
             // A point on the rim belongs to the last ring.
             let ring = ((relative.norm() * scale) as u32).min(u32::from(Self::RINGS) - 1);
-            let sector = sectors.index_by_counting(origin, relative) as u32 % u32::from(Self::SECTORS);
+            let sector = sectors.index(origin, relative) as u32 % u32::from(Self::SECTORS);
             cells |= 1 << (ring * u32::from(Self::SECTORS) + sector);
         });
         Self(cells)

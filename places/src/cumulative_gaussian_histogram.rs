@@ -58,7 +58,7 @@ impl CumulativeGaussianHistogram {
         let mut counts = [0_u16; BINS];
         let mut total = 0_u16;
         visit_around(scan, usize::from(keypoint.beam), radius, |relative| {
-            if let Some(count) = counts.get_mut(sectors.index_by_counting(origin, relative)) {
+            if let Some(count) = counts.get_mut(sectors.index(origin, relative)) {
                 *count = count.saturating_add(1);
                 total = total.saturating_add(1);
             }

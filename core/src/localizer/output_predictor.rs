@@ -104,6 +104,12 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         }
     }
 
+    /// Whether the localiser has said anything.
+    #[must_use]
+    pub fn has_output(&self) -> bool {
+        self.base.is_some()
+    }
+
     /// The pose for now. None before the localiser has said anything. What rests on landmarks that the localiser has used
     /// too long ago is dead reckoning, even if it has no time to say so.
     #[must_use]

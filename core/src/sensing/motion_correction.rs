@@ -71,45 +71,77 @@ impl SensorPath {
     /// Where the sensor was `time` seconds after the first beam, in its frame at the first beam.
     #[must_use]
     pub fn place(&self, time: f64) -> Pose {
-        self.transform(time, &mut 0).exact_pose()
+        self.transform(time).exact_pose()
     }
 
     /// Where a point that was seen `time` seconds after the first beam is in the frame of the first beam, m.
     #[must_use]
     pub fn to_start(&self, time: f64, point: &Point) -> Point {
-        self.transform(time, &mut 0).apply(point)
+        self.transform(time).apply(point)
     }
 
     /// Where a point of the frame of the first beam is seen from the sensor `time` seconds later, m.
     #[must_use]
     pub fn from_start(&self, time: f64, point: &Point) -> Point {
-        self.transform(time, &mut 0).apply_inverse(point)
+        self.transform(time).apply_inverse(point)
     }
 
     /// Moves all points of a scan into the frame of its first beam.
     pub fn correct<const BEAMS: usize>(&self, scan: &Scan, points: &mut PointScan<BEAMS>) {
-        let mut segment = 0;
+        let mut segment = self.segment(0);
         let interval = scan.beam_interval * PointScan::<BEAMS>::stride(scan) as f64;
         for (beam, (point, range)) in points.points.iter_mut().zip(&points.ranges).enumerate() {
             if *range > 0.0 {
-                let transform = self.transform(beam as f64 * interval, &mut segment);
-                *point = transform.single().apply(point);
+                let time = beam as f64 * interval;
+                while segment.end < time {
+                    segment = self.segment(segment.index + 1);
+                }
+                *point = segment.transform(time).single().apply(point);
             }
         }
     }
 
-    /// The sensor's pose `time` seconds after the first beam; `segment` is where the search begins and where it ended.
-    fn transform(&self, time: f64, segment: &mut usize) -> Transform<f64> {
-        while self.nodes.get(*segment + 1).is_some_and(|node| node.time < time) {
-            *segment += 1;
+    /// The sensor's pose `time` seconds after the first beam.
+    fn transform(&self, time: f64) -> Transform<f64> {
+        let mut segment = self.segment(0);
+        while segment.end < time {
+            segment = self.segment(segment.index + 1);
         }
-        match (self.nodes.get(*segment), self.nodes.get(*segment + 1)) {
-            (Some(before), Some(after)) => {
-                let share = ((time - before.time) / (after.time - before.time)).clamp(0.0, 1.0);
-                before.transform.towards(&after.transform, share)
-            }
-            (Some(only), None) => only.transform,
-            _ => Transform::IDENTITY,
+        segment.transform(time)
+    }
+
+    /// The path from a node to the one after it; behind the last one it stays.
+    fn segment(&self, index: usize) -> Segment {
+        let still = |at| Segment { index, end: f64::INFINITY, start: 0.0, duration: 1.0, from: at, to: at };
+        match (self.nodes.get(index), self.nodes.get(index + 1)) {
+            (Some(before), Some(after)) => Segment {
+                index,
+                end: after.time,
+                start: before.time,
+                duration: after.time - before.time,
+                from: before.transform,
+                to: after.transform,
+            },
+            (Some(only), None) => still(only.transform),
+            _ => still(Transform::IDENTITY),
         }
+    }
+}
+
+/// A part of a path: linear from `start` on, s since the first beam, up to its end.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    index: usize,
+    end: f64,
+    start: f64,
+    duration: f64,
+    from: Transform<f64>,
+    to: Transform<f64>,
+}
+
+impl Segment {
+    fn transform(&self, time: f64) -> Transform<f64> {
+        let share = ((time - self.start) / self.duration).clamp(0.0, 1.0);
+        self.from.towards(&self.to, share)
     }
 }

@@ -19,55 +19,96 @@ pub(super) struct Side<'a> {
     second: Piece<'a>,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// Neighbouring beams: as many ranges as points.
+#[derive(Clone, Copy, Debug, Default)]
 struct Piece<'a> {
     points: &'a [ScanPoint],
     ranges: &'a [f32],
 }
 
 impl<'a> Piece<'a> {
+    #[inline(always)]
     fn of<const BEAMS: usize>(scan: &'a PointScan<BEAMS>, start: usize, end: usize) -> Self {
-        Self {
-            points: scan.points.get(start..end).unwrap_or_default(),
-            ranges: scan.ranges.get(start..end).unwrap_or_default(),
+        match (scan.points.get(start..end), scan.ranges.get(start..end)) {
+            (Some(points), Some(ranges)) => Self { points, ranges },
+            _ => Self::default(),
         }
     }
 
-    #[inline]
-    fn returns(self) -> impl DoubleEndedIterator<Item = (ScanPoint, f32)> + ExactSizeIterator {
-        self.points.iter().copied().zip(self.ranges.iter().copied())
+    /// Index and relative position of the first return inside the disc.
+    #[inline(always)]
+    fn first_inside(self, disc: &Disc) -> Option<(usize, ScanPoint)> {
+        let mut rest = self.points.iter();
+        loop {
+            let relative = rest.find_map(|point| disc.holds(point))?;
+            // Counted only where it ends: most points at the rim are outside.
+            let index = self.points.len() - rest.len() - 1;
+            if self.ranges.get(index).is_some_and(|range| *range > 0.0) {
+                return Some((index, relative));
+            }
+        }
     }
+
+    /// Index and relative position of the last return inside the disc.
+    #[inline(always)]
+    fn last_inside(self, disc: &Disc) -> Option<(usize, ScanPoint)> {
+        let mut rest = self.points.iter();
+        loop {
+            let relative = rest.by_ref().rev().find_map(|point| disc.holds(point))?;
+            let index = rest.len();
+            if self.ranges.get(index).is_some_and(|range| *range > 0.0) {
+                return Some((index, relative));
+            }
+        }
+    }
+}
+
+/// What lies beyond the seam concerns few candidates; in the caller it would only slow the others down.
+#[cold]
+#[inline(never)]
+fn first_beyond_seam(piece: Piece<'_>, disc: &Disc) -> Option<(usize, ScanPoint)> {
+    piece.first_inside(disc)
+}
+
+/// The same after the candidate.
+#[cold]
+#[inline(never)]
+fn last_beyond_seam(piece: Piece<'_>, disc: &Disc) -> Option<(usize, ScanPoint)> {
+    piece.last_inside(disc)
 }
 
 impl<'a> Side<'a> {
     /// The `reach` beams before beam `index`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn before<const BEAMS: usize>(scan: &'a PointScan<BEAMS>, index: usize, reach: usize) -> Self {
-        let start = index.saturating_sub(reach);
-        let over = reach - (index - start);
-        let count = scan.ranges.len();
-        Self { first: Piece::of(scan, count.saturating_sub(over), count), second: Piece::of(scan, start, index) }
+        let Some(start) = index.checked_sub(reach) else {
+            let count = scan.ranges.len();
+            let first = Piece::of(scan, (count + index).saturating_sub(reach), count);
+            return Self { first, second: Piece::of(scan, 0, index) };
+        };
+        Self { first: Piece::default(), second: Piece::of(scan, start, index) }
     }
 
     /// The `reach` beams after beam `index`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn after<const BEAMS: usize>(scan: &'a PointScan<BEAMS>, index: usize, reach: usize) -> Self {
         let count = scan.ranges.len();
-        let end = (index + 1 + reach).min(count);
-        let over = (index + 1 + reach) - end;
-        Self { first: Piece::of(scan, index + 1, end), second: Piece::of(scan, 0, over) }
-    }
-
-    fn len(&self) -> usize {
-        self.first.points.len() + self.second.points.len()
+        let end = index + 1 + reach;
+        if end > count {
+            return Self { first: Piece::of(scan, index + 1, count), second: Piece::of(scan, 0, end - count) };
+        }
+        Self { first: Piece::of(scan, index + 1, end), second: Piece::default() }
     }
 
     /// Calls `visit` with each return inside the disc, relative to its centre, in order of beams.
-    #[inline]
+    // What a caller adds up stays in registers only if the loop is part of the caller.
+    #[inline(always)]
     pub(super) fn visit(&self, disc: &Disc, mut visit: impl FnMut(ScanPoint)) {
         for piece in [self.first, self.second] {
-            for (point, range) in piece.returns() {
-                if let Some(relative) = disc.contains(point, range) {
+            for (point, range) in piece.points.iter().zip(piece.ranges) {
+                if let Some(relative) = disc.holds(point)
+                    && *range > 0.0
+                {
                     visit(relative);
                 }
             }
@@ -76,33 +117,26 @@ impl<'a> Side<'a> {
 
     /// The first return inside the disc in order of beams, for a side that lies before the centre: beams to the
     /// centre, and position relative to it.
-    #[inline]
+    #[inline(always)]
     pub(super) fn farthest_before(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
-        let mut steps = self.len();
-        for piece in [self.first, self.second] {
-            for (point, range) in piece.returns() {
-                if let Some(relative) = disc.contains(point, range) {
-                    return Some((steps, relative));
-                }
-                steps -= 1;
-            }
+        let nearer = self.second.points.len();
+        if !self.first.points.is_empty()
+            && let Some((index, relative)) = first_beyond_seam(self.first, disc)
+        {
+            return Some((self.first.points.len() - index + nearer, relative));
         }
-        None
+        self.second.first_inside(disc).map(|(index, relative)| (nearer - index, relative))
     }
 
     /// The last return inside the disc, for a side that lies after the centre.
-    #[inline]
+    #[inline(always)]
     pub(super) fn farthest_after(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
-        let mut steps = self.len();
-        for piece in [self.second, self.first] {
-            for (point, range) in piece.returns().rev() {
-                if let Some(relative) = disc.contains(point, range) {
-                    return Some((steps, relative));
-                }
-                steps -= 1;
-            }
+        if !self.second.points.is_empty()
+            && let Some((index, relative)) = last_beyond_seam(self.second, disc)
+        {
+            return Some((self.first.points.len() + index + 1, relative));
         }
-        None
+        self.first.last_inside(disc).map(|(index, relative)| (index + 1, relative))
     }
 }
 
@@ -117,11 +151,11 @@ pub(super) struct Disc {
 }
 
 impl Disc {
-    /// Position of a return relative to the centre. None if it is not inside.
-    #[inline]
-    fn contains(&self, point: ScanPoint, range: f32) -> Option<ScanPoint> {
+    /// Position of a point relative to the centre. None if it is not inside.
+    #[inline(always)]
+    fn holds(&self, point: &ScanPoint) -> Option<ScanPoint> {
         let relative = point - self.centre;
-        (relative.norm_squared() <= self.radius * self.radius && range > 0.0).then_some(relative)
+        (relative.norm_squared() <= self.radius * self.radius).then_some(relative)
     }
 }
 

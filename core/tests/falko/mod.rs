@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::ScanPoint;
 use agv_core::measurement::{LaserId, Scan, Time};
-use agv_core::sensing::falko::{Detector, Parameters, Sectors, pair_sum};
+use agv_core::sensing::falko::{Detector, PairSum, Parameters, Sectors};
 use agv_core::sensing::{Keypoint, KeypointKind, PointScan};
 use proptest::prelude::*;
 use scene::{Random, Scene};
@@ -328,18 +328,28 @@ fn a_neighbourhood_that_nearly_reaches_the_sensor_is_whole() {
 
 proptest! {
     #[test]
-    fn score_equals_the_printed_double_sum(sectors in prop::collection::vec(0_usize..16, 0..80)) {
-        let mut counts = [0_u32; 16];
-        for sector in &sectors {
-            counts[*sector] += 1;
+    fn score_equals_the_printed_double_sum(
+        half in 1_u8..=16,
+        centred: bool,
+        axis in -3.1_f64..3.1,
+        seen in prop::collection::vec((0_usize..32, 0.1_f64..0.9), 0..80),
+    ) {
+        let count = 2 * usize::from(half);
+        let grid = Sectors::new(2 * half, centred);
+        let vector = |angle: f64| ScanPoint::new(angle.cos() as f32, angle.sin() as f32);
+        let seen: Vec<_> = seen.into_iter().map(|(sector, share)| (sector % count, share)).collect();
+        let mut own = PairSum::new(&grid, grid.origin(vector(axis)));
+        for (sector, share) in &seen {
+            let from_axis = *sector as f64 + share - if centred { 0.5 } else { 0.0 };
+            own.add(vector(axis + from_axis * TAU / count as f64));
         }
         let mut sum = 0;
-        for (index, first) in sectors.iter().enumerate() {
-            for second in sectors.iter().skip(index + 1) {
-                sum += sector_distance(*first, *second, 16);
+        for (index, (first, _)) in seen.iter().enumerate() {
+            for (second, _) in seen.iter().skip(index + 1) {
+                sum += sector_distance(*first, *second, count);
             }
         }
-        prop_assert_eq!(pair_sum(&counts), sum);
+        prop_assert_eq!(own.value(), sum);
     }
 
     #[test]

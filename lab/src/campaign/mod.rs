@@ -7,6 +7,7 @@ pub mod results;
 pub mod rig;
 pub mod soak;
 pub mod table;
+pub mod tape;
 pub mod verdict;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

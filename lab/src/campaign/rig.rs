@@ -3,7 +3,7 @@
 
 use agv_controller::{Controller, LaserOrder};
 use agv_core::geometry::Pose;
-use agv_core::localizer::Localizer;
+use agv_core::localizer::{Localizer, PoseFix};
 use agv_core::maps::MapError;
 use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
@@ -76,7 +76,6 @@ pub struct Heard<'a> {
 struct Rig<'a> {
     recording: &'a Recording,
     faults: &'a [&'a Fault],
-    settings: Settings,
     /// None while the power is cut.
     controller: Option<Box<Controller>>,
     pair: EmulatedPair,
@@ -90,6 +89,25 @@ struct Rig<'a> {
     published: Option<(PublishedPose, Time)>,
 }
 
+/// What the controller is given, call by call.
+#[derive(Clone, Copy, Debug)]
+pub enum Given<'a> {
+    /// Where the vehicle is.
+    Told(PoseFix),
+    /// Bytes of the laser.
+    LaserBytes(&'a [u8]),
+    /// Time for the laser.
+    LaserPolled,
+    /// The connection to the laser.
+    Connected,
+    /// A frame of the bus.
+    BusFrame(&'a Frame),
+    /// Time for the bus.
+    BusPolled,
+    /// Time to search.
+    Searched,
+}
+
 /// Drives a recorded drive with faults. `recording` has what the sensors see, faults of measurements included.
 ///
 /// # Errors
@@ -98,7 +116,21 @@ pub fn drive(
     recording: &Recording,
     faults: &[&Fault],
     options: &RigOptions,
+    hear: impl FnMut(&Heard),
+) -> Result<(), RigError> {
+    drive_listening(recording, faults, options, hear, |_, _| ())
+}
+
+/// The same; `listen` gets all that the controller is given, and when.
+///
+/// # Errors
+/// See [`RigError`].
+pub fn drive_listening(
+    recording: &Recording,
+    faults: &[&Fault],
+    options: &RigOptions,
     mut hear: impl FnMut(&Heard),
+    mut listen: impl FnMut(Time, Given),
 ) -> Result<(), RigError> {
     let mut rig = Rig::new(recording, faults, options.seed)?;
     let begin = Time::from_seconds(BEGIN);
@@ -107,10 +139,10 @@ pub fn drive(
         let now = Time::from_micros(step * STEP);
         let time = now.since(begin);
         if now == begin {
-            rig.begin(now, options.is_told);
+            rig.begin(now, options.is_told, &mut listen);
         }
         rig.switch(now, time)?;
-        rig.control(now, time);
+        rig.control(now, time, &mut listen);
         rig.answer(now, time);
         if step % STEPS_A_POSE == 0 {
             let output = rig.controller.as_ref().and_then(|controller| controller.output());
@@ -133,7 +165,7 @@ impl<'a> Rig<'a> {
         let mut rig = Self {
             recording,
             faults,
-            settings,
+
             controller: None,
             pair,
             sensor: Sensor::new(drive, clock(faults), None, true),
@@ -153,14 +185,12 @@ impl<'a> Rig<'a> {
     }
 
     fn power_on(&mut self, now: Time) -> Result<(), RigError> {
-        let mut localizer = <Localizer>::new(self.settings.parameters);
-        localizer.add_landmarks(&self.recording.landmarks).map_err(RigError::Map)?;
-        self.controller = Some(Box::new(Controller::new(&self.settings, localizer, now)));
+        self.controller = Some(new_controller(self.recording, now)?);
         Ok(())
     }
 
     /// Lets the vehicle drive off.
-    fn begin(&mut self, now: Time, is_told: bool) {
+    fn begin(&mut self, now: Time, is_told: bool, listen: &mut impl FnMut(Time, Given)) {
         self.pair.begin(now);
         self.sensor.begin(now.since(Time::default()));
         if let (true, Some(controller), Some(RecordedEvent::SetPose(fix))) =
@@ -168,6 +198,7 @@ impl<'a> Rig<'a> {
         {
             let mut fix = *fix;
             fix.time = now;
+            listen(now, Given::Told(fix));
             controller.tell(fix, |_| ());
         }
     }
@@ -195,17 +226,20 @@ impl<'a> Rig<'a> {
     }
 
     /// What the controller does.
-    fn control(&mut self, now: Time, time: f64) {
+    fn control(&mut self, now: Time, time: f64, listen: &mut impl FnMut(Time, Given)) {
         let Some(mut controller) = self.controller.take() else { return };
         let mut orders = Vec::new();
         while let Some(bytes) = self.from_laser.receive(now) {
+            listen(now, Given::LaserBytes(&bytes));
             controller.hear_laser(&bytes, now, |order| orders.push(order.map(<[u8]>::to_vec)), |_| ());
         }
+        listen(now, Given::LaserPolled);
         controller.poll_laser(now, |order| orders.push(order.map(<[u8]>::to_vec)), |_| ());
         for order in orders {
-            self.obey(order, &mut controller, now, time);
+            self.obey(order, &mut controller, (now, time), listen);
         }
         while let Some(frame) = self.from_bus.receive(now) {
+            listen(now, Given::BusFrame(&frame));
             // What answers a frame is no pose.
             controller.hear_bus(&frame, now, |_| (), |_| ());
         }
@@ -218,17 +252,26 @@ impl<'a> Rig<'a> {
                 from_bus.send_frame(now, time, answer, faults);
             }
         };
+        listen(now, Given::BusPolled);
         controller.poll_bus(now, answer, |_| ());
+        listen(now, Given::Searched);
         controller.search(|_| ());
         self.controller = Some(controller);
     }
 
     /// Does what the controller wants of its laser.
-    fn obey(&mut self, order: LaserOrder<Vec<u8>>, controller: &mut Controller, now: Time, time: f64) {
+    fn obey(
+        &mut self,
+        order: LaserOrder<Vec<u8>>,
+        controller: &mut Controller,
+        (now, time): (Time, f64),
+        listen: &mut impl FnMut(Time, Given),
+    ) {
         match order {
             LaserOrder::Connect if self.has(FaultKind::LaserUnreachable, time) => controller.unreachable(),
             LaserOrder::Connect => {
                 self.connection = Some(Connection::default());
+                listen(now, Given::Connected);
                 controller.connected(now);
             }
             LaserOrder::Disconnect => {
@@ -257,6 +300,16 @@ impl<'a> Rig<'a> {
             self.from_bus.send_frame(now, time, frame, self.faults);
         }
     }
+}
+
+/// A controller with the map of a recording, that is switched on at `now`.
+///
+/// # Errors
+/// [`RigError::Map`] if the map does not fit.
+pub fn new_controller(recording: &Recording, now: Time) -> Result<Box<Controller>, RigError> {
+    let mut localizer = <Localizer>::new(recording.parameters);
+    localizer.add_landmarks(&recording.landmarks).map_err(RigError::Map)?;
+    Ok(Box::new(Controller::new(&Settings::of(recording.parameters), localizer, now)))
 }
 
 /// The time that a pose states, of which its frames carry the low 16 bits of the milliseconds.

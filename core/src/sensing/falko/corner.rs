@@ -5,6 +5,13 @@ use crate::geometry::ScanPoint;
 use crate::sensing::line::{Line, intersection_covariance, largest_variance};
 use crate::sensing::neighbourhood::Disc;
 
+impl LineGate {
+    /// Whether a side's points are near enough to its line.
+    pub(super) fn is_straight(&self, line: &Line) -> bool {
+        line.mean_square() <= self.residual * self.residual
+    }
+}
+
 /// An intersection of two lines near a candidate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
@@ -39,17 +46,14 @@ impl Corner {
         Some(Self { relative, covariance, variance: largest_variance(covariance), before, after, ray })
     }
 
-    /// Whether the lines are good enough, if neighbouring beams are `beam_width` (m) apart at the candidate.
+    /// Whether straight lines are good enough, if neighbouring beams are `beam_width` (m) apart at the candidate.
     pub(super) fn passes(&self, gate: &LineGate, beam_width: f32) -> bool {
-        let residual = gate.residual * gate.residual;
         let sideways = libm::fabsf(self.ray.x * self.relative.y - self.ray.y * self.relative.x);
         let sine = libm::fabsf(self.before.along.dot(&self.after.normal()));
         let is_concave = (self.before.centroid + self.after.centroid).dot(&self.ray) < 0.0;
         let slant = |line: &Line| libm::fabsf(line.normal().dot(&self.ray));
         let least_slant = slant(&self.before).min(slant(&self.after));
-        self.before.mean_square() <= residual
-            && self.after.mean_square() <= residual
-            && sine >= gate.sine
+        sine >= gate.sine
             && self.variance <= gate.deviation * gate.deviation
             && sideways <= gate.beams * beam_width
             && !(is_concave && beam_width > gate.concave_spacing * least_slant)

@@ -6,7 +6,7 @@ use super::corner::Corner;
 use super::end_point;
 use super::parameters::{Parameters, SuppressionRule};
 use super::runs::Runs;
-use super::score::{SectorCounts, Sectors};
+use super::score::{PairSum, Sectors};
 use super::suppression::{Cost, is_best_within, walk};
 use crate::geometry::ScanPoint;
 use crate::sensing::keypoint::keep_best;
@@ -21,6 +21,27 @@ pub struct Detector<const BEAMS: usize> {
     sectors: Sectors,
     costs: [Cost; BEAMS],
     runs: Runs<BEAMS>,
+}
+
+/// Beams whose windows are computed together. One alone would be a chain of waiting for exponentials and quotients, at the end of
+/// which the processor guesses wrong where the neighbourhood ends.
+const AHEAD: usize = 16;
+
+/// Where neighbours of a candidate may be.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    /// Radius of the disc, m.
+    radius: f32,
+    /// Shortest base and height of the triangle, m.
+    shortest: f32,
+    /// Beams before the candidate; none if it is no candidate.
+    before: u16,
+    /// Beams after it.
+    after: u16,
+}
+
+impl Window {
+    const NONE: Self = Self { radius: 0.0, shortest: 0.0, before: 0, after: 0 };
 }
 
 /// A candidate's neighbourhood.
@@ -71,17 +92,7 @@ impl<const BEAMS: usize> Detector<BEAMS> {
             self.runs.find(scan, crosses_seam, jump);
         }
 
-        let mut worst = 0.0_f32;
-        for index in 0..count {
-            let cost = self.cost(scan, index, crosses_seam);
-            if cost.is_candidate() {
-                worst = worst.max(cost.cost);
-            }
-            if let Some(slot) = self.costs.get_mut(index) {
-                *slot = cost;
-            }
-        }
-
+        let worst = self.weigh(scan, count, crosses_seam);
         let costs = self.costs.get(..count).unwrap_or_default();
         let (radius, share) = (self.parameters.suppression_radius, self.parameters.score_share);
         match self.parameters.suppression {
@@ -115,12 +126,34 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         if radius >= range { 0.8 * range } else { radius }
     }
 
-    /// The neighbourhood of beam `index`. None if the beam is no candidate.
-    fn neighbourhood(&self, scan: &PointScan<BEAMS>, index: usize, crosses_seam: bool) -> Option<Neighbourhood> {
-        let range = *scan.ranges.get(index)?;
-        let centre = *scan.points.get(index)?;
+    /// Sets the cost of each of the first `count` beams. Returns the largest one of a candidate.
+    fn weigh(&mut self, scan: &PointScan<BEAMS>, count: usize, crosses_seam: bool) -> f32 {
+        let mut worst = 0.0_f32;
+        for start in (0..count).step_by(AHEAD) {
+            let beams = start..(start + AHEAD).min(count);
+            let mut windows = [Window::NONE; AHEAD];
+            for (window, index) in windows.iter_mut().zip(beams.clone()) {
+                *window = self.window(scan, index, crosses_seam);
+            }
+            for (window, index) in windows.iter().zip(beams) {
+                let cost = self.cost(scan, index, window);
+                if cost.is_candidate() {
+                    worst = worst.max(cost.cost);
+                }
+                if let Some(slot) = self.costs.get_mut(index) {
+                    *slot = cost;
+                }
+            }
+        }
+        worst
+    }
+
+    /// Where neighbours of beam `index` may be; nowhere if the beam is no candidate.
+    #[inline]
+    fn window(&self, scan: &PointScan<BEAMS>, index: usize, crosses_seam: bool) -> Window {
+        let Some(range) = scan.ranges.get(index).copied() else { return Window::NONE };
         if range <= 0.0 || range > self.parameters.farthest {
-            return None;
+            return Window::NONE;
         }
         let count = scan.ranges.len();
         let most = if crosses_seam { (count - 1) / 2 } else { count };
@@ -131,22 +164,41 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         } else {
             (index, count - 1 - index)
         };
-        let least = usize::from(self.parameters.points_a_side).max(1);
+        let least = self.least();
         if limits.0 < least || limits.1 < least {
-            return None;
+            return Window::NONE;
         }
         let radius = self.radius(range);
-        let window = beams_within(radius / range, scan.bearing_step);
+        let beams = beams_within(radius / range, scan.bearing_step);
+        // No scan has more beams than that.
+        let reach = |limit: usize| beams.min(limit) as u16;
+        Window {
+            radius,
+            before: reach(limits.0),
+            after: reach(limits.1),
+            shortest: radius / self.parameters.triangle_ratio,
+        }
+    }
+
+    /// Fewest neighbours on each side.
+    fn least(&self) -> usize {
+        usize::from(self.parameters.points_a_side).max(1)
+    }
+
+    /// The neighbourhood of beam `index`. None if the beam is no candidate.
+    fn neighbourhood(&self, scan: &PointScan<BEAMS>, index: usize, window: &Window) -> Option<Neighbourhood> {
+        let Window { radius, before, after, shortest } = *window;
+        let (range, centre) = (*scan.ranges.get(index)?, *scan.points.get(index)?);
         let disc = Disc { centre, range, radius };
-        let before = Side::before(scan, index, window.min(limits.0)).farthest_before(&disc)?;
-        let after = Side::after(scan, index, window.min(limits.1)).farthest_after(&disc)?;
+        let least = self.least();
+        let before = Side::before(scan, index, usize::from(before)).farthest_before(&disc)?;
+        let after = Side::after(scan, index, usize::from(after)).farthest_after(&disc)?;
         if before.0 < least || after.0 < least {
             return None;
         }
         // The triangle of K 3.1.1, relative to the candidate.
         let base = after.1 - before.1;
         let squared_base = base.norm_squared();
-        let shortest = radius / self.parameters.triangle_ratio;
         let doubled_area = before.1.x * after.1.y - before.1.y * after.1.x;
         let is_narrow = squared_base < shortest * shortest;
         let is_flat = doubled_area * doubled_area < shortest * shortest * squared_base;
@@ -158,8 +210,11 @@ impl<const BEAMS: usize> Detector<BEAMS> {
     }
 
     /// What the detector holds against beam `index` being a corner.
-    fn cost(&self, scan: &PointScan<BEAMS>, index: usize, crosses_seam: bool) -> Cost {
-        let Some(around) = self.neighbourhood(scan, index, crosses_seam) else { return Cost::NONE };
+    fn cost(&self, scan: &PointScan<BEAMS>, index: usize, window: &Window) -> Cost {
+        if window.before == 0 {
+            return Cost::NONE;
+        }
+        let Some(around) = self.neighbourhood(scan, index, window) else { return Cost::NONE };
         if self.parameters.gate.is_some() {
             let corner = self.corner(scan, index, &around);
             // The beam whose lines fix the corner best is the one at the corner.
@@ -170,9 +225,9 @@ impl<const BEAMS: usize> Detector<BEAMS> {
         let Some(orientation) = self.orientation(&around, &before, &after) else { return Cost::NONE };
         let origin = self.sectors.origin(orientation);
         let score = [before, after].map(|side| {
-            let mut counts = SectorCounts::default();
-            side.visit(&around.disc, |relative| counts.add(self.sectors.index(origin, relative)));
-            counts.pair_sum(self.sectors.count())
+            let mut sum = PairSum::new(&self.sectors, origin);
+            side.visit(&around.disc, |relative| sum.add(relative));
+            sum.value()
         });
         Cost { cost: (score[0] + score[1]) as f32, height: around.height }
     }
@@ -205,7 +260,8 @@ impl<const BEAMS: usize> Detector<BEAMS> {
             if self.parameters.lines_include_corner {
                 moments.add(ScanPoint::zeros());
             }
-            is_enough.then(|| moments.line()).flatten()
+            let line = is_enough.then(|| moments.line()).flatten();
+            line.filter(|line| self.parameters.gate.is_none_or(|gate| gate.is_straight(line)))
         };
         let before = fit(Side::before(scan, index, around.reach.before))?;
         let after = fit(Side::after(scan, index, around.reach.after))?;
@@ -223,7 +279,7 @@ impl<const BEAMS: usize> Detector<BEAMS> {
     }
 
     fn keypoint(&self, scan: &PointScan<BEAMS>, index: usize, score: f32, crosses_seam: bool) -> Option<Keypoint> {
-        let around = self.neighbourhood(scan, index, crosses_seam)?;
+        let around = self.neighbourhood(scan, index, &self.window(scan, index, crosses_seam))?;
         let before = Side::before(scan, index, around.reach.before);
         let after = Side::after(scan, index, around.reach.after);
         let orientation = self.orientation(&around, &before, &after)?;

@@ -38,13 +38,16 @@ pub(super) fn find<const BEAMS: usize>(
     mut keep: impl FnMut(Keypoint),
 ) {
     let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
-    for index in 0..scan.ranges.len() {
-        let Some(range) = beams.range(index).filter(|range| *range <= parameters.farthest) else { continue };
-        for ends in [Ends::After, Ends::Before] {
-            let (own, back) = match ends {
-                Ends::After => (runs.after(index), runs.before(index)),
-                Ends::Before => (runs.before(index), runs.after(index)),
-            };
+    let lengths = runs.lengths(beams.ranges.len());
+    for (index, (&range, (before, after))) in beams.ranges.iter().zip(lengths).enumerate() {
+        // Most beams are inside a face.
+        let is_inside = before > 0 && after > 0;
+        let is_near = range > 0.0 && range <= parameters.farthest;
+        if is_inside || !is_near {
+            continue;
+        }
+        for (ends, own, back) in [(Ends::After, after, before), (Ends::Before, before, after)] {
+            let back = usize::from(back);
             if own > 0 || back + 1 < usize::from(wanted.points) {
                 continue;
             }

@@ -19,4 +19,4 @@ mod suppression;
 
 pub use detector::Detector;
 pub use parameters::{EndPointParameters, LineGate, Parameters, SuppressionRule};
-pub use score::{Sectors, pair_sum};
+pub use score::{PairSum, Sectors};

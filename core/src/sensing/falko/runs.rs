@@ -33,43 +33,80 @@ impl<const BEAMS: usize> Runs<BEAMS> {
         self.after.get(index).copied().map_or(0, usize::from)
     }
 
+    /// Beams before and after each of the first `count` beams on the same surface.
+    pub(super) fn lengths(&self, count: usize) -> impl Iterator<Item = (u16, u16)> {
+        self.before.iter().copied().zip(self.after.iter().copied()).take(count)
+    }
+
     /// Finds the surfaces of a scan; a surface ends where the range departs from it by more than `jump` (m).
     pub(super) fn find(&mut self, scan: &PointScan<BEAMS>, crosses_seam: bool, jump: f32) {
         let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
-        let count = scan.ranges.len();
+        let count = beams.ranges.len();
+        // No scan has more beams than there is room for.
+        let (Some(before), Some(after)) = (self.before.get_mut(..count), self.after.get_mut(..count)) else { return };
         let most = count.saturating_sub(1);
-        self.before.fill(0);
-        self.after.fill(0);
-        // The second lap carries a surface across the seam.
-        let laps = if crosses_seam { 2 } else { 1 };
-        for step in 0..laps * count {
-            let index = if step < count { step } else { step - count };
-            let Some(gap) = beams.gap_before(index) else { continue };
-            let Some(previous) = beams.back(index, gap) else { continue };
-            let is_continued =
-                if step < count { !beams.is_broken(previous, index, jump) } else { self.before(index) > 0 };
-            if is_continued {
-                let length = (self.before(previous) + gap).min(most);
-                if let Some(slot) = self.before.get_mut(index) {
-                    *slot = length as u16;
+
+        let mut last = if crosses_seam { beams.before_first() } else { None };
+        for (index, (&range, before)) in beams.ranges.iter().zip(before.iter_mut()).enumerate() {
+            let linked = last.filter(|last| {
+                range > 0.0
+                    && last.steps <= BRIDGED + 1
+                    && (libm::fabsf(range - last.range) <= jump || !beams.is_broken(index, last.steps, jump))
+            });
+            *before = linked.map_or(0, |last| last.length_from(most));
+            last = Return::nearest(last, range, *before);
+        }
+        if crosses_seam {
+            // The second lap carries a surface across the seam.
+            for (&range, before) in beams.ranges.iter().zip(before.iter_mut()) {
+                if range > 0.0 {
+                    let Some(linked) = last.filter(|_| *before > 0) else { break };
+                    *before = linked.length_from(most);
                 }
-            } else if step >= count {
-                break;
+                last = Return::nearest(last, range, *before);
             }
         }
-        for step in 0..laps * count {
-            let index = count - 1 - if step < count { step } else { step - count };
-            let before = self.before(index);
-            if before == 0 {
-                continue;
-            }
-            let Some(gap) = beams.gap_before(index) else { continue };
-            let Some(previous) = beams.back(index, gap) else { continue };
-            let length = (self.after(index) + gap).min(most);
-            if let Some(slot) = self.after.get_mut(previous) {
-                *slot = length as u16;
+
+        let mut next = None::<Return>;
+        for lap in 0..if crosses_seam { 2 } else { 1 } {
+            for ((&range, &before), after) in beams.ranges.iter().zip(before.iter()).zip(after.iter_mut()).rev() {
+                let linked = next.filter(|_| range > 0.0);
+                *after = linked.map_or(0, |next| next.length_from(most));
+                next = Return::nearest(next, range, *after).filter(|next| next.steps > 1 || before > 0);
+                if lap > 0 && next.is_none() {
+                    break;
+                }
             }
         }
+    }
+}
+
+/// The nearest return on the way through the beams.
+#[derive(Clone, Copy)]
+struct Return {
+    /// Beams since then.
+    steps: usize,
+    /// Range, m.
+    range: f32,
+    /// Beams on its surface that were passed before.
+    length: u16,
+}
+
+impl Return {
+    /// The nearest return after one more beam.
+    #[inline]
+    fn nearest(last: Option<Self>, range: f32, length: u16) -> Option<Self> {
+        if range > 0.0 {
+            Some(Self { steps: 1, range, length })
+        } else {
+            last.map(|last| Self { steps: last.steps + 1, ..last })
+        }
+    }
+
+    /// Beams on the surface up to here, if it goes on.
+    #[inline]
+    fn length_from(self, most: usize) -> u16 {
+        (usize::from(self.length) + self.steps).min(most) as u16
     }
 }
 
@@ -116,28 +153,22 @@ impl Beams<'_> {
         self.points.get(index).map(|point| point.norm()).filter(|distance| *distance > 0.0)
     }
 
-    /// Steps back to the nearest present return. None if `index` itself is absent, or if too many are.
-    fn gap_before(&self, index: usize) -> Option<usize> {
-        self.range(index)?;
-        if index > 0 && self.range(index - 1).is_some() {
-            return Some(1);
-        }
-        (1..=BRIDGED + 1).find(|gap| self.back(index, *gap).and_then(|previous| self.range(previous)).is_some())
+    /// The last return of the scan, as seen from its first beam.
+    fn before_first(&self) -> Option<Return> {
+        let steps = (1..=BRIDGED + 1).find(|steps| self.back(0, *steps).and_then(|beam| self.range(beam)).is_some())?;
+        let range = self.range(self.back(0, steps)?)?;
+        Some(Return { steps, range, length: 0 })
     }
 
-    /// Whether two neighbouring returns lie on different surfaces: neither surface, continued straight, meets the other
-    /// return.
-    fn is_broken(&self, earlier: usize, later: usize, jump: f32) -> bool {
-        let (Some(first), Some(second)) = (self.range(earlier), self.range(later)) else { return true };
-        if libm::fabsf(second - first) <= jump {
-            return false;
-        }
+    /// Whether the return of a beam lies on another surface than the one `gap` beams before, from whose range it departs by
+    /// more than `jump` (m): neither surface, continued straight, meets the other return.
+    fn is_broken(&self, later: usize, gap: usize, jump: f32) -> bool {
+        let Some(earlier) = self.back(later, gap) else { return true };
         // Across the seam of a moving sensor ranges jump though the surface does not; corrected points do not.
         let (Some(first), Some(second)) = (self.distance(earlier), self.distance(later)) else { return true };
         if libm::fabsf(second - first) <= jump {
             return false;
         }
-        let gap = if later > earlier { later - earlier } else { later + self.ranges.len() - earlier };
         let continues = |from: f32, inner: Option<usize>, target: f32| {
             let inner = inner.and_then(|index| self.distance(index));
             inner.is_some_and(|inner| {

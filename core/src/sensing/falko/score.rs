@@ -1,21 +1,32 @@
 //! Cornerness: how well each side of a corner keeps to one direction (K 3.5-3.10).
 
-use heapless::Vec;
-
 use super::Parameters;
 use crate::geometry::ScanPoint;
 
 /// Room for the sectors of a polar grid.
 const ROOM: usize = Parameters::MOST_SECTORS as usize;
 
+/// Lines that are compared with a vector at once.
+const LANES: usize = 4;
+
 /// A polar grid of equal sectors.
 #[derive(Clone, Debug)]
 pub struct Sectors {
-    /// Directions of the boundaries strictly inside the upper half plane, as cosine and sine; the first `half - 1`.
-    boundaries: [ScanPoint; ROOM / 2 - 1],
+    /// Directions of the boundaries in the upper half plane, of which each goes on as one in the lower half plane; the first
+    /// `half`, of which the first is the axis of the grid.
+    lines: [Lines; ROOM / 2 / LANES],
     half: usize,
+    /// How many blocks of lines there are.
+    blocks: usize,
     /// Half a sector as cosine and sine if sectors are centred, else no turn.
     shift: ScanPoint,
+}
+
+/// Directions as cosines and sines.
+#[derive(Clone, Copy, Debug)]
+struct Lines {
+    x: [f32; LANES],
+    y: [f32; LANES],
 }
 
 impl Sectors {
@@ -25,13 +36,13 @@ impl Sectors {
     pub fn new(count: u8, centred: bool) -> Self {
         let half = usize::from(count.clamp(2, Parameters::MOST_SECTORS) / 2);
         let width = core::f32::consts::PI / half as f32;
-        let mut boundaries = [ScanPoint::zeros(); ROOM / 2 - 1];
-        for (boundary, index) in boundaries.iter_mut().take(half - 1).zip(1_u8..) {
-            let (sine, cosine) = libm::sincosf(width * f32::from(index));
-            *boundary = ScanPoint::new(cosine, sine);
+        let mut lines = [Lines::NONE; ROOM / 2 / LANES];
+        let directions = lines.iter_mut().flat_map(|lines| lines.x.iter_mut().zip(&mut lines.y));
+        for ((x, y), index) in directions.take(half).zip(0_u8..) {
+            (*y, *x) = libm::sincosf(width * f32::from(index));
         }
         let (sine, cosine) = if centred { libm::sincosf(0.5 * width) } else { (0.0, 1.0) };
-        Self { boundaries, half, shift: ScanPoint::new(cosine, sine) }
+        Self { lines, half, blocks: half.div_ceil(LANES), shift: ScanPoint::new(cosine, sine) }
     }
 
     /// Number of sectors.
@@ -51,73 +62,84 @@ impl Sectors {
     #[must_use]
     #[inline]
     pub fn index(&self, origin: ScanPoint, vector: ScanPoint) -> usize {
-        let (vector, base) = self.upper(origin, vector);
-        base + self.inner_boundaries().partition_point(|boundary| is_past(*boundary, vector))
+        let (vector, is_lower) = upper(origin, vector);
+        let mut passed = [0; LANES];
+        for lines in self.lines() {
+            lines.count_passed(vector, false, &mut passed);
+        }
+        // All have passed the axis.
+        let inner = passed.iter().sum::<u32>().saturating_sub(1) as usize;
+        if is_lower { self.half + inner } else { inner }
     }
 
-    /// The same sector without a search: faster for vectors that jump from sector to sector, where a search is guessed
-    /// wrong, and slower for vectors in order of direction.
+    #[inline]
+    fn lines(&self) -> impl Iterator<Item = &Lines> {
+        self.lines.iter().take(self.blocks)
+    }
+}
+
+impl Lines {
+    /// No lines: no vector passes them.
+    const NONE: Self = Self { x: [f32::NAN; LANES], y: [f32::NAN; LANES] };
+
+    /// Adds one to the count of each line on which a vector of the upper half plane lies or which it has passed,
+    /// counter-clockwise; or of each that it has not, if so wanted.
+    #[inline]
+    fn count_passed(&self, vector: ScanPoint, is_inverse: bool, counts: &mut [u32; LANES]) {
+        for ((x, y), count) in self.x.iter().zip(&self.y).zip(counts) {
+            let is_past = x * vector.y >= y * vector.x;
+            // No scan has that many beams.
+            *count = count.wrapping_add(u32::from(is_past != is_inverse));
+        }
+    }
+}
+
+/// A vector in the frame of the origin, folded into the upper half plane, and whether it was in the lower one.
+#[inline]
+fn upper(origin: ScanPoint, vector: ScanPoint) -> (ScanPoint, bool) {
+    let x = origin.x * vector.x + origin.y * vector.y;
+    let y = origin.x * vector.y - origin.y * vector.x;
+    // Without a branch: vectors of one side may lie in both halves.
+    let is_lower = (y < 0.0) | ((y == 0.0) & (x < 0.0));
+    let sign = if is_lower { -1.0 } else { 1.0 };
+    (ScanPoint::new(sign * x, sign * y), is_lower)
+}
+
+/// Sum of the distances (K 3.7) between the sectors of all pairs of vectors, those of one side of a corner (K 3.8 or 3.9).
+///
+/// The distance of two sectors around the circle is the number of the grid's lines that part them. So the sum over pairs is a
+/// sum over lines: how many vectors lie on one side times how many lie on the other.
+#[derive(Clone, Debug)]
+pub struct PairSum<'a> {
+    sectors: &'a Sectors,
+    origin: ScanPoint,
+    count: u32,
+    on_left: [[u32; LANES]; ROOM / 2 / LANES],
+}
+
+impl<'a> PairSum<'a> {
+    /// No vectors, in sectors counted from `origin`.
     #[must_use]
     #[inline]
-    pub fn index_by_counting(&self, origin: ScanPoint, vector: ScanPoint) -> usize {
-        let (vector, base) = self.upper(origin, vector);
-        base + self.inner_boundaries().iter().map(|boundary| usize::from(is_past(*boundary, vector))).sum::<usize>()
+    pub fn new(sectors: &'a Sectors, origin: ScanPoint) -> Self {
+        Self { sectors, origin, count: 0, on_left: [[0; LANES]; ROOM / 2 / LANES] }
     }
 
-    fn inner_boundaries(&self) -> &[ScanPoint] {
-        self.boundaries.get(..self.half - 1).unwrap_or_default()
+    /// Adds a vector.
+    #[inline(always)]
+    pub fn add(&mut self, vector: ScanPoint) {
+        let (vector, is_lower) = upper(self.origin, vector);
+        self.count += 1;
+        for (lines, on_left) in self.sectors.lines().zip(&mut self.on_left) {
+            lines.count_passed(vector, is_lower, on_left);
+        }
     }
 
-    /// A vector in the frame of the origin, folded into the upper half plane, and the first sector of its own half.
+    /// The sum.
+    #[must_use]
     #[inline]
-    fn upper(&self, origin: ScanPoint, vector: ScanPoint) -> (ScanPoint, usize) {
-        let x = origin.x * vector.x + origin.y * vector.y;
-        let y = origin.x * vector.y - origin.y * vector.x;
-        let is_lower = y < 0.0 || (y == 0.0 && x < 0.0);
-        if is_lower { (ScanPoint::new(-x, -y), self.half) } else { (ScanPoint::new(x, y), 0) }
+    pub fn value(&self) -> u32 {
+        let lines = self.on_left.as_flattened().iter().take(self.sectors.half);
+        lines.map(|on_left| on_left * (self.count - on_left)).sum()
     }
-}
-
-/// Whether a vector of the upper half plane lies on a boundary or beyond it, counter-clockwise.
-#[inline]
-fn is_past(boundary: ScanPoint, vector: ScanPoint) -> bool {
-    boundary.x * vector.y >= boundary.y * vector.x
-}
-
-/// How many points of one side lie in each sector.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SectorCounts([u32; ROOM]);
-
-impl SectorCounts {
-    pub(super) fn add(&mut self, sector: usize) {
-        if let Some(count) = self.0.get_mut(sector) {
-            *count += 1;
-        }
-    }
-
-    pub(super) fn pair_sum(&self, sectors: usize) -> u32 {
-        pair_sum(self.0.get(..sectors).unwrap_or(&self.0))
-    }
-}
-
-/// Sum of the distances (K 3.7) between the sectors of all pairs of points of one side (K 3.8 or 3.9), given how many
-/// points lie in each sector.
-///
-/// The printed double sum runs over points; points of one sector are alike, so the sum over pairs of sectors is the
-/// same integer.
-#[must_use]
-pub fn pair_sum(counts: &[u32]) -> u32 {
-    let mut occupied = Vec::<(usize, u32), ROOM>::new();
-    // No grid has more sectors than there is room for.
-    occupied.extend(counts.iter().copied().enumerate().filter(|(_, count)| *count > 0).take(ROOM));
-    let mut rest = occupied.as_slice();
-    let mut sum = 0_u32;
-    while let Some(((first, count), others)) = rest.split_first() {
-        for (second, other) in others {
-            let apart = second - first;
-            sum += count * other * apart.min(counts.len() - apart) as u32;
-        }
-        rest = others;
-    }
-    sum
 }
