@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::kinds::Catalogue;
+use super::kinds::{Catalogue, NOTHING};
 use super::of_kind::{Class, OfKind, per_fault};
 use super::of_pairs::{OfPairs, pairs};
 use super::outcome::Outcome;
@@ -76,9 +76,6 @@ pub struct Figures {
     /// With faults, but for pairs apart.
     pub stanford_faults: Stanford,
 }
-
-/// The kind without a fault.
-pub const NOTHING: &str = "nothing";
 
 /// The figures of these rows.
 #[must_use]

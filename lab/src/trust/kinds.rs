@@ -6,7 +6,7 @@ use agv_host_sim::simulate::random::Random;
 use agv_host_sim::simulate::scenario::{Carry, Knock, toml_complaint};
 use serde::{Deserialize, Serialize};
 
-use super::pair::Blinding;
+use super::blinding::Blinding;
 use crate::campaign::fault::{Fault, FaultKind};
 
 /// Why kinds of faults cannot be read.
@@ -138,6 +138,9 @@ pub struct Catalogue {
     /// Which take away what shows others.
     pub blinding: Vec<Blinding>,
 }
+
+/// The kind without a fault.
+pub const NOTHING: &str = "nothing";
 
 /// Fewest sizes of a kind.
 pub const FEWEST_SIZES: usize = 9;

@@ -1,5 +1,6 @@
 //! Whether the vehicle may be trusted: kinds of faults at every size, in halls that are drawn, judged at the bus.
 
+pub mod blinding;
 pub mod figures;
 pub mod hall;
 pub mod judge;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use agv_host_sim::output_file;
 use serde::{Deserialize, Serialize};
 
-use super::kinds::Kind;
+use super::kinds::{Kind, NOTHING};
 use super::outcome::Outcome;
 
 /// Why rows cannot be read or written.
@@ -70,7 +70,7 @@ pub fn read(paths: &[PathBuf], kinds: &[Kind]) -> Result<Vec<Row>, RowsError> {
     let place = |row: &Row| {
         let kind = kinds.iter().position(|kind| kind.name == row.kind);
         let size = kind.and_then(|kind| kinds.get(kind)?.every_size().iter().position(|size| *size == row.size));
-        (row.with.is_some(), row.kind == super::figures::NOTHING, kind, size, row.seed)
+        (row.with.is_some(), row.kind == NOTHING, kind, size, row.seed)
     };
     rows.sort_by_key(place);
     match rows.windows(2).find(|pair| place(&pair[0]) == place(&pair[1]) && pair[0].with == pair[1].with) {

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use agv_lab::campaign::Shard;
-use agv_lab::trust::figures::{Figures, NOTHING, figures};
-use agv_lab::trust::kinds::{self, Catalogue, Kind};
+use agv_lab::trust::figures::{Figures, figures};
+use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
 use agv_lab::trust::page::page;
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
