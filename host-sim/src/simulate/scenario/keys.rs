@@ -35,7 +35,7 @@ const SECONDS: [f64; 2] = [0.0, 86_400.0];
 const SIZE: [f64; 2] = [0.0, 1000.0];
 
 /// Every key that holds numbers.
-pub const KEYS: [Key; 85] = [
+pub const KEYS: [Key; 90] = [
     key("seed", "", SEED, "seed of all random numbers"),
     key("world.seed", "", SEED, "seed of dimensions and positions; the scenario's if absent"),
     key("world.moved_share", "", SHARE, "block storage: share of the pallets that have been moved"),
@@ -107,6 +107,11 @@ pub const KEYS: [Key; 85] = [
     key("laser.mixed_share", "", SHARE, "beams on an edge that report a distance between its sides"),
     key("laser.divergence_deg", "deg", [0.0, 45.0], "width of a beam, for mixing"),
     key("laser.lost_share", "", SHARE, "beams that are lost"),
+    key("laser.knocks.from", "s", SECONDS, "when the laser is knocked, after the first event"),
+    key("laser.knocks.lasts", "s", SECONDS, "how long that takes; 0 for a blow"),
+    key("laser.knocks.x", "m", PLACE, "how far forward, in S"),
+    key("laser.knocks.y", "m", PLACE, "how far to the left, in S"),
+    key("laser.knocks.heading_deg", "deg", TURN, "how far it is turned"),
     key("laser.dirty_sectors.from_deg", "deg", TURN, "where dirt on the window starts, counter-clockwise"),
     key("laser.dirty_sectors.to_deg", "deg", TURN, "where it ends"),
     key("laser.dirty_sectors.lost_share", "", SHARE, "beams that it swallows"),
