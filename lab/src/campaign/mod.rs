@@ -220,6 +220,7 @@ impl Campaign {
         let mut judge = Judge::new(self.limits, window(&faults).0);
         let options = RigOptions { seconds: self.seconds, seed: run.seed, is_told: true };
         rig::drive(&recording, &faults, &options, |heard| {
+            // The vehicle is told where it is when it drives off.
             if heard.time >= 0.0 {
                 judge.hear(heard.now, heard.time, heard.output, heard.truth);
             }

@@ -61,6 +61,10 @@ pub fn soak(scenario: &Scenario, hours: u64, mut done: impl FnMut()) -> Result<V
     let (mut judge, mut errors, mut begun) = (Judge::new(limits, 0.0), Vec::new(), Instant::now());
     let options = RigOptions { seconds, seed: scenario.seed, is_told: true };
     rig::drive(&recording, &[&wrap], &options, |&Heard { now, time, output, truth, .. }| {
+        // The vehicle is told where it is when it drives off.
+        if time < 0.0 {
+            return;
+        }
         judge.hear(now, time, output, truth);
         if let Some((output, truth)) = output.and_then(|output| Some((output, truth(output.time)?))) {
             errors.push(1e3 * (output.pose.position() - truth.position()).norm());
