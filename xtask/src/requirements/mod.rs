@@ -2,6 +2,7 @@
 
 pub mod debian;
 mod node;
+mod packages;
 mod programs;
 mod python;
 
@@ -16,6 +17,7 @@ pub fn prepare() -> Vec<String> {
     let mut missing = programs::prepare();
     missing.extend(python::prepare());
     missing.extend(node::prepare());
+    missing.extend(packages::prepare());
     missing
 }
 
