@@ -87,14 +87,13 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
     let (apart, rows): (Vec<&Row>, Vec<&Row>) = every_row.iter().partition(|row| hidden(row).is_some());
     let of_pairs = |rows: &[&Row]| pairs(rows.iter().copied().filter(|row| row.with.is_some()), hidden);
     let (pairs, pairs_apart) = (of_pairs(&rows), of_pairs(&apart));
-    let rows: Vec<Row> = rows.into_iter().cloned().collect();
-    let rows = rows.as_slice();
-    let all = OfSize { size: 0.0, rows: rows.iter().collect() };
-    let sound = OfSize { size: 0.0, rows: rows.iter().filter(|row| row.kind == NOTHING).collect() };
+    let (sound, faulty): (Vec<&Row>, Vec<&Row>) = rows.iter().copied().partition(|row| row.kind == NOTHING);
+    let sound = OfSize { size: 0.0, rows: sound };
+    let all = OfSize { size: 0.0, rows: rows.clone() };
     let accepted = OfSize { size: 0.0, rows: sound.rows.iter().copied().filter(|row| row.is_accepted).collect() };
     let share = |part: u64, whole: u64| (whole > 0).then(|| part as f64 / whole as f64);
     let km = accepted.sum(|outcome| outcome.driven_um) as f64 * 1e-9;
-    let recovering: Vec<&Row> = rows.iter().filter(|row| row.can_recover).collect();
+    let recovering: Vec<&Row> = rows.iter().copied().filter(|row| row.can_recover).collect();
     let ends_right = |rows: &[&Row]| {
         rows.iter().filter(|row| row.outcome.as_ref().is_some_and(|outcome| outcome.ends_right)).count() as u64
     };
@@ -104,7 +103,7 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
         Some(outcome.first_claim.unwrap_or(outcome.outputs) as f64 * super::judge::STEP)
     }));
     let seeds = rows.iter().map(|row| row.seed);
-    let of_kinds = per_fault(rows, catalogue);
+    let of_kinds = per_fault(&rows, catalogue);
     Figures {
         runs: rows.len(),
         panics: rows.iter().filter(|row| row.outcome.is_none()).count(),
@@ -143,7 +142,7 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
         pairs,
         pairs_apart,
         stanford_nominal: stanford(&sound.rows),
-        stanford_faults: stanford(&rows.iter().filter(|row| row.kind != NOTHING).collect::<Vec<_>>()),
+        stanford_faults: stanford(&faulty),
     }
 }
 

@@ -60,7 +60,7 @@ pub enum Class {
 }
 
 /// Each kind at its worst size, worst first.
-pub(super) fn per_fault(rows: &[Row], catalogue: &Catalogue) -> Vec<OfKind> {
+pub(super) fn per_fault(rows: &[&Row], catalogue: &Catalogue) -> Vec<OfKind> {
     let mut names: Vec<&str> = Vec::new();
     for row in rows.iter().filter(|row| row.with.is_none()) {
         if !names.contains(&row.kind.as_str()) {
@@ -68,7 +68,7 @@ pub(super) fn per_fault(rows: &[Row], catalogue: &Catalogue) -> Vec<OfKind> {
         }
     }
     let of_kind = |name: &str| {
-        let sizes = by_size(rows, name);
+        let sizes = by_size(rows.iter().copied(), name);
         let worst = worst_size(&sizes)?;
         let of = sizes.into_iter().find(|of| of.size.to_bits() == worst.to_bits())?;
         let (runs, failures) = (of.rows.len(), of.failures());

@@ -166,9 +166,9 @@ impl OfSize<'_> {
 
 /// The rows of a kind that comes alone by its sizes, in order of size.
 #[must_use]
-pub fn by_size<'a>(rows: &'a [Row], kind: &str) -> Vec<OfSize<'a>> {
+pub fn by_size<'a>(rows: impl IntoIterator<Item = &'a Row>, kind: &str) -> Vec<OfSize<'a>> {
     let mut sizes: Vec<OfSize> = Vec::new();
-    for row in rows.iter().filter(|row| row.kind == kind && row.with.is_none()) {
+    for row in rows.into_iter().filter(|row| row.kind == kind && row.with.is_none()) {
         match sizes.iter_mut().find(|of| of.size.to_bits() == row.size.to_bits()) {
             Some(of) => of.rows.push(row),
             None => sizes.push(OfSize { size: row.size, rows: vec![row] }),

@@ -106,7 +106,7 @@ impl Fault {
                 sample.steering = sample.steering.wrapping_neg() & last_value(tricycle.steering_range);
             }
             FaultKind::SlipInBends { share } if is_active => {
-                let ticks = i64::from(shifted(sample.steering, 0, tricycle.steering_range));
+                let ticks = i64::from(sample.steering);
                 let values = tricycle.steering_range.values() as i64;
                 let signed = if ticks > values / 2 { ticks - values } else { ticks };
                 let angle = signed as f64 * tricycle.steering_scale + tricycle.steering_offset_forward;
