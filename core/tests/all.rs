@@ -41,6 +41,7 @@ mod slam;
 mod slip_check;
 mod slot_life;
 mod sources;
+mod start_confirmation;
 mod start_finder;
 mod start_search;
 mod state_slots;

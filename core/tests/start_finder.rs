@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::localizer::{Event, Parameters, PoseFix, StartFinder, StartState};
+use agv_core::localizer::{Event, Parameters, PoseFix, StartFinder, StartRule, StartState};
 use agv_core::maps::{FixedMap, Landmark};
 use agv_core::measurement::{EncoderFault, EncoderFaults, PoseIncrement, ReflectorObservation, Reflectors, Time};
 use agv_core::odometry::Vehicle;
@@ -27,7 +27,7 @@ impl Search {
             (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.002)).collect();
         map.extend(&reflectors).unwrap();
         index.build(map.view());
-        let finder = StartFinder::new(parameters, RelocalizationParameters::default());
+        let finder = StartFinder::new(parameters, RelocalizationParameters::default(), StartRule::ONE_LOOK);
         Self { map, index, finder, laser: *parameters.lasers.first() }
     }
 

@@ -3,7 +3,7 @@
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::localizer::{
-    EFFORT_A_REVOLUTION, Event, Mode, Parameters, PoseFix, StartFinder, StartSearch, StartState,
+    EFFORT_A_REVOLUTION, Event, Mode, Parameters, PoseFix, StartFinder, StartRule, StartSearch, StartState,
 };
 use agv_core::maps::{FixedMap, Landmark};
 use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Time};
@@ -76,6 +76,10 @@ fn a_vehicle_that_does_not_know_where_it_is_finds_it() {
         let mut search = Search::new(&reflectors(), true);
         search.mode = mode;
         assert_eq!(search.search.advance(search.map.view()), (false, None), "nothing has been seen");
+        for _ in 0..7 {
+            search.see(&view(&pose));
+            assert_eq!((search.found(), search.search.state()), (None, Relocalization::Searching));
+        }
         search.see(&view(&pose));
         let fix = search.found();
         assert!(fix.is_some_and(|fix| is_near(&fix, &pose) && fix.time == Time::from_seconds(2.0)), "{fix:?}");
@@ -150,7 +154,7 @@ impl Finder {
         let map = map(&reflectors());
         let mut index = Box::new(ReflectorIndex::new());
         index.build(map.view());
-        let finder = StartFinder::new(parameters, RelocalizationParameters::default());
+        let finder = StartFinder::new(parameters, RelocalizationParameters::default(), StartRule::ONE_LOOK);
         let mut finder = Self { map, index, finder, pose: Pose::new(-3.0, 0.5, 0.2), time: 5.0 };
         finder.drive(0.0, 1);
         finder
@@ -258,7 +262,7 @@ fn bright_places_of_a_scan_are_looked_for_if_the_vehicle_says_how() {
         let mut finder = Finder::new();
         let mut parameters = parameters();
         parameters.reflectors.detection = detection;
-        finder.finder = StartFinder::new(parameters, RelocalizationParameters::default());
+        finder.finder = StartFinder::new(parameters, RelocalizationParameters::default(), StartRule::ONE_LOOK);
         finder.pose = stage.truth;
         finder.tell(&Event::Scan(scan));
         if is_seen {

@@ -12,8 +12,10 @@ mod machine;
 mod output;
 mod output_predictor;
 mod parameters;
+mod seen_through;
 mod separate;
 mod slam;
+mod start_confirmation;
 mod start_finder;
 mod start_search;
 mod supervisor;
@@ -28,6 +30,7 @@ pub use output::{Misuse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;
 pub use parameters::{Limits, Parameters};
 
+pub use start_confirmation::StartRule;
 pub use start_finder::{StartFinder, StartState};
 pub use start_search::{EFFORT_A_REVOLUTION, StartSearch};
 

@@ -5,9 +5,10 @@
 
 use heapless::Vec;
 
+use super::start_confirmation::{Belief, Look, StartConfirmation, StartRule};
 use super::{Event, Parameters, PoseFix};
 use crate::geometry::{Point, Pose};
-use crate::measurement::{LaserId, ReflectorObservation, Time};
+use crate::measurement::{LaserId, ReflectorObservation, Scan, Time};
 use crate::odometry::{Motion, OdometryError, RecentMotion, VehicleOdometer};
 use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
@@ -22,6 +23,8 @@ pub enum StartState {
     Waiting,
     /// The search is to go on.
     Searching,
+    /// The vehicle may be here, but more must be seen before that is believed.
+    Unconfirmed(PoseFix),
     /// The vehicle is here.
     Found(PoseFix),
     /// Two poses of R fit almost equally.
@@ -57,18 +60,22 @@ pub struct StartFinder<const SEEN: usize = 64> {
     /// Reflectors in R as it was at the end of the last motion.
     snapshot: ReflectorSnapshot<SEEN>,
     relocalizer: ReflectorRelocalizer<SEEN>,
-    /// Motion since the search began; none if no search is under way.
-    since: Option<Pose>,
+    /// Where the odometry had R when the search began, and how many revolutions had been seen; none if no search is under way.
+    begun: Option<(Pose, u16)>,
+    confirmation: StartConfirmation,
+    /// Where the odometry has R, how far it has come, m, and how many revolutions were seen since nothing was known.
+    odometry_pose: Pose,
     distance: f64,
+    revolutions: u16,
     /// Whether the odometry has said something since the last revolution.
     has_spoken: bool,
     found: Vec<ReflectorObservation, OBSERVATIONS>,
 }
 
 impl<const SEEN: usize> StartFinder<SEEN> {
-    /// A finder that has seen nothing.
+    /// A finder that has seen nothing, and believes what it finds by that rule.
     #[must_use]
-    pub fn new(parameters: Parameters, search: RelocalizationParameters) -> Self {
+    pub fn new(parameters: Parameters, search: RelocalizationParameters, rule: StartRule) -> Self {
         Self {
             odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
             recent: RecentMotion::standing(Time::default()),
@@ -76,8 +83,11 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             is_blind: false,
             snapshot: ReflectorSnapshot::new(),
             relocalizer: ReflectorRelocalizer::new(search),
-            since: None,
+            begun: None,
+            confirmation: StartConfirmation::new(rule),
+            odometry_pose: Pose::default(),
             distance: 0.0,
+            revolutions: 0,
             has_spoken: false,
             found: Vec::new(),
             parameters,
@@ -113,6 +123,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                     self.revolution(scan.laser, &found, reflectors);
                     self.found = found;
                 }
+                self.look_through(scan, reflectors);
             }
             Event::EncoderFaults(faults) => {
                 self.forget();
@@ -133,8 +144,11 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     /// Begins with a vehicle that stands at `time`, as nobody says otherwise.
     fn stand(&mut self, time: Time) {
         self.snapshot.clear();
-        self.since = None;
+        self.begun = None;
+        self.confirmation.forget();
+        self.odometry_pose = Pose::default();
         self.distance = 0.0;
+        self.revolutions = 0;
         self.recent = RecentMotion::standing(time);
         self.known_from = Some(time);
     }
@@ -147,7 +161,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 let covariance = &motion.covariance;
                 let shift = 0.5 * (covariance.m11 + covariance.m22);
                 self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
-                self.since = self.since.map(|since| since.compose(&motion.displacement));
+                self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
                 self.distance += motion.distance;
                 self.recent.add(&motion);
                 self.known_from.get_or_insert(motion.start);
@@ -177,28 +191,52 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         }
         self.has_spoken = false;
         self.see(laser, observations);
-        if self.since.is_none() {
+        self.revolutions = self.revolutions.saturating_add(1);
+        if self.begun.is_none() {
             self.relocalizer.begin(&self.snapshot, reflectors);
-            self.since = Some(Pose::default());
+            self.begun = Some((self.odometry_pose, self.revolutions));
         }
+    }
+
+    /// Looks through the places of reflectors that should be there.
+    fn look_through(&mut self, scan: &Scan, reflectors: &IndexedReflectors) {
+        let (Some(pose), Some(mount)) =
+            (self.confirmation.pose(&self.odometry_pose), self.parameters.lasers.mount(scan.laser))
+        else {
+            return;
+        };
+        let middle = scan.start.offset(0.5 * scan.end().since(scan.start));
+        let sensor = pose.compose(&self.recent.pose_at(middle)).compose(mount);
+        self.confirmation.look_through(scan, &sensor, reflectors.map());
     }
 
     /// Goes on with the search that is under way, if one is, until about `effort` is spent: see
     /// [`ReflectorRelocalizer::advance`].
     pub fn search(&mut self, reflectors: &IndexedReflectors, effort: u32) -> StartState {
-        let Some(since) = self.since else { return StartState::Waiting };
+        let Some((odometry, revolutions)) = self.begun else { return StartState::Waiting };
         let answer = match self.relocalizer.advance(reflectors, effort) {
             RelocalizationProgress::Searching => return StartState::Searching,
             RelocalizationProgress::Done(answer) => answer,
         };
-        self.since = None;
+        self.begun = None;
+        if let ReflectorAnswer::Found(fix) = answer {
+            let look = Look { pose: fix.pose, odometry, revolutions };
+            let belief = self.confirmation.take(&look, &self.odometry_pose, &self.snapshot, reflectors);
+            let fix = self.fix(&fix, &odometry.between(&self.odometry_pose));
+            return match belief {
+                Belief::Confirmed => StartState::Found(fix),
+                Belief::Open => StartState::Unconfirmed(fix),
+                Belief::Contradicted => StartState::Unknown,
+            };
+        }
+        self.confirmation.forget();
+        let since = odometry.between(&self.odometry_pose);
         match answer {
-            ReflectorAnswer::Found(fix) => StartState::Found(self.fix(&fix, &since)),
             ReflectorAnswer::Ambiguous(one, other) => {
                 StartState::Ambiguous(one.pose.compose(&since), other.pose.compose(&since))
             }
             ReflectorAnswer::TooFew => StartState::TooFew,
-            ReflectorAnswer::Unknown => StartState::Unknown,
+            ReflectorAnswer::Found(_) | ReflectorAnswer::Unknown => StartState::Unknown,
         }
     }
 

@@ -1,6 +1,6 @@
 //! The search for the pose of a vehicle that does not know where it is, in slices between events.
 
-use super::{Event, Mode, Parameters, PoseFix, StartFinder, StartState};
+use super::{Event, Mode, Parameters, PoseFix, StartFinder, StartRule, StartState};
 use crate::maps::MapView;
 use crate::relocalization::{ReflectorIndex, RelocalizationParameters};
 use crate::state::Relocalization;
@@ -32,7 +32,7 @@ impl StartSearch {
     #[inline(always)]
     pub fn new(parameters: &Parameters, is_wanted: bool) -> Self {
         Self {
-            finder: StartFinder::new(*parameters, RelocalizationParameters::default()),
+            finder: StartFinder::new(*parameters, RelocalizationParameters::default(), StartRule::default()),
             index: ReflectorIndex::new(),
             is_wanted,
             left: 0,
@@ -78,7 +78,7 @@ impl StartSearch {
         self.state = match (&state, self.state) {
             (StartState::Searching, Relocalization::Idle) => Relocalization::Searching,
             (StartState::Searching | StartState::Waiting, before) => before,
-            (StartState::Found(_), _) => Relocalization::Searching,
+            (StartState::Found(_) | StartState::Unconfirmed(_), _) => Relocalization::Searching,
             (StartState::Ambiguous(..), _) => Relocalization::Ambiguous,
             (StartState::TooFew, _) => Relocalization::TooFew,
             (StartState::Unknown, _) => Relocalization::Unknown,

@@ -2,8 +2,12 @@
 
 use super::distance_histogram::DistanceHistogram;
 use super::occupancy::{Occupancy, OccupancyView};
-use crate::geometry::{Point, ScanPoint};
+use super::{ReflectorSnapshot, SeenReflector};
+use crate::geometry::{Point, Pose, ScanPoint};
 use crate::maps::{Landmark, MapView};
+
+/// Farthest that a reflector is looked for, m.
+pub(super) const LARGEST_REACH: f32 = 0.6;
 
 /// Points within this distance of a reflector count as near in the first look, m.
 const REACH: f32 = 0.35;
@@ -64,6 +68,28 @@ impl<'a> IndexedReflectors<'a> {
     /// Where positions are told from, W, m.
     pub(super) fn origin(&self) -> Point {
         self.origin
+    }
+
+    /// The map.
+    pub(crate) fn map(&self) -> MapView<'a> {
+        self.map
+    }
+
+    /// How many of the reflectors of a snapshot that were seen at least so many times the map explains within `gate`
+    /// deviations, and how many they are, if the frame of the snapshot is at `pose` in W.
+    pub(crate) fn explained<const SEEN: usize>(
+        &self,
+        snapshot: &ReflectorSnapshot<SEEN>,
+        pose: &Pose,
+        times: u8,
+        gate: f32,
+    ) -> (usize, usize) {
+        let lasting = || snapshot.reflectors().iter().filter(|seen| seen.times >= times);
+        let is_explained = |seen: &&SeenReflector| {
+            let reach = (gate * libm::sqrtf(seen.variance)).min(LARGEST_REACH);
+            self.map.nearest(pose.transform(&seen.position.cast()), f64::from(reach)).is_some()
+        };
+        (lasting().filter(is_explained).count(), lasting().count())
     }
 
     /// Whether there may be a reflector near a point (m, from the origin).

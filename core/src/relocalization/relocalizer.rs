@@ -9,6 +9,7 @@ use heapless::Vec;
 
 use super::distance_histogram::DistanceHistogram;
 use super::groups::Groups;
+use super::indexed_reflectors::LARGEST_REACH;
 use super::sought_pairs::{SoughtPair, SoughtPairs};
 use super::{IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorSnapshot, SeenReflector};
 use crate::geometry::{Pose, ScanPoint, Transform, difference, fit_rigid};
@@ -328,9 +329,6 @@ impl<const SEEN: usize> ReflectorRelocalizer<SEEN> {
 
 /// How far beyond the noise a reflector may lie from the map while the pose is refined, m.
 const SLACK: f32 = 0.02;
-
-/// Farthest that a reflector is looked for, m.
-const LARGEST_REACH: f32 = 0.6;
 
 fn is_same(parameters: &RelocalizationParameters, first: &Pose, second: &Pose) -> bool {
     let (shift, turn) = parameters.same_pose;

@@ -1,6 +1,6 @@
 //! Where a drive begins, found as the controller finds it: by the reflectors that are seen.
 
-use agv_core::localizer::{PoseFix, StartFinder, StartState};
+use agv_core::localizer::{PoseFix, StartFinder, StartRule, StartState};
 use agv_core::maps::{FixedMap, Landmark, LandmarkKind, MapError};
 use agv_core::relocalization::{ReflectorIndex, RelocalizationParameters};
 
@@ -50,7 +50,11 @@ pub fn find_start(recording: &Recording) -> Result<(usize, PoseFix), StartSearch
     map.extend(&reflectors)?;
     index.build(map.view());
     let reflectors = index.of(map.view());
-    let mut finder = Box::new(StartFinder::<64>::new(recording.parameters, RelocalizationParameters::default()));
+    let mut finder = Box::new(StartFinder::<64>::new(
+        recording.parameters,
+        RelocalizationParameters::default(),
+        StartRule::default(),
+    ));
     let mut reason = StartSearchError::TooFew;
     for (number, event) in recording.events.iter().enumerate().filter(|(_, event)| !event.is_told()) {
         finder.handle(&event.view(), &reflectors);
@@ -59,7 +63,7 @@ pub fn find_start(recording: &Recording) -> Result<(usize, PoseFix), StartSearch
             StartState::Ambiguous(..) => reason = StartSearchError::Ambiguous,
             StartState::Unknown => reason = StartSearchError::Unknown,
             StartState::TooFew => reason = StartSearchError::TooFew,
-            StartState::Waiting | StartState::Searching => {}
+            StartState::Waiting | StartState::Searching | StartState::Unconfirmed(_) => {}
         }
     }
     Err(reason)

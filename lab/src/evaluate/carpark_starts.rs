@@ -88,7 +88,11 @@ fn start(recording: &Recording, truth: &[Truth], map: &IndexedReflectors, at: f6
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
     // The map of the recording fits the localiser, as the experiment beside this one shows.
     let _ = localizer.add_landmarks(&recording.landmarks);
-    let mut finder = Box::new(StartFinder::<64>::new(recording.parameters, RelocalizationParameters::default(), StartRule::default()));
+    let mut finder = Box::new(StartFinder::<64>::new(
+        recording.parameters,
+        RelocalizationParameters::default(),
+        StartRule::default(),
+    ));
     let mut start = Start { at_s: at, found_after_s: None, position_error_m: None, heading_error_deg: None };
     let (mut moving, mut last) = (0.0, None);
     for event in recording.events.iter().filter(|event| event.time().is_some_and(|time| time.seconds() >= at)) {

@@ -1,0 +1,135 @@
+//! When a start that was found is believed: one look may fit a place that only looks like the right one.
+
+use super::seen_through::SeenThrough;
+use crate::geometry::{Pose, difference};
+use crate::maps::MapView;
+use crate::measurement::Scan;
+use crate::relocalization::{IndexedReflectors, ReflectorSnapshot};
+
+/// What must have been seen before a pose that was found is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartRule {
+    /// Revolutions that were looked at.
+    pub revolutions: u16,
+    /// Reflectors that the map explains,
+    pub reflectors: usize,
+    /// or the distance between two looks that find the same place, m.
+    pub apart: f64,
+    /// Reflectors count that were seen in so many revolutions.
+    pub times: u8,
+    /// Share of those that the map must explain.
+    pub explained: f64,
+}
+
+impl StartRule {
+    /// One look is believed.
+    pub const ONE_LOOK: Self = Self { revolutions: 1, reflectors: 0, apart: 0.0, times: 1, explained: 0.0 };
+}
+
+impl Default for StartRule {
+    /// Eight revolutions, and five reflectors or two looks 2 m apart; three in four reflectors fit, and none is missing whose
+    /// place the scans pass through.
+    fn default() -> Self {
+        Self { revolutions: 8, reflectors: 5, apart: 2.0, times: 2, explained: 0.75 }
+    }
+}
+
+/// A look that has found a place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    /// Pose of R in W that it has found.
+    pub pose: Pose,
+    /// Where the odometry had R then.
+    pub odometry: Pose,
+    /// How many revolutions had been seen then.
+    pub revolutions: u16,
+}
+
+impl Look {
+    /// Where the vehicle is when the odometry has it there.
+    fn moved_to(&self, odometry: &Pose) -> Pose {
+        self.pose.compose(&self.odometry.between(odometry))
+    }
+}
+
+/// What a look does to what is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Belief {
+    /// The place is believed.
+    Confirmed,
+    /// It may be; more must be seen.
+    Open,
+    /// The map does not explain what is seen there.
+    Contradicted,
+}
+
+/// Two looks find the same place within this distance, m, and turn, rad, by the odometry between them.
+const SAME: (f64, f64) = (0.3, 0.05);
+/// A reflector is explained if the map has one within so many standard deviations.
+const GATE: f32 = 3.5;
+
+/// The first of the looks that agree, and what speaks against it.
+#[derive(Clone, Debug)]
+pub(super) struct StartConfirmation {
+    rule: StartRule,
+    first: Option<Look>,
+    seen_through: SeenThrough,
+}
+
+impl StartConfirmation {
+    /// Nothing was found.
+    pub(super) const fn new(rule: StartRule) -> Self {
+        Self { rule, first: None, seen_through: SeenThrough::new() }
+    }
+
+    /// Forgets the looks.
+    pub(super) fn forget(&mut self) {
+        self.first = None;
+        self.seen_through.forget();
+    }
+
+    /// Where the looks have the vehicle when the odometry has it at `odometry`.
+    pub(super) fn pose(&self, odometry: &Pose) -> Option<Pose> {
+        self.first.map(|first| first.moved_to(odometry))
+    }
+
+    /// Takes a scan whose laser the looks have at `sensor` in W.
+    pub(super) fn look_through(&mut self, scan: &Scan, sensor: &Pose, reflectors: MapView) {
+        self.seen_through.look(scan, sensor, reflectors);
+    }
+
+    /// Takes a look; `snapshot` is what is seen from where the odometry has R now.
+    pub(super) fn take<const SEEN: usize>(
+        &mut self,
+        look: &Look,
+        odometry: &Pose,
+        snapshot: &ReflectorSnapshot<SEEN>,
+        reflectors: &IndexedReflectors,
+    ) -> Belief {
+        let is_same = |first: &Look| {
+            let off = first.moved_to(&look.odometry).between(&look.pose);
+            libm::hypot(off.x, off.y) < SAME.0 && libm::fabs(difference(off.theta, 0.0)) < SAME.1
+        };
+        let first = self.first.filter(is_same).unwrap_or_else(|| {
+            self.seen_through.forget();
+            *look
+        });
+        self.first = Some(first);
+        let StartRule { revolutions, reflectors: enough, apart, times, explained } = self.rule;
+        let between = first.odometry.between(&look.odometry);
+        let is_long = look.revolutions.saturating_sub(first.revolutions).saturating_add(1) >= revolutions;
+        let pose = look.moved_to(odometry);
+        let (fitting, seen) = reflectors.explained(snapshot, &pose, times, GATE);
+        let places = snapshot.reflectors().iter().map(|seen| pose.transform(&seen.position.cast()));
+        if is_long && (fitting as f64) < explained * seen as f64
+            || self.seen_through.is_any_missing(reflectors.map(), places)
+        {
+            return Belief::Contradicted;
+        }
+        if is_long && (fitting >= enough || libm::hypot(between.x, between.y) >= apart) {
+            Belief::Confirmed
+        } else {
+            Belief::Open
+        }
+    }
+}

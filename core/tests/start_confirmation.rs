@@ -1,0 +1,203 @@
+//! A place that was found is told once enough has been seen that fits it, and nothing that contradicts it.
+#![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use std::f64::consts::{PI, TAU};
+
+use agv_core::geometry::{Point, Pose, difference};
+use agv_core::localizer::{EFFORT_A_REVOLUTION, Event, Mode, PoseFix, StartSearch};
+use agv_core::maps::{FixedMap, Landmark};
+use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::state::Relocalization;
+
+use super::support::stage::{LASER, parameters, reflectors};
+
+const BEAMS: usize = 720;
+
+/// A vehicle that is switched on with this map.
+struct Start {
+    map: Box<FixedMap<64>>,
+    search: Box<StartSearch>,
+    pose: Pose,
+    time: f64,
+}
+
+impl Start {
+    fn new(landmarks: &[Landmark]) -> Self {
+        let mut map = Box::new(FixedMap::new());
+        assert_eq!(map.extend(landmarks), Ok(()));
+        let mut search = Box::new(StartSearch::new(&parameters(), true));
+        search.index(map.view());
+        let mut start = Self { map, search, pose: Pose::new(-3.0, 0.5, 0.2), time: 5.0 };
+        start.drive(0.0, 1);
+        start
+    }
+
+    fn tell(&mut self, event: &Event) {
+        self.search.handle(event, Mode::NotLocalised, self.map.view());
+    }
+
+    fn moved(&mut self, displacement: Pose) {
+        self.time += 0.02;
+        self.tell(&Event::Increment(PoseIncrement { time: Time::from_seconds(self.time), displacement }));
+    }
+
+    /// So many samples of the odometry on a straight.
+    fn drive(&mut self, speed: f64, samples: usize) {
+        for _ in 0..samples {
+            let displacement = Pose::new(0.02 * speed, 0.0, 0.0);
+            self.pose = self.pose.compose(&displacement);
+            self.moved(displacement);
+        }
+    }
+
+    fn sensor(&self) -> Pose {
+        self.pose.compose(&LASER)
+    }
+
+    /// Sees things at these places.
+    fn see(&mut self, places: &[Point]) {
+        let sensor = self.sensor();
+        let time = Time::from_seconds(self.time);
+        let observations: Vec<_> = places
+            .iter()
+            .map(|place| {
+                let seen = sensor.inverse_transform(place);
+                ReflectorObservation { time, range: seen.norm() as f32, bearing: seen.y.atan2(seen.x) as f32 }
+            })
+            .collect();
+        self.tell(&Event::Reflectors(Reflectors::of_first(&observations)));
+    }
+
+    /// A scan of a wide place in which these things stand, 0.1 m wide.
+    fn scan(&mut self, things: &[Point]) {
+        let sensor = self.sensor();
+        let ranges: Vec<f32> = (0..BEAMS)
+            .map(|beam| {
+                let bearing = beam as f64 * TAU / BEAMS as f64 - PI;
+                let hits = things
+                    .iter()
+                    .map(|thing| sensor.inverse_transform(thing))
+                    .filter(|thing| difference(thing.y.atan2(thing.x), bearing).abs() < 0.05 / thing.norm());
+                hits.map(|thing| thing.norm()).fold(30.0, f64::min) as f32
+            })
+            .collect();
+        self.tell(&Event::Scan(Scan {
+            laser: LaserId::FIRST,
+            start: Time::from_seconds(self.time),
+            beam_interval: 0.0,
+            first_bearing: -PI,
+            bearing_step: TAU / BEAMS as f64,
+            ranges: &ranges,
+            intensities: &[],
+        }));
+    }
+
+    fn search(&mut self) -> Option<PoseFix> {
+        (0..=EFFORT_A_REVOLUTION)
+            .map_while(|_| {
+                let (goes_on, fix) = self.search.advance(self.map.view());
+                (goes_on || fix.is_some()).then_some(fix)
+            })
+            .find_map(|fix| fix)
+    }
+
+    /// The number of the revolution that tells the pose, of so many in which these places are seen.
+    fn told_after(&mut self, places: &[Point], revolutions: usize) -> Option<usize> {
+        (1..=revolutions).find(|_| {
+            self.drive(0.0, 6);
+            self.see(places);
+            self.search().is_some_and(|fix| {
+                let off = self.pose.between(&fix.pose);
+                assert!(off.x.hypot(off.y) < 0.01 && off.theta.abs() < 0.002, "{fix:?} {:?}", self.pose);
+                true
+            })
+        })
+    }
+}
+
+fn places(which: impl IntoIterator<Item = usize>) -> Vec<Point> {
+    let all = reflectors();
+    which.into_iter().map(|index| all[index].position()).collect()
+}
+
+#[test]
+fn five_reflectors_are_believed_after_eight_revolutions() {
+    let mut start = Start::new(&reflectors());
+    assert_eq!(start.told_after(&places([0, 2, 4, 7, 9]), 20), Some(8));
+}
+
+#[test]
+fn four_reflectors_are_believed_once_they_were_seen_from_two_metres_further_on() {
+    let four = places([0, 2, 5, 7]);
+    for (speed, is_told) in [(0.9, false), (1.1, true), (-1.1, true)] {
+        let mut start = Start::new(&reflectors());
+        assert_eq!(start.told_after(&four, 30), None);
+        assert_eq!(start.search.state(), Relocalization::Searching);
+        start.drive(speed, 94);
+        assert_eq!(start.told_after(&four, 1).is_some(), is_told, "{speed}");
+    }
+}
+
+#[test]
+fn a_vehicle_that_is_carried_meanwhile_is_looked_for_anew() {
+    let mut start = Start::new(&reflectors());
+    let all = places(0..12);
+    assert_eq!(start.told_after(&all, 6), None);
+    start.pose = Pose::new(2.0, -1.0, 2.0);
+    // What was seen before contradicts what is seen now.
+    assert_eq!(start.told_after(&all, 7), None);
+}
+
+#[test]
+fn one_reflector_in_three_that_the_map_does_not_have_is_too_much() {
+    let strangers = [Point::new(1.0, 3.0), Point::new(-4.0, -2.0), Point::new(5.5, 2.2)];
+    let known = places([0, 2, 4, 5, 7, 9]);
+    for (count, is_told) in [(2, true), (3, false)] {
+        let mut start = Start::new(&reflectors());
+        let seen: Vec<Point> = known.iter().chain(&strangers[..count]).copied().collect();
+        assert_eq!(start.told_after(&seen, 20).is_some(), is_told, "{count}");
+        let state = if is_told { Relocalization::Searching } else { Relocalization::Unknown };
+        assert_eq!(start.search.state(), state);
+    }
+}
+
+/// What stands where the map has a reflector that is not seen.
+#[test]
+fn a_reflector_through_whose_place_the_laser_sees_is_missing() {
+    let all = places(0..12);
+    let seen: Vec<Point> = all[1..].to_vec();
+    for (what, is_told) in [("nothing", false), ("a dirty reflector", true), ("a pallet before it", true)] {
+        let mut start = Start::new(&reflectors());
+        let mut things = seen.clone();
+        match what {
+            "a dirty reflector" => things.push(all[0]),
+            "a pallet before it" => {
+                let sensor = start.sensor().position();
+                things.push(sensor + (all[0] - sensor) * 0.5);
+            }
+            _ => {}
+        }
+        let told = (0..20).find(|_| {
+            let told = start.told_after(&seen, 1);
+            start.scan(&things);
+            told.is_some()
+        });
+        assert_eq!(told, is_told.then_some(7), "{what}");
+        if !is_told {
+            assert_eq!(start.search.state(), Relocalization::Unknown);
+        }
+    }
+}
+
+#[test]
+fn a_reflector_that_is_seen_now_and_then_is_not_missing() {
+    let all = places(0..12);
+    let mut start = Start::new(&reflectors());
+    let told = (0..20).find(|revolution| {
+        let told = start.told_after(&all[usize::from(*revolution != 2)..], 1);
+        // The beams pass beside the thin post.
+        start.scan(&[]);
+        told.is_some()
+    });
+    assert_eq!(told, Some(7));
+}
