@@ -316,6 +316,9 @@ impl<C: Capacities> Localizer<C> {
         let replacement = self.replaced_by(fix);
         self.integrity.restart(self.parameters.consistency, replacement.as_ref());
         if self.parameters.protection {
+            if matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge)) {
+                self.separation.doubt_mounting();
+            }
             self.separation.step(self.timeline.now(), self.timeline.odometry_pose());
         }
         self.timeline.begin(fix.time, state);

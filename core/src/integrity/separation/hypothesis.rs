@@ -91,6 +91,8 @@ impl Fit {
 
 /// What a turn shows of the place of the laser, and a drive of its yaw, is enough from here on, rad and m.
 const ENOUGH: (f64, f64) = (core::f64::consts::FRAC_PI_2, 5.0);
+/// A pose is well known if it has no larger deviations than these, m and rad.
+const WELL_KNOWN: (f64, f64) = (0.01, 1.75e-3);
 
 impl FreeSince {
     /// Begins at `since`.
@@ -103,6 +105,14 @@ impl FreeSince {
     #[must_use]
     pub fn has_found_mounting(&self) -> bool {
         self.turned >= ENOUGH.0 && self.has_found_yaw()
+    }
+
+    /// Whether its bound counts: it is needed, or it has found the place of the laser, or knows its pose well without.
+    #[must_use]
+    pub fn counts(&self) -> bool {
+        let (position, heading) = self.solution.variances();
+        let is_well_known = position <= WELL_KNOWN.0 * WELL_KNOWN.0 && heading <= WELL_KNOWN.1 * WELL_KNOWN.1;
+        self.is_needed || self.has_found_mounting() || is_well_known
     }
 
     /// Whether a free yaw of the laser has been found.

@@ -160,6 +160,14 @@ impl SolutionSeparation {
         self.rest_on(pose, 1.0);
     }
 
+    /// The map has contradicted the pose, and nobody knows why: a laser that is mounted elsewhere counts from now on, however
+    /// little is known of it, until a turn has shown its place.
+    pub fn doubt_mounting(&mut self) {
+        if let Some(mounting) = &mut self.mounting {
+            mounting.is_needed = true;
+        }
+    }
+
     /// What was wrong before may have been learnt as something else; so nothing is kept but about where the vehicle is.
     fn free_mounting(&self, since: Time) -> FreeSince {
         let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
@@ -411,7 +419,7 @@ impl SolutionSeparation {
             |factors: &Factors| Factors { position: surprise * factors.position, heading: surprise * factors.heading };
         let (fault_free, one_fault) = (larger(&FAULT_FREE), larger(&ONE_FAULT));
         let fast_creep = self.creeps_fast.then_some(&self.fast_creeping);
-        let found_mounting = self.mounting.as_ref().filter(|free| free.is_needed || free.has_found_mounting());
+        let found_mounting = self.mounting.as_ref().filter(|free| free.counts());
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
         let level = [&self.creeping, &self.odometry]
             .into_iter()
