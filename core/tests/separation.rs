@@ -560,6 +560,42 @@ fn what_contradicts_widens_the_bound_by_its_size() {
     assert!((level.heading - before.heading - 0.05).abs() < 0.005, "{level:?} {before:?}");
 }
 
+/// As long as the corrections say that the laser moves, a laser that creeps fast may be where nothing has shown it yet.
+#[test]
+fn a_doubted_laser_may_creep_as_fast_as_is_assumed() {
+    let straight = Pose::new(0.125, 0.0, 0.0);
+    let mut drive = Drive::new(7);
+    (0..80).for_each(|_| drive.revolve(&straight));
+    let before = drive.monitor.level();
+    assert!(before.position < 0.08, "{before:?}");
+    for (is_doubted, least, most) in [(true, 0.12, 3.0), (false, 0.005, 0.08)] {
+        drive.monitor.doubt_laser(is_doubted);
+        drive.revolve(&straight);
+        let level = drive.monitor.level();
+        assert!((least..most).contains(&level.position), "{is_doubted}: {level:?}");
+    }
+}
+
+#[test]
+fn solutions_lie_so_many_deviations_of_their_difference_apart() {
+    let assumed = AssumedDeviations::default();
+    let solution = |pose: Pose, covariance| Solution::new(pose, &covariance, &assumed);
+    let surer = solution(Pose::new(1.0, 2.0, 3.1), [1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-6]);
+    // On one axis after the other, and across the seam of the angle.
+    for (pose, deviations) in [
+        (Pose::new(1.06, 2.0, 3.1), 3.0),
+        (Pose::new(1.0, 1.92, 3.1), 2.0),
+        (Pose::new(1.0, 2.0, 3.15 - std::f64::consts::TAU), 5.0),
+        (Pose::new(1.06, 1.92, 3.1), f64::hypot(3.0, 2.0)),
+    ] {
+        let other = solution(pose, [5e-4, 0.0, 1.7e-3, 0.0, 0.0, 1.01e-4]);
+        assert!((other.separation(&surer) - deviations).abs() < 1e-6, "{pose:?}: {}", other.separation(&surer));
+    }
+    // Who is hardly less sure counts with half of its own deviation.
+    let other = solution(Pose::new(1.02, 2.0, 3.1), [1.01e-4, 0.0, 1.01e-4, 0.0, 0.0, 1.01e-6]);
+    assert!((other.separation(&surer) - 0.02 / (0.5 * f64::sqrt(1.01e-4))).abs() < 1e-6);
+}
+
 #[test]
 fn a_solution_that_is_not_a_number_bounds_nothing() {
     let assumed = AssumedDeviations::default();

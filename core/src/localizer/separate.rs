@@ -5,6 +5,7 @@ use nalgebra::Matrix2;
 use super::{Capacities, Localizer};
 use crate::filter::RangeBearing;
 use crate::geometry::Point;
+use crate::integrity::Suspect;
 use crate::integrity::separation::{LandmarkKey, Laser, Seen};
 use crate::maps::{Landmark, LandmarkKind, Verdict};
 use crate::measurement::{LaserId, Time};
@@ -33,6 +34,7 @@ impl<C: Capacities> Localizer<C> {
                 self.tell(&seen, first, &from);
             }
         }
+        self.separation.doubt_laser(self.integrity.suspect() == Some(Suspect::Laser));
         let square = self.integrity.innovations.mean_normalised_square();
         self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));
     }

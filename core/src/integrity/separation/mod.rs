@@ -38,9 +38,9 @@ const REMEMBERED: f64 = 10.0;
 /// The solution with a laser that creeps so fast that it is found: its place, m, and yaw, rad, for a square root of a metre, or of
 /// two seconds.
 const FAST_CREEP: (f64, f64) = (3e-2, 1.7e-2);
-/// It is found where the solutions lie further apart than so many deviations of what lies between them: once in 100 km
-/// without a fault, if 50 statistics are looked at in each of 8e5 revolutions.
-const FOUND: f64 = 5.9;
+/// It is found where the solutions lie further apart than so many deviations of what lies between them, in position and heading
+/// together. They drift apart over some ten metres, so there are 1e4 looks in 100 km: without a fault it is found once in 1000 km.
+const FOUND: f64 = 5.1;
 /// A laser is not knocked further than this, m, or turned by more, rad: it is the vehicle that was carried.
 const FURTHEST_KNOCK: (f64, f64) = (1.5, 0.6);
 /// The solution with a laser that creeps: its place, m, and yaw, rad, for a square root of a metre, or of two seconds.
@@ -90,6 +90,8 @@ pub struct SolutionSeparation {
     fast_creeping: Solution,
     /// Whether the laser was found to creep fast.
     creeps_fast: bool,
+    /// Whether the corrections say that the laser has moved.
+    is_laser_doubted: bool,
     odometry: Solution,
     told: SensorInformation,
     contradiction: Contradiction,
@@ -123,6 +125,7 @@ impl SolutionSeparation {
             creeping: nowhere.clone(),
             fast_creeping: nowhere.clone(),
             creeps_fast: false,
+            is_laser_doubted: false,
             odometry: nowhere,
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
@@ -166,6 +169,11 @@ impl SolutionSeparation {
         if let Some(mounting) = &mut self.mounting {
             mounting.is_needed = true;
         }
+    }
+
+    /// Whether the corrections say that the laser has moved: as long as they do, the solutions count in which it has.
+    pub fn doubt_laser(&mut self, is_doubted: bool) {
+        self.is_laser_doubted = is_doubted;
     }
 
     /// What was wrong before may have been learnt as something else; so nothing is kept but about where the vehicle is.
@@ -371,12 +379,8 @@ impl SolutionSeparation {
         if is_refuted(self.fast_creeping.correct(told, laser)) {
             self.fast_creeping = self.all.clone();
         }
-        let bound = self.fast_creeping.bound(self.all.pose(), &Factors { position: 0.0, heading: 0.0 }, (0.0, 0.0));
-        let (position, heading) = self.fast_creeping.variances();
-        let (known, known_heading) = self.all.variances();
-        let apart = |by: f64, variance: f64, known: f64| by / libm::sqrt((variance - known).max(0.25 * variance));
-        let most = apart(bound.position, position, known).max(apart(bound.heading, heading, known_heading));
-        self.creeps_fast = most > if self.creeps_fast { 0.5 * FOUND } else { FOUND };
+        let apart = self.fast_creeping.separation(&self.all);
+        self.creeps_fast = apart > if self.creeps_fast { 0.5 * FOUND } else { FOUND };
     }
 
     fn correct_free(&mut self, told: &SensorInformation, laser: &Laser) {
@@ -418,8 +422,8 @@ impl SolutionSeparation {
         let larger =
             |factors: &Factors| Factors { position: surprise * factors.position, heading: surprise * factors.heading };
         let (fault_free, one_fault) = (larger(&FAULT_FREE), larger(&ONE_FAULT));
-        let fast_creep = self.creeps_fast.then_some(&self.fast_creeping);
-        let found_mounting = self.mounting.as_ref().filter(|free| free.counts());
+        let fast_creep = (self.creeps_fast || self.is_laser_doubted).then_some(&self.fast_creeping);
+        let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
         let level = [&self.creeping, &self.odometry]
             .into_iter()

@@ -335,6 +335,23 @@ impl Solution {
         (not_negative(larger_axis(at(0, 0), at(0, 1), at(1, 1))), not_negative(at(2, 2)))
     }
 
+    fn pose_covariance(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| self.covariance.get((row, column)).copied().unwrap_or_default())
+    }
+
+    /// How many deviations of what lies between them this solution is away from a surer one, in position and heading together; the
+    /// deviation is at least half of this solution's own.
+    #[must_use]
+    pub fn separation(&self, surer: &Self) -> f64 {
+        let (pose, other) = (&self.pose, &surer.pose);
+        let apart = Vector3::new(pose.x - other.x, pose.y - other.y, difference(pose.theta, other.theta));
+        let own = self.pose_covariance();
+        let square = |covariance: Matrix3<f64>| covariance.try_inverse().map(|inverse| apart.dot(&(inverse * apart)));
+        let between = square(own - surer.pose_covariance()).filter(|square| *square >= 0.0);
+        let at_most = 4.0 * square(own).unwrap_or_default();
+        libm::sqrt(between.unwrap_or(at_most).min(at_most).max(0.0))
+    }
+
     /// How far a pose may be off if this solution is right: by what lies between them, and by the solution's own bound.
     /// `map_variances` are what the errors of the map add.
     #[must_use]
