@@ -21,6 +21,11 @@ impl SettingArguments {
         self.set.is_empty()
     }
 
+    /// As they were given.
+    pub fn texts(&self) -> &[String] {
+        &self.set
+    }
+
     /// Changes settings.
     pub fn change(&self, settings: &mut Settings) -> anyhow::Result<()> {
         self.set.iter().try_for_each(|text| change(settings, text))

@@ -2,6 +2,7 @@
 
 use agv_core::geometry::Pose;
 use agv_core::integrity::AlertLimits;
+use agv_core::localizer::Parameters;
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, Shapes, WorldOptions};
 use agv_host_sim::simulate::{START, simulate};
@@ -45,11 +46,11 @@ impl Trial<'_> {
         [(self.kind, self.size)].into_iter().chain(self.with)
     }
 
-    /// Makes the run.
+    /// Makes the run; `settings` changes what the controller believes from its defaults.
     ///
     /// # Errors
     /// See [`CampaignError`].
-    pub fn run(&self) -> Result<Tried, CampaignError> {
+    pub fn run(&self, settings: &(dyn Fn(&mut Parameters) + Sync)) -> Result<Tried, CampaignError> {
         let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
         let mut random = Random::new(self.seed, Stream::Faults);
         let timetable = Timetable::of(&scenario)?;
@@ -70,6 +71,7 @@ impl Trial<'_> {
         }
         let simulation = simulate_with(&scenario, &faults, &mut random)?;
         let mut recording = simulation.recording;
+        settings(&mut recording.parameters);
         let sight = Sight::of(&recording, [station.x, station.y]);
         for fault in &faults {
             fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use agv_core::localizer::Parameters;
 use agv_lab::campaign::Shard;
 use agv_lab::trust::figures::{Figures, figures};
 use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
@@ -9,9 +10,11 @@ use agv_lab::trust::page::page;
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
 use agv_lab::trust::trial::Trial;
+use agv_settings::Settings;
 use anyhow::{Context as _, ensure};
 
 use crate::command::progress;
+use crate::command::setting_arguments::SettingArguments;
 
 /// Whether the vehicle may be trusted: kinds of faults at every size, in halls that are drawn, judged at the bus.
 ///
@@ -66,6 +69,8 @@ pub struct Trust {
     /// One JSON object instead of the table.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    settings: SettingArguments,
 }
 
 const HELP: &str = "\
@@ -73,6 +78,7 @@ Examples:
   agv evaluate trust --sweep-runs 1 --runs 2 --sound-runs 10
   agv evaluate trust --only 'laser shifted' --runs 20
   agv evaluate trust --sample 100 --seed 7
+  agv evaluate trust --only nothing --sound-runs 30 --set odometry.slip=0.003
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
@@ -84,7 +90,7 @@ continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_sh
 [95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
 pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
-and stanford_faults {cell_mm, cells [level, error, claims]}.";
+and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set].";
 
 impl Trust {
     /// Runs the command.
@@ -98,14 +104,16 @@ impl Trust {
         if !self.merge.is_empty() {
             return self.tell(&row::read(&self.merge, all)?, &catalogue);
         }
+        let mut parameters = Settings::default().parameters;
+        self.settings.apply(&mut parameters)?;
         if let Some(runs) = self.sample {
-            let rows = make("spot check", &sweep::sample(&faults, runs, self.seed), Shard::ALL)?;
+            let rows = self.make("spot check", &sweep::sample(&faults, runs, self.seed), Shard::ALL)?;
             return self.tell(&rows, &catalogue);
         }
         let shard = self.shard.unwrap_or(Shard::ALL);
         let swept = if self.swept.is_empty() {
             let trials = sweep::sweep(&faults, self.sweep_runs, self.first_seed);
-            let swept = make("every size", &trials, shard)?;
+            let swept = self.make("every size", &trials, shard)?;
             if let Some(output) = &self.output {
                 return Ok(row::write(output, &swept)?);
             }
@@ -116,11 +124,21 @@ impl Trust {
         let mut trials = sweep::worst(&faults, &swept, self.runs, self.first_seed);
         trials.extend(sweep::sweep(&sound, self.sound_runs, self.first_seed + sweep::OTHER_SEEDS));
         trials.extend(sweep::pairs(&faults, self.pairs, self.first_seed));
-        let rows = make("worst sizes", &trials, shard)?;
+        let rows = self.make("worst sizes", &trials, shard)?;
         match &self.output {
             Some(output) => Ok(row::write(output, &rows)?),
             None => self.tell(&rows, &catalogue),
         }
+    }
+
+    /// Makes the runs of a part.
+    fn make(&self, what: &'static str, trials: &[Trial], shard: Shard) -> anyhow::Result<Vec<Row>> {
+        let bar = progress::bar(what, (0..trials.len()).filter(|run| shard.has(*run)).count() as u64);
+        // Whatever can be refused was refused before.
+        let settings = |parameters: &mut Parameters| _ = self.settings.apply(parameters);
+        let rows = run(trials, shard, &settings, || bar.inc(1)).context("a run cannot be made")?;
+        bar.finish_and_clear();
+        Ok(rows)
     }
 
     fn tell(&self, rows: &[Row], catalogue: &Catalogue) -> anyhow::Result<()> {
@@ -130,20 +148,17 @@ impl Trust {
             page(&figures)?.write(report).with_context(|| report.display().to_string())?;
         }
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&figures)?);
+            let mut told = serde_json::to_value(&figures)?;
+            told["settings"] = self.settings.texts().into();
+            println!("{}", serde_json::to_string_pretty(&told)?);
         } else {
             print(&figures);
+            if !self.settings.is_empty() {
+                println!("not the default settings: {}", self.settings.texts().join(" "));
+            }
         }
         Ok(())
     }
-}
-
-/// Makes the runs of a part.
-fn make(what: &'static str, trials: &[Trial], shard: Shard) -> anyhow::Result<Vec<Row>> {
-    let bar = progress::bar(what, (0..trials.len()).filter(|run| shard.has(*run)).count() as u64);
-    let rows = run(trials, shard, || bar.inc(1)).context("a run cannot be made")?;
-    bar.finish_and_clear();
-    Ok(rows)
 }
 
 fn print(figures: &Figures) {
