@@ -43,15 +43,15 @@ fn start(flash: Memory, starts: u32) -> Controller<Memory> {
 }
 
 /// A controller whose service port is open as long as the test program runs.
-struct Emulated {
+pub struct Emulated {
     controller: Arc<Mutex<Controller<Memory>>>,
     is_moving: Arc<AtomicBool>,
-    host: String,
+    pub host: String,
 }
 
 impl Emulated {
     /// With the flash that `agv provision` has written.
-    fn of(image: &str) -> Self {
+    pub fn of(image: &str) -> Self {
         let flash = Memory::filled(std::fs::read(image).unwrap());
         let controller = Arc::new(Mutex::new(start(flash, 1)));
         let is_moving = Arc::new(AtomicBool::new(false));
@@ -106,7 +106,8 @@ fn converse(mut stream: TcpStream, controller: &Mutex<Controller<Memory>>, is_mo
     }
 }
 
-const KEY: &str = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
+/// The key of the controllers here.
+pub const KEY: &str = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
 
 /// A file as `agv calibrate --apply` writes it.
 const VEHICLE: &str = "wheelbase_m = 1.482\nsteer_offset_forward_rad = -0.0127\nlaser_theta_rad = 0.007\n";
