@@ -128,7 +128,8 @@ impl Bench {
         let files = Files::new();
         let (key, image) = (files.write("agv.key", KEY.as_bytes()), files.path("flash.bin"));
         let vehicle = files.write("vehicle.toml", VEHICLE.as_bytes());
-        let provision = ["provision", "--key", &key, "--set", "vehicle.wheelbase=1.6", "--set", "laser.x=0.4", "-o", &image];
+        let provision =
+            ["provision", "--key", &key, "--set", "vehicle.wheelbase=1.6", "--set", "laser.x=0.4", "-o", &image];
         let made = agv(&provision);
         assert!(made.status.success(), "{}", text(&made.stderr));
         let emulated = Emulated::of(&image);
@@ -197,6 +198,9 @@ fn a_vehicle_file_is_brought_to_a_controller_and_stays_there() {
     }
     bench.ctl(&["--key", &bench.key, "set", "limits.fastest", "2.5"]);
     bench.ctl(&["--key", &bench.key, "store"]);
+    // A value that hardly a vehicle has is asked about.
+    let asked = agv(&["ctl", &bench.emulated.host, "--key", &bench.key, "set", "laser.y", "7.5"]);
+    assert!(asked.status.success() && text(&asked.stderr).contains("in metres?"), "{}", text(&asked.stderr));
     bench.ctl(&["--key", &bench.key, "reboot"]);
     assert_eq!(bench.setting("limits.fastest"), 2.5);
 }
@@ -240,7 +244,10 @@ fn a_map_is_brought_to_a_controller_and_back() {
     assert_eq!(row(&bench.ctl(&["map", "download", &back]), "landmarks"), ["3"]);
     let [sent, got] = [&hall, &back].map(|path| layout_file::landmarks(&layout_file::load(Path::new(path)).unwrap()));
     assert_eq!(sent.len(), 3);
-    assert_eq!(got.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>(), sent.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>());
+    assert_eq!(
+        got.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>(),
+        sent.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>()
+    );
 }
 
 #[test]

@@ -39,12 +39,12 @@ fn a_result_that_cannot_be_printed_is_a_failure() {
         &["completion", "bash"],
         &["completion", "zsh"],
         &["simulate", &scenario, "--json"],
+        &["settings"],
         &["calibrate", "--help"],
+        &["--help"],
+        &["--version"],
     ] {
         let (code, complaint) = into_full_device(arguments);
-        if arguments.contains(&"--help") {
-            continue;
-        }
         assert_eq!(code, Some(1), "{arguments:?}: {complaint}");
         let last = complaint.lines().last().unwrap_or_default();
         assert!(last.starts_with("agv: the result cannot be written"), "{arguments:?}: {complaint}");
@@ -56,7 +56,7 @@ fn a_result_that_cannot_be_printed_is_a_failure() {
 fn a_reader_that_has_seen_enough_is_no_failure() {
     let files = Files::new();
     let log = short_drive(&files);
-    for arguments in [&["completion", "bash"][..], &["replay", &log, "--json"]] {
+    for arguments in [&["completion", "bash"][..], &["replay", &log, "--json"], &["--help"], &["replay", "--help"]] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_agv"))
             .args(arguments)
             .stdout(Stdio::piped())
@@ -152,14 +152,18 @@ fn a_command_that_fails_while_it_writes_leaves_what_was_there() {
         (&["layout", "check", &layout, "--report", &folder], &page),
         (&["import", "graph", &graph, "--output", &table], &table),
         (&["provision", "--key", &key, "--output", &table], &table),
-        (&["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "100", "--scenario", &table], &table),
+        (
+            &["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "100", "--scenario", &table],
+            &table,
+        ),
         (&["manual", "--output", &folder], &manual),
     ] {
         std::fs::write(output, b"before").unwrap();
         let run = without_room(arguments);
         let complaint = text(&run.stderr);
         assert_eq!(run.status.code(), Some(1), "{arguments:?}: {complaint}");
-        assert!(complaint.starts_with("agv: ") && complaint.contains("os error 27"), "{arguments:?}: {complaint}");
+        let last = complaint.lines().last().unwrap_or_default();
+        assert!(last.starts_with("agv: ") && last.contains("os error 27"), "{arguments:?}: {complaint}");
         assert_eq!(std::fs::read(output).unwrap(), b"before", "{arguments:?}");
         std::fs::remove_file(output).unwrap();
     }
@@ -239,6 +243,26 @@ fn a_recording_that_begins_sets_the_older_one_aside() {
     }
     assert_eq!(std::fs::read(files.path("drive.agvlog.old")).unwrap(), b"before");
     assert!(log::read(Path::new(&files.path("drive.agvlog.old2"))).unwrap().1.is_empty());
+}
+
+#[test]
+fn the_file_that_is_missing_is_named_once() {
+    let files = Files::new();
+    let missing = files.path("missing");
+    for arguments in [
+        &["campaign", &missing][..],
+        &["-q", "campaign", &missing],
+        &["simulate", &missing],
+        &["emulate", "--image", &missing],
+        &["replay", &missing],
+        &["provision", "--key", &missing, "--output", "x"],
+        &["nav350", "layout", "convert", &missing, "x.csv"],
+        &["view", &missing],
+    ] {
+        let complaint = refusal(arguments);
+        assert_eq!(complaint.matches(&missing).count(), 1, "{arguments:?}: {complaint}");
+        assert_eq!(complaint.to_lowercase().matches("no such file").count(), 1, "{arguments:?}: {complaint}");
+    }
 }
 
 #[test]

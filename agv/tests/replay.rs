@@ -297,7 +297,8 @@ fn a_log_without_its_beginning_replays_with_the_vehicle_of_another() {
     let landmarks = files.write("landmarks.agvlog", &bytes[20..]);
     assert!(agv(&["replay", &landmarks, "--like", &like]).status.success());
     let other = files.path("other.agvlog");
-    let moved: Vec<_> = map.iter().map(|landmark| agv_core::maps::Landmark { x: landmark.x + 1.0, ..*landmark }).collect();
+    let moved: Vec<_> =
+        map.iter().map(|landmark| agv_core::maps::Landmark { x: landmark.x + 1.0, ..*landmark }).collect();
     log::write(Path::new(&other), &Recording { landmarks: moved, events: Vec::new(), ..logged }).unwrap();
     assert!(refusal(&["replay", &landmarks, "--like", &other]).contains("another map"));
 }

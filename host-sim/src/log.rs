@@ -494,8 +494,7 @@ pub fn read_part(path: &Path, like: &Recording, progress: impl FnMut(u64)) -> Re
     if !contents.recording.landmarks.iter().all(|landmark| like.landmarks.contains(landmark)) {
         return wrong("the log has landmarks that the log of --like has not: it is of another map");
     }
-    let recording =
-        Recording { parameters: like.parameters, landmarks: like.landmarks.clone(), ..contents.recording };
+    let recording = Recording { parameters: like.parameters, landmarks: like.landmarks.clone(), ..contents.recording };
     Ok(Contents { recording, ..contents })
 }
 
@@ -512,8 +511,13 @@ fn read_pieces(path: &Path, mut progress: impl FnMut(u64)) -> Result<Pieces, Log
     let mut header = None;
     let mut is_complete = false;
     let mut contents = Contents::empty();
-    let Contents { recording: Recording { landmarks, events, truth, references, .. }, outputs, publishing, damages, .. } =
-        &mut contents;
+    let Contents {
+        recording: Recording { landmarks, events, truth, references, .. },
+        outputs,
+        publishing,
+        damages,
+        ..
+    } = &mut contents;
     // An output behind damage may belong to an event that is lost.
     let mut is_answer_expected = false;
     while let Some(item) = reader.next()? {

@@ -283,7 +283,8 @@ fn other_files_are_refused_in_one_clear_line() {
     bytes.drain(..records[1].0 as usize);
     std::fs::write(&path, &bytes).unwrap();
     let complaint = refusal(&path);
-    let expected = ": the log's header, which tells the vehicle, is missing: this is a part of a log; agv replay PART --like";
+    let expected =
+        ": the log's header, which tells the vehicle, is missing: this is a part of a log; agv replay PART --like";
     assert!(complaint.starts_with(expected), "{complaint}");
 }
 

@@ -289,20 +289,24 @@ fn crates_are_packaged_without_a_warning() {
 fn packages_need_no_file_of_their_neighbours() {
     fn check(folder: &Path, depth: usize) -> usize {
         let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-        entries.map(|path| {
-            if path.is_dir() {
-                return check(&path, depth + 1);
-            }
-            if path.extension().is_none_or(|ending| ending != "rs") {
-                return 0;
-            }
-            let source = std::fs::read_to_string(&path).unwrap();
-            // A file in `src` reaches the package with one step up, one in a room of it with two.
-            let outside = format!("\"{}", "../".repeat(depth + 1));
-            let is_reached = source.lines().any(|line| (line.contains("include_") || line.contains("#[path")) && line.contains(&outside));
-            assert!(!is_reached, "{}", path.display());
-            1
-        }).sum()
+        entries
+            .map(|path| {
+                if path.is_dir() {
+                    return check(&path, depth + 1);
+                }
+                if path.extension().is_none_or(|ending| ending != "rs") {
+                    return 0;
+                }
+                let source = std::fs::read_to_string(&path).unwrap();
+                // A file in `src` reaches the package with one step up, one in a room of it with two.
+                let outside = format!("\"{}", "../".repeat(depth + 1));
+                let is_reached = source
+                    .lines()
+                    .any(|line| (line.contains("include_") || line.contains("#[path")) && line.contains(&outside));
+                assert!(!is_reached, "{}", path.display());
+                1
+            })
+            .sum()
     }
     for (folder, name) in published() {
         assert!(check(&folder.join("src"), 1) > 5, "{name}");

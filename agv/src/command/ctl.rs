@@ -220,7 +220,13 @@ impl Ctl {
             Action::Get { name } => show_settings(&[get(&mut client, name)?], self.json)?,
             Action::Set { name, value } => {
                 let like = get(&mut client, name)?.value;
-                client.set(name, parse_value(name, value, like)?)?;
+                let value = parse_value(name, value, like)?;
+                if let Value::Number(number) = value
+                    && let Some(doubt) = doubt(name, number)
+                {
+                    note(&format!("agv: {doubt}"));
+                }
+                client.set(name, value)?;
             }
             Action::Apply { file, dry_run } => self.print(&apply(&mut client, file, *dry_run)?)?,
             Action::Store => client.store()?,

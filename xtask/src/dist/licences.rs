@@ -12,8 +12,7 @@ use super::{cargo, output};
 /// Licences of the packages in the command and in the vehicle's image, each text once, under the packages that state it.
 pub fn of_program() -> anyhow::Result<String> {
     const COMMAND: &[&str] = &["--package", "agv", "--features", "full"];
-    const IMAGE: &[&str] =
-        &["--package", "agv-firmware", "--features", "h743", "--target", "thumbv7em-none-eabihf"];
+    const IMAGE: &[&str] = &["--package", "agv-firmware", "--features", "h743", "--target", "thumbv7em-none-eabihf"];
     let mut used = Vec::new();
     for of in [COMMAND, IMAGE] {
         let mut tree = cargo();
@@ -42,7 +41,11 @@ fn text<'a>(packages: impl Iterator<Item = &'a Value>) -> anyhow::Result<String>
     let mut list = String::new();
     let mut texts: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for package in packages {
-        let name = format!("{} {}", package["name"].as_str().unwrap_or_default(), package["version"].as_str().unwrap_or_default());
+        let name = format!(
+            "{} {}",
+            package["name"].as_str().unwrap_or_default(),
+            package["version"].as_str().unwrap_or_default()
+        );
         let stated = package["license"].as_str().unwrap_or("as its file says");
         let _ = writeln!(list, "{name}: {stated}");
         let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
@@ -65,7 +68,8 @@ fn files(folder: &Path) -> anyhow::Result<Vec<String>> {
     paths.sort();
     let is_licence = |path: &Path| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
-        path.is_file() && ["LICEN", "COPYING", "NOTICE", "COPYRIGHT", "UNLICENSE"].iter().any(|start| name.starts_with(start))
+        path.is_file()
+            && ["LICEN", "COPYING", "NOTICE", "COPYRIGHT", "UNLICENSE"].iter().any(|start| name.starts_with(start))
     };
     paths.retain(|path| is_licence(path));
     let texts = paths.iter().map(|path| std::fs::read(path).with_context(|| path.display().to_string()));

@@ -99,7 +99,9 @@ fn check_package(package: &Path, root: &Path) {
         assert!(fields.contains(field), "{field}: {fields}");
     }
     let contents = said(Command::new("dpkg-deb").arg("--contents").arg(package));
-    let listed = |line: &str| Some(line.split_once(" ./usr/")?.1.to_owned()).filter(|name| !name.ends_with('/') && !name.is_empty());
+    let listed = |line: &str| {
+        Some(line.split_once(" ./usr/")?.1.to_owned()).filter(|name| !name.ends_with('/') && !name.is_empty())
+    };
     let listed: BTreeSet<String> = contents.lines().filter_map(listed).collect();
     let files = said(Command::new("find").arg(".").args(["-type", "f", "-printf", "%P\n"]).current_dir(root));
     let mut expected: BTreeSet<String> = files.lines().map(str::to_owned).collect();
