@@ -4,24 +4,18 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use agv_tests::{image, is_on_path, skip};
+use agv_tests::{agv, image, is_on_path, skip};
 
 use super::{Parts, pack};
 
-/// The command as the tests are built with it, beside this program. None, and a word about it, if it is not there.
+/// The command as the tests are built with it. None, and a word about it, if it or a program that packs is not there.
 fn built(test: &str) -> Option<PathBuf> {
-    let program = std::env::current_exe().unwrap();
-    let agv = program.ancestors().nth(2).unwrap().join("agv");
-    let missing = ["dpkg", "dpkg-deb", "strip"].into_iter().find(|name| !is_on_path(name));
+    let missing = ["dpkg", "dpkg-deb", "strip", "objdump"].into_iter().find(|name| !is_on_path(name));
     if let Some(name) = missing {
         skip(test, &format!("there is no {name}"));
         return None;
     }
-    if !agv.exists() {
-        skip(test, "the command is not built; cargo build --release --package agv --features full");
-        return None;
-    }
-    Some(agv)
+    agv(test)
 }
 
 fn said(command: &mut Command) -> String {
