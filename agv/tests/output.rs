@@ -132,7 +132,7 @@ fn a_command_that_fails_while_it_writes_leaves_what_was_there() {
     let files = Files::new();
     let log = short_drive(&files);
     let scenario = files.write("s.toml", b"seed = 1\n");
-    let layout = files.write("layout.csv", b"globID,x_mm,y_mm\n7,-1000,2000\n");
+    let layout = files.write("layout.csv", b"globID,x_mm,y_mm,type,subtype,size_mm,layer1\n7,-1000,2000,1,2,80,0\n");
     let graph = files.write("graph.log", GRAPH.as_bytes());
     let key = files.write("agv.key", "0".repeat(64).as_bytes());
     let [table, imk, folder] = ["old.csv", "old.imk", "old"].map(|name| files.path(name));
@@ -248,7 +248,7 @@ fn a_recording_that_begins_sets_the_older_one_aside() {
 #[test]
 fn the_file_that_is_missing_is_named_once() {
     let files = Files::new();
-    let missing = files.path("missing");
+    let missing = files.path("missing.csv");
     for arguments in [
         &["campaign", &missing][..],
         &["-q", "campaign", &missing],
