@@ -221,6 +221,7 @@ fn who_may_not_change_a_controller_is_told_why() {
         ("wheelbase_m = 1500.0\n", "from 0.05 to 50"),
         ("laser_theta_rad = 0.1\nwheelbase = 1.5\n", "bad.toml:2:"),
         ("wheelbase_m = \n", "bad.toml:1:"),
+        ("# wheelbase_m = 1.5\n", "states no parameter"),
     ] {
         let bad = bench.files.write("bad.toml", content.as_bytes());
         let complaint = bench.refused(&["--key", &bench.key, "apply", &bad]);

@@ -10,7 +10,7 @@ use agv_host_sim::link::with_port;
 use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::Value;
 use agv_settings::service::Refusal;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::output::{note, print_rows};
@@ -172,6 +172,7 @@ fn get(client: &mut Client, name: &str) -> anyhow::Result<Setting> {
 /// Brings a vehicle's parameters to a controller; gives a row for each setting that differs.
 fn apply(client: &mut Client, file: &Path, dry_run: bool) -> anyhow::Result<Vec<[String; 2]>> {
     let vehicle = VehicleFile::read(file)?;
+    ensure!(vehicle.settings().next().is_some(), "{}: the file states no parameter of a vehicle", file.display());
     let known = client.list()?;
     let mut rows = Vec::new();
     let mut changes = Vec::new();
