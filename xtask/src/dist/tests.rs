@@ -81,9 +81,33 @@ fn check_tree(root: &Path, has_firmware: bool) {
     let modes = said(Command::new("find").arg(".").args(["-printf", "%m %y\n"]).current_dir(root));
     let modes: BTreeSet<&str> = modes.lines().collect();
     assert!(modes.is_subset(&BTreeSet::from(["755 d", "755 f", "644 f"])), "{modes:?}");
+    check_links(&root.join("share/doc/agv/book"));
     let page = std::fs::read_to_string(root.join("share/man/man1/agv.1")).unwrap();
     assert!(page.contains(".TH agv 1"), "{page}");
     assert!(said(Command::new(root.join("bin/agv")).arg("--version")).starts_with("agv 0.1.0"));
+}
+
+/// Every page of the book leads to what is there.
+fn check_links(book: &Path) {
+    let mut count = 0;
+    for entry in std::fs::read_dir(book).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|ending| ending != "html") {
+            continue;
+        }
+        let page = std::fs::read_to_string(&path).unwrap();
+        let targets = ["href=\"", "src=\""].into_iter().flat_map(|word| page.split(word).skip(1));
+        let targets = targets.map(|rest| rest.split(['"', '#']).next().unwrap());
+        for target in targets.filter(|target| !target.is_empty() && !target.contains("://")) {
+            assert!(book.join(target).exists(), "{}: {target}", path.display());
+            count += 1;
+        }
+    }
+    assert!(count > 100, "{count}");
+    // The first page begins with the archive.
+    let first = std::fs::read_to_string(book.join("index.html")).unwrap();
+    let begin = first.split("<main>").nth(1).unwrap().chars().take(400).collect::<String>();
+    assert!(begin.contains("archive"), "{begin}");
 }
 
 /// The package says what it is and needs, and holds what the archive does.
