@@ -8,11 +8,12 @@ use anyhow::Context;
 use serde_json::Value;
 
 use super::{cargo, output};
+use crate::firmware::image::TARGET;
 
 /// Licences of the packages in the command and in the vehicle's image, each text once, under the packages that state it.
 pub fn of_program() -> anyhow::Result<String> {
     const COMMAND: &[&str] = &["--package", "agv", "--features", "full"];
-    const IMAGE: &[&str] = &["--package", "agv-firmware", "--features", "h743", "--target", "thumbv7em-none-eabihf"];
+    const IMAGE: &[&str] = &["--package", "agv-firmware", "--features", "h743", "--target", TARGET];
     let mut used = Vec::new();
     for of in [COMMAND, IMAGE] {
         let mut tree = cargo();
@@ -22,7 +23,13 @@ pub fn of_program() -> anyhow::Result<String> {
     }
     used.sort_unstable();
     used.dedup();
-    let metadata = output(cargo().args(["metadata", "--format-version", "1", "--all-features"]))?;
+    let mut metadata = cargo();
+    metadata.args(["metadata", "--format-version", "1", "--all-features"]);
+    // Packages of other systems need not be there.
+    for target in [&format!("{}-unknown-linux-gnu", std::env::consts::ARCH), TARGET] {
+        metadata.args(["--filter-platform", target]);
+    }
+    let metadata = output(&mut metadata)?;
     let metadata: Value = serde_json::from_slice(&metadata)?;
     let packages = metadata["packages"].as_array().context("cargo metadata lists no packages")?;
     text(packages.iter().filter(|package| {
