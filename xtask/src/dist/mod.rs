@@ -23,6 +23,9 @@ pub struct Dist {
     without_firmware: bool,
 }
 
+/// Folders of the archive lie in each other less deep than that.
+const DEEPEST: usize = 16;
+
 /// Version of everything.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -65,9 +68,10 @@ fn pack(folder: &Path, parts: &Parts, epoch: &str) -> anyhow::Result<[PathBuf; 2
     if parts.has_firmware {
         images(&root.join("share/agv/firmware"))?;
     }
-    archive::write_checksums(&root)?;
+    archive::write_checksums(&root, DEEPEST)?;
     let packed = [archive::pack(&root, epoch)?, debian::pack(&root, epoch)?];
-    archive::write_checksums(folder)?;
+    // Who has the two files has not what they were packed from.
+    archive::write_checksums(folder, 1)?;
     Ok(packed)
 }
 

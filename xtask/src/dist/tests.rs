@@ -57,7 +57,8 @@ fn the_same_parts_make_the_same_bytes_and_they_install() {
     for (first, second) in packed[0].iter().zip(&packed[1]) {
         assert!(std::fs::read(first).unwrap() == std::fs::read(second).unwrap(), "{}", first.display());
     }
-    said(Command::new("sha256sum").args(["--check", "--strict", "SHA256SUMS"]).current_dir(&folders[0]));
+    let sums = said(Command::new("sha256sum").args(["--check", "--strict", "SHA256SUMS"]).current_dir(&folders[0]));
+    assert_eq!(sums.lines().count(), 2, "{sums}");
     let [archive, package] = &packed[0];
     let unpacked = folder.path().join("unpacked");
     std::fs::create_dir(&unpacked).unwrap();
