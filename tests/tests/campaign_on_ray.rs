@@ -2,7 +2,7 @@
 
 use agv_tests::{python, repository, skip};
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 

@@ -312,7 +312,7 @@ fn mapping_takes_as_many_turns_as_it_is_told_and_answers_in_the_layout() {
 fn reflectors_are_told_by_their_names_in_the_layout() {
     use agv_wire::nav350::{CoordinateFormat, DataMask, LandmarkDataFormat, NavigationData, Setting};
     let mut line = Line::new(0.0);
-    let layout = line.sensor.layout();
+    let layout = line.sensor.layout().to_vec();
     asked(&mut line, &Request::Call(Method::SetAccessMode { level: 3, password: 0xF472_4744 }), |_| ());
     asked(&mut line, &Request::Call(Method::ChangeState(OperatingMode::Navigation)), |_| ());
     let format = LandmarkDataFormat { coordinates: CoordinateFormat::Cartesian, has_details: true, filter: 0 };
