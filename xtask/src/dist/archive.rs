@@ -21,7 +21,7 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
         .arg("--file")
         .arg(&tar)
         .arg(name))?;
-    run(Command::new("gzip").args(["--no-name", "--best", "--force"]).arg(&tar))?;
+    run(Command::new("gzip").args(["--no-name", "--force"]).arg(&tar))?;
     let mut packed = tar.into_os_string();
     packed.push(".gz");
     Ok(packed.into())

@@ -32,7 +32,7 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
     let package = root.with_file_name(format!("agv_{VERSION}_{architecture}.deb"));
     run(Command::new("chmod").args(["--recursive", "u+rwX,go+rX,go-w"]).arg(&folder))?;
     run(Command::new("dpkg-deb")
-        .args(["--root-owner-group", "-Zgzip", "--build"])
+        .args(["--root-owner-group", "-Zgzip", "-z6", "--build"])
         .arg(&folder)
         .arg(&package)
         .env("SOURCE_DATE_EPOCH", epoch))?;
