@@ -153,7 +153,7 @@ fn a_command_that_fails_while_it_writes_leaves_what_was_there() {
         (&["import", "graph", &graph, "--output", &table], &table),
         (&["provision", "--key", &key, "--output", &table], &table),
         (
-            &["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "100", "--scenario", &table],
+            &["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "300", "--scenario", &table],
             &table,
         ),
         (&["manual", "--output", &folder], &manual),
