@@ -178,3 +178,16 @@ fn a_layout_that_was_not_asked_for_is_not_written() {
         assert_eq!(std::fs::read(&layout).unwrap(), before);
     }
 }
+
+/// The kind of the reflectors is no number.
+fn garble(bytes: Vec<u8>) -> Vec<u8> {
+    const ANSWER: &[u8] = b"sRA NLMDReflType ";
+    if position(&bytes, ANSWER).is_some() { b"\x02sRA NLMDReflType zz\x03".to_vec() } else { bytes }
+}
+
+#[test]
+fn an_answer_that_cannot_be_read_is_not_called_silence() {
+    let sensor = Server::start(&["--dialect", "cola-a"]);
+    let complaint = refusal(&["nav350", "probe", &behind(&sensor, garble)]);
+    assert!(complaint.contains("the answer to NLMDReflType cannot be read"), "{complaint}");
+}
