@@ -3,6 +3,7 @@
 
 mod command;
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
@@ -66,7 +67,7 @@ enum Command {
 
 fn main() -> ExitCode {
     command::panic_message::install();
-    let matches = Agv::command().get_matches();
+    let matches = Agv::command().try_get_matches().unwrap_or_else(|error| leave(&error));
     let words: Vec<String> = std::env::args().skip(1).collect();
     if let Some(option) = matches.subcommand_name().and_then(|command| stray_option(command, &words)) {
         let problem = format!("--{option} does not go with a command before which it stands");
@@ -118,6 +119,19 @@ fn finish(outcome: anyhow::Result<()>) -> ExitCode {
             eprintln!("agv: {}", command::complaint::line(&error));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Ends with help, version, or what is wrong with the command line.
+fn leave(error: &clap::Error) -> ! {
+    let is_result = !error.use_stderr();
+    match error.print().and_then(|()| std::io::stdout().flush()) {
+        // As with `head`.
+        Err(problem) if is_result && problem.kind() != std::io::ErrorKind::BrokenPipe => {
+            eprintln!("agv: the result cannot be written: {problem}");
+            std::process::exit(1)
+        }
+        _ => std::process::exit(error.exit_code()),
     }
 }
 

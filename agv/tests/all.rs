@@ -7,6 +7,7 @@ mod can;
 mod command;
 mod commissioning;
 mod contours;
+mod ctl;
 mod exchange;
 mod import;
 mod import_scans;

@@ -9,6 +9,8 @@ use agv_tests::recordings;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::ctl;
+use crate::nav350::commands::Server;
 use crate::support::{agv, text};
 
 fn repository() -> PathBuf {
@@ -171,4 +173,40 @@ fn the_book_is_whole() {
             assert!(path.parent().unwrap().join(target).exists(), "{}: {target}", path.display());
         }
     }
+}
+
+/// What stands between back quotes in the lines of a page's tables, and begins with the command.
+fn remedies(page: &str) -> Vec<String> {
+    let rows = page.lines().filter(|line| line.starts_with('|'));
+    let quoted = rows.flat_map(|line| line.split('`').skip(1).step_by(2));
+    let mut remedies: Vec<String> = quoted.filter(|words| words.starts_with("agv ")).map(str::to_owned).collect();
+    remedies.sort();
+    remedies.dedup();
+    remedies
+}
+
+#[test]
+fn each_remedy_for_a_symptom_runs() {
+    let page = std::fs::read_to_string(repository().join("docs/src/troubleshooting.md")).unwrap();
+    let folder = scratch();
+    let succeed = |command: &str| {
+        let output = run(command, folder.path());
+        assert!(output.status.success(), "{command}: {}", text(&output.stderr));
+    };
+    succeed("agv calibrate plan --area 14x11 --steering 18..50 --time 300 --scenario plan.toml");
+    succeed("agv simulate plan.toml --output drive.agvlog");
+    let sensor = Server::start(&[]);
+    let remedies = remedies(&page);
+    assert!(remedies.len() >= 4, "{remedies:?}");
+    for remedy in &remedies {
+        succeed(&remedy.replace("LOG", "drive.agvlog").replace("HOST", &sensor.host));
+    }
+    // What needs a controller runs against one that is emulated, with the file that the calibration has left.
+    std::fs::write(folder.path().join("agv.key"), ctl::KEY).unwrap();
+    succeed("agv provision --key agv.key --output flash.bin");
+    let controller = ctl::Emulated::of(folder.path().join("flash.bin").to_str().unwrap());
+    let commands = page.lines().filter(|line| line.starts_with("agv ctl "));
+    let count = commands.map(|command| succeed(&command.replace("192.168.1.20", &controller.host))).count();
+    assert_eq!(count, 2);
+    succeed(&format!("agv ctl {} apply vehicle.toml --dry-run | grep 'nothing differs'", controller.host));
 }

@@ -74,6 +74,11 @@ fn import_refuses_bad_input_in_one_line() {
         }
         assert!(!Path::new(&output).exists(), "{format} left a log behind");
     }
+    for format in ["auto", "carpark", "rosbag2", "optiodom", "mcap", "capture"] {
+        let folder = files.path("no/such/folder");
+        let complaint = refusal(&["import", format, &folder, "-o", &output]);
+        assert_eq!(complaint, format!("agv: {folder}: there is no such file or folder\n"));
+    }
     let nowhere = files.path("no/such/folder/out.agvlog");
     let good = files.write("good.log", GRAPH.as_bytes());
     assert!(refusal(&["import", "auto", &good, "-o", &nowhere]).contains("out.agvlog"));

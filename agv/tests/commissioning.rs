@@ -141,6 +141,8 @@ fn settings_are_listed_and_names_are_suggested() {
         "laser.theta=3.0",
     ]);
     assert!(asked.status.success());
+    let replayed = agv(&["replay", &hall(&files), "--set", "vehicle.wheelbase=30"]);
+    assert!(text(&replayed.stderr).contains("vehicle.wheelbase is 30 m"), "{}", text(&replayed.stderr));
     let questions = text(&asked.stderr);
     assert!(questions.contains("vehicle.wheelbase is 30 m") && questions.contains("171.9 deg"), "{questions}");
     let said = text(&asked.stdout);

@@ -39,12 +39,12 @@ fn a_result_that_cannot_be_printed_is_a_failure() {
         &["completion", "bash"],
         &["completion", "zsh"],
         &["simulate", &scenario, "--json"],
+        &["settings"],
         &["calibrate", "--help"],
+        &["--help"],
+        &["--version"],
     ] {
         let (code, complaint) = into_full_device(arguments);
-        if arguments.contains(&"--help") {
-            continue;
-        }
         assert_eq!(code, Some(1), "{arguments:?}: {complaint}");
         let last = complaint.lines().last().unwrap_or_default();
         assert!(last.starts_with("agv: the result cannot be written"), "{arguments:?}: {complaint}");
@@ -56,7 +56,7 @@ fn a_result_that_cannot_be_printed_is_a_failure() {
 fn a_reader_that_has_seen_enough_is_no_failure() {
     let files = Files::new();
     let log = short_drive(&files);
-    for arguments in [&["completion", "bash"][..], &["replay", &log, "--json"]] {
+    for arguments in [&["completion", "bash"][..], &["replay", &log, "--json"], &["--help"], &["replay", "--help"]] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_agv"))
             .args(arguments)
             .stdout(Stdio::piped())
@@ -119,6 +119,98 @@ fn what_measures_nothing_is_a_failure_and_an_old_recording_survives_it() {
     }
 }
 
+/// Runs a command that may write no byte to any file.
+fn without_room(arguments: &[&str]) -> std::process::Output {
+    // What a full disk does, without one: the limit is an error instead of a signal.
+    let script = "trap '' XFSZ; ulimit -f 0; exec \"$@\"";
+    let mut bash = Command::new("bash");
+    bash.args(["-c", script, "bash", env!("CARGO_BIN_EXE_agv")]).args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_command_that_fails_while_it_writes_leaves_what_was_there() {
+    let files = Files::new();
+    let log = short_drive(&files);
+    let scenario = files.write("s.toml", b"seed = 1\n");
+    let layout = files.write("layout.csv", b"globID,x_mm,y_mm,type,subtype,size_mm,layer1\n7,-1000,2000,1,2,80,0\n");
+    let graph = files.write("graph.log", GRAPH.as_bytes());
+    let key = files.write("agv.key", "0".repeat(64).as_bytes());
+    let [table, imk, folder] = ["old.csv", "old.imk", "old"].map(|name| files.path(name));
+    let [page, manual] = ["old/index.html", "old/agv.1"].map(|name| files.path(name));
+    std::fs::create_dir(&folder).unwrap();
+    for (arguments, output) in [
+        (&["simulate", &scenario, "--output", &table][..], &table),
+        (&["replay", &log, "--output", &table], &table),
+        (&["replay", &log, "--report", &folder], &page),
+        (&["report", &log, "--output", &table], &table),
+        (&["map", &log, "--output", &table, "--poses", "truth"], &table),
+        (&["map", &log, "--output", &table, "--poses", "truth", "--kind", "contours"], &table),
+        (&["export", "csv", &log, "--output", &table], &table),
+        (&["export", "tum", &log, "--output", &table], &table),
+        (&["export", "mcap", &log, "--output", &table], &table),
+        (&["layout", "convert", &layout, &imk], &imk),
+        (&["layout", "check", &layout, "--report", &folder], &page),
+        (&["import", "graph", &graph, "--output", &table], &table),
+        (&["provision", "--key", &key, "--output", &table], &table),
+        (
+            &["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "300", "--scenario", &table],
+            &table,
+        ),
+        (&["manual", "--output", &folder], &manual),
+    ] {
+        std::fs::write(output, b"before").unwrap();
+        let run = without_room(arguments);
+        let complaint = text(&run.stderr);
+        assert_eq!(run.status.code(), Some(1), "{arguments:?}: {complaint}");
+        let last = complaint.lines().last().unwrap_or_default();
+        assert!(last.starts_with("agv: ") && last.contains("os error 27"), "{arguments:?}: {complaint}");
+        assert_eq!(std::fs::read(output).unwrap(), b"before", "{arguments:?}");
+        std::fs::remove_file(output).unwrap();
+    }
+    // Nothing half done is left beside.
+    assert_eq!(std::fs::read_dir(files.folder()).unwrap().count(), 6);
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+}
+
+/// A pose graph of two scans.
+const GRAPH: &str = "VERTEX2 0 0 0 0
+ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 10.5 host 0.5
+VERTEX2 1 1 0 0.5
+ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 11.5 host 1.5
+EDGE2 0 1 1 0 0.5 1 0 1 1 0 0
+";
+
+#[test]
+fn nothing_is_written_but_aside() {
+    fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                sources(&path, found);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                found.push(path);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for room in ["agv", "host-sim", "lab", "lidar3d"] {
+        sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(room).join("src"), &mut found);
+    }
+    // A board's own files, and what is written aside.
+    let may = ["output_file.rs", "emulate/board.rs", "emulate/vehicle/mod.rs"];
+    let others: Vec<_> = found.iter().filter(|path| !may.iter().any(|end| path.ends_with(end))).collect();
+    assert!(found.len() > 300 && found.len() == others.len() + may.len(), "{} {}", found.len(), others.len());
+    for path in others {
+        let source = std::fs::read_to_string(path).unwrap();
+        let is_direct = |way: &&str| source.contains(*way);
+        let direct = ["fs::write(", "File::create(", "write_to_file("].into_iter().find(is_direct);
+        // The same call with another name is none.
+        let aside = source.matches("OutputFile::create(").count();
+        let is_aside = direct == Some("File::create(") && source.matches("File::create(").count() == aside;
+        assert!(direct.is_none() || is_aside, "{}: {direct:?}", path.display());
+    }
+}
+
 #[test]
 fn a_babbling_server_does_not_fill_the_disk() {
     let babbling = serve(|mut stream| while stream.write_all(&[0xAA; 1 << 16]).is_ok() {});
@@ -151,6 +243,26 @@ fn a_recording_that_begins_sets_the_older_one_aside() {
     }
     assert_eq!(std::fs::read(files.path("drive.agvlog.old")).unwrap(), b"before");
     assert!(log::read(Path::new(&files.path("drive.agvlog.old2"))).unwrap().1.is_empty());
+}
+
+#[test]
+fn the_file_that_is_missing_is_named_once() {
+    let files = Files::new();
+    let missing = files.path("missing.csv");
+    for arguments in [
+        &["campaign", &missing][..],
+        &["-q", "campaign", &missing],
+        &["simulate", &missing],
+        &["emulate", "--image", &missing],
+        &["replay", &missing],
+        &["provision", "--key", &missing, "--output", "x"],
+        &["nav350", "layout", "convert", &missing, "x.csv"],
+        &["view", &missing],
+    ] {
+        let complaint = refusal(arguments);
+        assert_eq!(complaint.matches(&missing).count(), 1, "{arguments:?}: {complaint}");
+        assert_eq!(complaint.to_lowercase().matches("no such file").count(), 1, "{arguments:?}: {complaint}");
+    }
 }
 
 #[test]

@@ -254,6 +254,56 @@ fn a_cut_log_replays_up_to_the_cut() {
 }
 
 #[test]
+fn a_log_without_its_beginning_replays_with_the_vehicle_of_another() {
+    let files = Files::new();
+    let [whole, like, mended] = ["whole", "like", "mended"].map(|name| files.path(&format!("{name}.agvlog")));
+    let recording = drive();
+    let answers = replay(&recording, |_| {}).unwrap();
+    // As a vehicle logs it: nobody knows the truth.
+    let logged = Recording { truth: Vec::new(), ..recording.clone() };
+    log::write_with_outputs(Path::new(&whole), &logged, |event| answers.output(event)).unwrap();
+    // Another drive of the same vehicle in the same hall.
+    log::write(Path::new(&like), &Recording { events: Vec::new(), ..logged.clone() }).unwrap();
+    let bytes = std::fs::read(&whole).unwrap();
+    // In the middle of a record.
+    let tail = files.write("tail.agvlog", &bytes[bytes.len() / 3..]);
+    for arguments in [&["replay", &tail][..], &["report", &tail], &["check", &tail]] {
+        let complaint = refusal(arguments);
+        assert!(complaint.contains("part of a log") && complaint.contains("--like LOG"), "{complaint}");
+    }
+    let run = agv(&["replay", &tail, "--like", &like, "--start", "recorded", "--output", &mended, "--json"]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let figures = json(&run.stdout);
+    let events = figures["events"].as_u64().unwrap() as usize - 1;
+    assert!(events > 100 && events < recording.events.len() * 2 / 3 + 10, "{events}");
+    // What went before is not known, so the same bits cannot be expected, and none are claimed.
+    assert!(figures["outputs"].is_null() && figures["published"].is_null(), "{figures}");
+    let contents = log::read_contents(Path::new(&mended), |_| {}).unwrap();
+    assert_eq!(contents.recording.parameters, recording.parameters);
+    assert_eq!(contents.recording.landmarks, recording.landmarks);
+    let is_told = |event: &&RecordedEvent| !matches!(event, RecordedEvent::SetPose(_));
+    let kept: Vec<_> = contents.recording.events.iter().filter(is_told).collect();
+    assert_eq!(kept, recording.events[recording.events.len() - events..].iter().collect::<Vec<_>>());
+    // It ends where the vehicle was.
+    let end = contents.outputs.last().unwrap().pose.pose;
+    let truth = recording.truth.last().unwrap().pose;
+    assert!((end.position() - truth.position()).norm() < 0.02, "{end:?} {truth:?}");
+
+    assert!(refusal(&["replay", &whole, "--like", &like]).contains("a header of its own"));
+    assert!(refusal(&["replay", &tail, "--like", &tail]).contains("part of a log"));
+    // The first landmarks are still in this part, and they are not those of another hall.
+    let map = log::read(Path::new(&like)).unwrap().0.landmarks;
+    assert!(!map.is_empty());
+    let landmarks = files.write("landmarks.agvlog", &bytes[20..]);
+    assert!(agv(&["replay", &landmarks, "--like", &like]).status.success());
+    let other = files.path("other.agvlog");
+    let moved: Vec<_> =
+        map.iter().map(|landmark| agv_core::maps::Landmark { x: landmark.x + 1.0, ..*landmark }).collect();
+    log::write(Path::new(&other), &Recording { landmarks: moved, events: Vec::new(), ..logged }).unwrap();
+    assert!(refusal(&["replay", &landmarks, "--like", &other]).contains("another map"));
+}
+
+#[test]
 fn a_report_is_one_page_with_pictures() {
     let files = Files::new();
     let log = files.path("drive.agvlog");

@@ -5,8 +5,10 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Localizer, ParameterError, Parameters};
 use agv_core::maps::Landmark;
+use agv_core::odometry::Vehicle;
 use agv_core::record::{
     self, Damage, DamageReason, FORMAT_VERSION, Frame, FrameReader, FrameStep, HEADER_LENGTH, Header, Item,
     LANDMARKS_A_RECORD, MAGIC, MAX_FRAME, MAX_PAYLOAD, Output, Record, Scratch,
@@ -62,7 +64,12 @@ pub enum LogError {
         found: u8,
     },
     /// The header cannot be read, so nobody knows what vehicle it was.
-    #[error("{}: the log's header, which tells the vehicle, is missing{}: this is a part of a log", path.display(), damage.map(|damage| format!(" ({damage})")).unwrap_or_default())]
+    #[error(
+        "{}: the log's header, which tells the vehicle, is missing{}: this is a part of a log; agv replay PART --like LOG \
+         --output WHOLE takes vehicle and map from another log",
+        path.display(),
+        damage.map(|damage| format!(" ({damage})")).unwrap_or_default()
+    )]
     Header {
         /// The file.
         path: PathBuf,
@@ -76,6 +83,14 @@ pub enum LogError {
         path: PathBuf,
         /// The parameter.
         error: ParameterError,
+    },
+    /// The log is no part of one that is like the other.
+    #[error("{}: {problem}", path.display())]
+    Like {
+        /// The file.
+        path: PathBuf,
+        /// Why it is none.
+        problem: &'static str,
     },
     /// The log holds two drives that do not belong together.
     #[error("{}: a second drive with other parameters begins at byte {offset}", path.display())]
@@ -421,6 +436,26 @@ pub struct Contents {
     pub damages: Vec<Damage>,
 }
 
+impl Contents {
+    /// Nothing, of a vehicle that nobody knows.
+    fn empty() -> Self {
+        let parameters = Parameters::new(Vehicle::Increments, Pose::default());
+        Self {
+            software: String::new(),
+            recording: Recording {
+                parameters,
+                landmarks: Vec::new(),
+                events: Vec::new(),
+                truth: Vec::new(),
+                references: Vec::new(),
+            },
+            outputs: Vec::new(),
+            publishing: Publishing::default(),
+            damages: Vec::new(),
+        }
+    }
+}
+
 /// Reads a drive, and everything that is wrong with its log: see [`read_contents`].
 ///
 /// # Errors
@@ -434,13 +469,55 @@ pub fn read(path: &Path) -> Result<(Recording, Vec<Damage>), LogError> {
 ///
 /// # Errors
 /// If the file is missing, empty, foreign, of another version, without a readable header, or holds two different drives.
-pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Contents, LogError> {
+pub fn read_contents(path: &Path, progress: impl FnMut(u64)) -> Result<Contents, LogError> {
+    let Pieces { header, contents } = read_pieces(path, progress)?;
+    match header {
+        Some((software, parameters)) => {
+            let recording = Recording { parameters, ..contents.recording };
+            Ok(Contents { software, recording, ..contents })
+        }
+        None => Err(LogError::Header { path: path.to_owned(), damage: contents.damages.first().copied() }),
+    }
+}
+
+/// Reads a part of a log whose beginning is missing, with the vehicle and the map of another log. The part's own landmarks
+/// must be among those of the map.
+///
+/// # Errors
+/// As [`read_contents`], and if the log has a header of its own, or another map.
+pub fn read_part(path: &Path, like: &Recording, progress: impl FnMut(u64)) -> Result<Contents, LogError> {
+    let Pieces { header, contents } = read_pieces(path, progress)?;
+    let wrong = |problem| Err(LogError::Like { path: path.to_owned(), problem });
+    if header.is_some() {
+        return wrong("the log has a header of its own; --like is for a part of a log without one");
+    }
+    if !contents.recording.landmarks.iter().all(|landmark| like.landmarks.contains(landmark)) {
+        return wrong("the log has landmarks that the log of --like has not: it is of another map");
+    }
+    let recording = Recording { parameters: like.parameters, landmarks: like.landmarks.clone(), ..contents.recording };
+    Ok(Contents { recording, ..contents })
+}
+
+/// What was found of a log.
+struct Pieces {
+    /// The program that wrote it, and the vehicle.
+    header: Option<(String, Parameters)>,
+    /// Everything else.
+    contents: Contents,
+}
+
+fn read_pieces(path: &Path, mut progress: impl FnMut(u64)) -> Result<Pieces, LogError> {
     let mut reader = Reader::open(path)?;
-    let mut damages = Vec::new();
     let mut header = None;
     let mut is_complete = false;
-    let (mut landmarks, mut events, mut truth, mut references) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let (mut outputs, mut publishing) = (Vec::new(), Publishing::default());
+    let mut contents = Contents::empty();
+    let Contents {
+        recording: Recording { landmarks, events, truth, references, .. },
+        outputs,
+        publishing,
+        damages,
+        ..
+    } = &mut contents;
     // An output behind damage may belong to an event that is lost.
     let mut is_answer_expected = false;
     while let Some(item) = reader.next()? {
@@ -483,11 +560,5 @@ pub fn read_contents(path: &Path, mut progress: impl FnMut(u64)) -> Result<Conte
     if !is_complete && !is_cut {
         damages.push(Damage { offset: reader.position(), skipped: 0, reason: DamageReason::Cut });
     }
-    match header {
-        Some((software, parameters)) => {
-            let recording = Recording { parameters, landmarks, events, truth, references };
-            Ok(Contents { software, recording, outputs, publishing, damages })
-        }
-        None => Err(LogError::Header { path: path.to_owned(), damage: damages.first().copied() }),
-    }
+    Ok(Pieces { header, contents })
 }

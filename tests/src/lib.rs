@@ -6,7 +6,7 @@ mod skip;
 
 use std::path::{Path, PathBuf};
 
-pub use programs::{emulator, image, is_on_path, python};
+pub use programs::{agv, emulator, image, is_on_path, python};
 pub use skip::{skip, too_busy};
 
 /// A path in the repository.

@@ -18,6 +18,24 @@ pub fn python(test: &str, modules: &str) -> Option<Command> {
     None
 }
 
+/// The command `agv` as it was built last; it belongs to another package, so Cargo does not build it for these tests. Where
+/// it is not, `test` is skipped.
+#[must_use]
+pub fn agv(test: &str) -> Option<PathBuf> {
+    let program = std::env::current_exe().ok()?;
+    let built = program
+        .ancestors()
+        .skip(1)
+        .take(3)
+        .flat_map(|folder| ["agv", "release/agv", "debug/agv"].map(|name| folder.join(name)));
+    let age = |path: &PathBuf| path.metadata().and_then(|data| data.modified()).ok();
+    let newest = built.filter(|path| path.is_file()).max_by_key(age);
+    if newest.is_none() {
+        skip(test, "the command agv is not built; cargo build --release --package agv --features full");
+    }
+    newest
+}
+
 /// Whether a program is on the path, or where the programs of root are.
 #[must_use]
 pub fn is_on_path(program: &str) -> bool {

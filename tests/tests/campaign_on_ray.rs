@@ -2,7 +2,7 @@
 
 use agv_tests::{python, repository, skip};
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -10,14 +10,6 @@ const TEST: &str = "a_lost_worker_changes_nothing";
 
 /// Long enough for a shard of it to be caught while it runs.
 const RUNS: [&str; 2] = ["--runs", "2"];
-
-/// The command `agv` as it was built last; it belongs to another package, so Cargo does not build it for this test.
-fn command() -> Option<PathBuf> {
-    let program = std::env::current_exe().unwrap();
-    let target = program.ancestors().nth(3)?;
-    let built = ["release/agv", "debug/agv"].map(|name| target.join(name));
-    built.into_iter().filter(|path| path.exists()).max_by_key(|path| path.metadata().unwrap().modified().unwrap())
-}
 
 /// A process that runs a shard.
 struct Shard {
@@ -84,10 +76,7 @@ fn checked(output: &Output) {
 
 #[test]
 fn a_lost_worker_changes_nothing() {
-    let Some(agv) = command() else {
-        skip(TEST, "the command agv is not built; cargo build --release --package agv-host-sim");
-        return;
-    };
+    let Some(agv) = agv_tests::agv(TEST) else { return };
     if !Path::new("/proc/self/stat").exists() {
         skip(TEST, "there is no /proc, where the workers are found");
         return;

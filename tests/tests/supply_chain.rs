@@ -253,3 +253,62 @@ fn no_kind_of_unsafe_escapes_the_count() {
     ];
     assert_eq!(count_unsafe(source), Unsafe::from(expected));
 }
+
+/// Packages that may be published: each says where it is documented.
+fn published() -> Vec<(PathBuf, String)> {
+    let members = toml("Cargo.toml")["workspace"]["members"].as_array().unwrap().clone();
+    let members = members.iter().map(|member| repository().join(member.as_str().unwrap()));
+    let package = |folder: PathBuf| {
+        let package = toml(folder.join("Cargo.toml").to_str().unwrap())["package"].clone();
+        let is_published = package.get("publish").is_none();
+        is_published.then(|| (folder, package["name"].as_str().unwrap().to_owned()))
+    };
+    members.filter_map(package).collect()
+}
+
+#[test]
+fn crates_are_packaged_without_a_warning() {
+    let published = published();
+    assert!(published.len() >= 9, "{published:?}");
+    let folder = tempfile::tempdir().unwrap();
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(["package", "--no-verify", "--offline", "--allow-dirty", "--target-dir"]).arg(folder.path());
+    for (_, name) in &published {
+        cargo.args(["--package", name]);
+    }
+    let output = cargo.current_dir(repository()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !said.contains("warning"), "{said}");
+    for (_, name) in &published {
+        assert!(folder.path().join(format!("package/{name}-0.1.0.crate")).metadata().unwrap().len() > 1000, "{name}");
+    }
+}
+
+/// What is packaged reaches for no file outside: it would not be there.
+#[test]
+fn packages_need_no_file_of_their_neighbours() {
+    fn check(folder: &Path, depth: usize) -> usize {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        entries
+            .map(|path| {
+                if path.is_dir() {
+                    return check(&path, depth + 1);
+                }
+                if path.extension().is_none_or(|ending| ending != "rs") {
+                    return 0;
+                }
+                let source = std::fs::read_to_string(&path).unwrap();
+                // A file in `src` reaches the package with one step up, one in a room of it with two.
+                let outside = format!("\"{}", "../".repeat(depth + 1));
+                let is_reached = source
+                    .lines()
+                    .any(|line| (line.contains("include_") || line.contains("#[path")) && line.contains(&outside));
+                assert!(!is_reached, "{}", path.display());
+                1
+            })
+            .sum()
+    }
+    for (folder, name) in published() {
+        assert!(check(&folder.join("src"), 1) > 5, "{name}");
+    }
+}

@@ -250,7 +250,8 @@ fn flood(port: u16, start: Instant) {
 
 #[test]
 fn it_is_commissioned_over_the_service_port() {
-    let Some((image, _alone)) = image("it_is_commissioned_over_the_service_port") else { return };
+    const TEST: &str = "it_is_commissioned_over_the_service_port";
+    let (Some((image, _alone)), Some(agv)) = (image(TEST), agv_tests::agv(TEST)) else { return };
     let recording = hall();
     let folder = tempfile::tempdir().unwrap();
     let options =
@@ -295,15 +296,38 @@ fn it_is_commissioned_over_the_service_port() {
     let mut client = connect(Some(KEY));
     let starts = client.version().unwrap().starts;
     client.set("limits.fastest", Value::Number(2.5)).unwrap();
-    client.store().unwrap();
     let map = &recording.landmarks[..60];
     client.upload_map(map, |_| ()).unwrap();
-    client.reboot().unwrap();
+    drop(client);
+    apply_and_reboot(&agv, &host, folder.path());
     let mut client = connect(Some(KEY));
     assert_eq!(client.version().unwrap().starts, starts + 1);
     assert_eq!(client.get("limits.fastest").unwrap().value, Value::Number(2.5));
+    assert_eq!(client.get("vehicle.wheelbase").unwrap().value, Value::Number(1.482));
+    assert_eq!(client.get("laser.theta").unwrap().value, Value::Number(0.007));
     assert_eq!(client.download_map().unwrap(), map);
     assert_eq!(client.last_panic().unwrap(), "");
+}
+
+/// Brings a file of the vehicle to a controller with the command, stores everything, and starts it again.
+fn apply_and_reboot(agv: &Path, host: &str, folder: &Path) {
+    let [vehicle, key] = ["vehicle.toml", "agv.key"].map(|name| folder.join(name).to_str().unwrap().to_owned());
+    std::fs::write(&vehicle, "wheelbase_m = 1.482\nlaser_theta_rad = 0.007\n").unwrap();
+    std::fs::write(&key, "42".repeat(32)).unwrap();
+    let ctl = |words: &[&str]| {
+        let run = std::process::Command::new(agv).args(["ctl", host, "--key", &key]).args(words).output().unwrap();
+        assert!(run.status.success(), "{words:?}: {}", String::from_utf8_lossy(&run.stderr));
+        String::from_utf8(run.stdout).unwrap()
+    };
+    let before = ctl(&["get", "vehicle.wheelbase"]);
+    let shown = ctl(&["apply", &vehicle, "--dry-run"]);
+    assert!(shown.contains("-> 1.482 m") && shown.contains("-> 0.007 rad"), "{shown}");
+    assert_eq!(ctl(&["get", "vehicle.wheelbase"]), before);
+    let done = ctl(&["apply", &vehicle]);
+    assert!(done.contains("-> 1.482 m") && done.contains("reboot"), "{done}");
+    assert!(ctl(&["apply", &vehicle]).contains("nothing differs"));
+    ctl(&["store"]);
+    ctl(&["reboot"]);
 }
 
 #[test]

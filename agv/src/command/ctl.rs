@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 use agv_core::geometry::Pose;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::layout_file;
-use agv_host_sim::link::service::{Client, PORT, Setting};
+use agv_host_sim::link::service::{Client, PORT, ServiceError, Setting};
 use agv_host_sim::link::with_port;
 use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::Value;
-use anyhow::{Context, bail};
+use agv_settings::service::Refusal;
+use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::output::{note, print_rows};
 use super::progress;
-use super::setting_text::{parse_value, show};
+use super::setting_text::{named, parse_value, show};
 
 const HELP: &str = "\
 Reading needs nothing; changing needs the controller's key (64 hexadecimal digits in a file) and a vehicle that stands.
@@ -160,9 +161,18 @@ fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// A setting of a controller; what comes near the name is suggested if there is none.
+fn get(client: &mut Client, name: &str) -> anyhow::Result<Setting> {
+    match client.get(name) {
+        Err(ServiceError::Refused(Refusal::Name)) if let Err(error) = named(name) => Err(error),
+        outcome => Ok(outcome?),
+    }
+}
+
 /// Brings a vehicle's parameters to a controller; gives a row for each setting that differs.
 fn apply(client: &mut Client, file: &Path, dry_run: bool) -> anyhow::Result<Vec<[String; 2]>> {
     let vehicle = VehicleFile::read(file)?;
+    ensure!(vehicle.settings().next().is_some(), "{}: the file states no parameter of a vehicle", file.display());
     let known = client.list()?;
     let mut rows = Vec::new();
     let mut changes = Vec::new();
@@ -208,10 +218,16 @@ impl Ctl {
                 self.print(&rows.map(|[name, value]| [name.to_owned(), value.to_owned()]))?;
             }
             Action::List => show_settings(&client.list()?, self.json)?,
-            Action::Get { name } => show_settings(&[client.get(name)?], self.json)?,
+            Action::Get { name } => show_settings(&[get(&mut client, name)?], self.json)?,
             Action::Set { name, value } => {
-                let like = client.get(name)?.value;
-                client.set(name, parse_value(name, value, like)?)?;
+                let like = get(&mut client, name)?.value;
+                let value = parse_value(name, value, like)?;
+                if let Value::Number(number) = value
+                    && let Some(doubt) = doubt(name, number)
+                {
+                    note(&format!("agv: {doubt}"));
+                }
+                client.set(name, value)?;
             }
             Action::Apply { file, dry_run } => self.print(&apply(&mut client, file, *dry_run)?)?,
             Action::Store => client.store()?,

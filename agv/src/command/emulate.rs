@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use agv_host_sim::emulate::vehicle::{self, Errors, VehicleOptions, Watch};
 use agv_host_sim::simulate::scenario::Scenario;
-use agv_host_sim::simulate::simulate;
+use agv_host_sim::simulate::{simulate, standard};
 use agv_host_sim::{log, replay};
 use anyhow::{Context, bail};
 use indicatif::ProgressStyle;
@@ -64,8 +64,7 @@ impl Emulate {
     pub fn run(self) -> anyhow::Result<()> {
         let scenario = match &self.scenario {
             Some(path) => Scenario::read(path)?,
-            None => toml::from_str(include_str!("../../../host-sim/scenarios/warehouse_hall.toml"))
-                .context("standard hall")?,
+            None => toml::from_str(standard::HALL).context("standard hall")?,
         };
         let recording = simulate(&scenario)?.recording;
         let image = self.image.canonicalize().with_context(|| self.image.display().to_string())?;

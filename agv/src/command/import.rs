@@ -13,7 +13,7 @@ use agv_host_sim::import::{
 };
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 use flate2::read::MultiGzDecoder;
 use indicatif::ProgressBar;
@@ -112,6 +112,9 @@ enum Format {
 impl Import {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        // Before a reader looks for files in a folder that is not there.
+        let is_missing = self.input.try_exists().is_ok_and(|exists| !exists);
+        ensure!(!is_missing, "{}: there is no such file or folder", self.input.display());
         let format = match self.format {
             Format::Auto => detect(&self.input)?,
             stated => stated,
@@ -222,12 +225,7 @@ fn candump_bytes(input: &Path) -> anyhow::Result<Vec<RawBytes>> {
 
 /// What the input looks like.
 fn detect(input: &Path) -> anyhow::Result<Format> {
-    let metadata = match std::fs::metadata(input) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            bail!("{}: there is no such file", input.display())
-        }
-        other => other.with_context(|| input.display().to_string())?,
-    };
+    let metadata = std::fs::metadata(input).with_context(|| input.display().to_string())?;
     if metadata.is_dir() {
         if input.join("laser_ranges_m.csv").exists() {
             return Ok(Format::Carpark);

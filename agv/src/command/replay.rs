@@ -6,13 +6,14 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{MapUse, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::record::Damage;
+use agv_core::state::Mode;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::drive_check::{POOR, poor_share};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::mapping::{contour_file, contour_replay, map_file};
-use agv_host_sim::recording::{RecordedEvent, Recording, Truth};
+use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording, Truth};
 use agv_host_sim::replay::{Comparisons, Replay as Replayed, replay};
 use agv_host_sim::report::Page;
 use agv_host_sim::setting_doubts::doubt;
@@ -22,7 +23,7 @@ use clap::ValueEnum;
 use super::drive_summary::DriveSummary;
 use super::lidar3d::relocalise::Relocalisation;
 use super::setting_arguments::SettingArguments;
-use super::{output, pose_argument, progress};
+use super::{like, output, pose_argument, progress};
 
 const HELP: &str = "\
 Examples:
@@ -33,6 +34,7 @@ Examples:
   agv replay intel.agvlog --start recorded --landmarks dynamic
   agv replay drive.agvlog --landmarks none --output odometry.agvlog
   agv replay drive.agvlog --relocalise reflectors
+  agv replay tail.agvlog --like drive.agvlog --start recorded --output whole.agvlog
   agv replay drive.agvlog --relocalise lidar3d --places street.places3d --scans drive.pcap
 
 Keys of --json:
@@ -61,6 +63,9 @@ pub struct Replay {
     /// beside them, with the noise of the odometry that the scans of the log say.
     #[arg(long, value_name = "MAP")]
     map: Vec<PathBuf>,
+    /// Log whose vehicle and map are those of this one, if this one is a part that has lost its beginning.
+    #[arg(long, value_name = "LOG")]
+    like: Option<PathBuf>,
     /// Parameters of the vehicle, instead of those of the log; as `agv calibrate --apply` writes them.
     #[arg(long, value_name = "FILE")]
     vehicle: Option<PathBuf>,
@@ -68,7 +73,8 @@ pub struct Replay {
     #[arg(long, value_name = "KIND,...", value_delimiter = ',')]
     landmarks: Vec<Landmarks>,
     /// Where the vehicle is at the start, for logs that do not say it: X,Y,HEADING of the logical point in m, m and deg,
-    /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose.
+    /// good to 0.3 m and 5 deg, or `recorded` for the first true or reference pose, or the first answer of a localised
+    /// vehicle if there is neither.
     #[arg(long, value_name = "POSE", value_parser = start, allow_hyphen_values = true)]
     start: Option<Start>,
     #[command(flatten)]
@@ -118,10 +124,10 @@ impl Replay {
         }
         let size = std::fs::metadata(&self.log).map_or(0, |metadata| metadata.len());
         let reading = progress::bar("reading", size);
-        let contents = log::read_contents(&self.log, |bytes| reading.set_position(bytes))?;
+        let contents = self.read(|bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let Contents { software, mut recording, outputs, publishing, damages } = contents;
-        let contours = self.prepare(&mut recording)?;
+        let contours = self.prepare(&mut recording, &outputs)?;
         let replay = self.replay(&recording, contours.as_ref())?;
         let comparisons = if self.is_as_recorded() {
             Comparisons::of(&outputs, &publishing, &recording, &replay)
@@ -153,9 +159,16 @@ impl Replay {
         Ok(())
     }
 
-    /// Whether nothing is changed of what the log says.
+    fn read(&self, progress: impl FnMut(u64)) -> anyhow::Result<Contents> {
+        let Some(like) = &self.like else { return Ok(log::read_contents(&self.log, progress)?) };
+        let like = like::drive_like(Some(like))?;
+        Ok(log::read_part(&self.log, &like, progress)?)
+    }
+
+    /// Whether nothing is changed of what the log says. What a vehicle knew before a part of a log is not known.
     fn is_as_recorded(&self) -> bool {
         self.map.is_empty()
+            && self.like.is_none()
             && self.landmarks.is_empty()
             && self.start.is_none()
             && self.vehicle.is_none()
@@ -164,11 +177,11 @@ impl Replay {
     }
 
     /// Changes what the log says to what is wanted. A map of contours is given back.
-    fn prepare(&self, recording: &mut Recording) -> anyhow::Result<Option<ContourMap>> {
+    fn prepare(&self, recording: &mut Recording, answers: &[RecordedOutput]) -> anyhow::Result<Option<ContourMap>> {
         let of_log = || self.log.display().to_string();
         self.relocalisation.apply(recording).with_context(of_log)?;
         if let Some(start) = self.start {
-            set_start(recording, start).with_context(of_log)?;
+            set_start(recording, answers, start).with_context(of_log)?;
         }
         self.settings.apply(&mut recording.parameters)?;
         if let Some(path) = &self.vehicle {
@@ -244,8 +257,10 @@ impl Replay {
 
     /// What there is to say about the log itself.
     fn remarks(&self, software: &str, comparisons: &Comparisons, damages: &[Damage]) -> Vec<[String; 2]> {
-        let mut rows =
-            vec![["log".to_owned(), self.log.display().to_string()], ["written by".to_owned(), software.to_owned()]];
+        let mut rows = vec![["log".to_owned(), self.log.display().to_string()]];
+        // A part of a log does not tell it.
+        rows.extend((!software.is_empty()).then(|| ["written by".to_owned(), software.to_owned()]));
+        rows.extend(self.like.iter().map(|path| ["vehicle and map of".to_owned(), path.display().to_string()]));
         rows.extend(self.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
         for map in &self.map {
             rows.push(["map".to_owned(), map.display().to_string()]);
@@ -267,8 +282,15 @@ const STATED_DEVIATIONS: (f64, f64) = (0.3, 5.0 * std::f64::consts::PI / 180.0);
 const RECORDED_DEVIATIONS: (f64, f64) = (0.05, 1.0 * std::f64::consts::PI / 180.0);
 
 /// Puts a start pose before all events; other poses that the log gives stay.
-fn set_start(recording: &mut Recording, start: Start) -> anyhow::Result<()> {
-    let known = || recording.truth.first().copied().or_else(|| recording.referenced_poses().first().copied());
+fn set_start(recording: &mut Recording, answers: &[RecordedOutput], start: Start) -> anyhow::Result<()> {
+    let answer = || {
+        let is_known = |answer: &&RecordedOutput| !matches!(answer.pose.mode, Mode::NotLocalised | Mode::Lost);
+        answers.iter().find(is_known).map(|RecordedOutput { pose, .. }| Truth { time: pose.time, pose: pose.pose })
+    };
+    let known = || {
+        let true_one = recording.truth.first().copied();
+        true_one.or_else(|| recording.referenced_poses().first().copied()).or_else(answer)
+    };
     let (time, pose, (position_deviation, heading_deviation)) = match start {
         Start::Given(pose) => {
             let first = recording.events.iter().filter_map(RecordedEvent::time).min();

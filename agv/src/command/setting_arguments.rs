@@ -1,10 +1,12 @@
 //! Settings on a command line.
 
 use agv_core::localizer::Parameters;
+use agv_host_sim::setting_doubts::doubt;
 use agv_settings::Settings;
-use agv_settings::leaf::LeafError;
+use agv_settings::leaf::{Leaf, LeafError, Value};
 use anyhow::{Context, bail};
 
+use super::output::note;
 use super::setting_text::{named, parse_value, show_number};
 
 /// Options of the commands that take settings.
@@ -31,10 +33,18 @@ impl SettingArguments {
         self.set.iter().try_for_each(|text| change(settings, text))
     }
 
-    /// Changes what the localiser believes.
+    /// Changes what the localiser believes, and asks about values that hardly a vehicle has.
     pub fn apply(&self, parameters: &mut Parameters) -> anyhow::Result<()> {
         let mut settings = Settings::of(*parameters);
         self.change(&mut settings)?;
+        let names = self.set.iter().filter_map(|text| Leaf::named(text.split_once('=')?.0));
+        for leaf in names {
+            if let Some(Value::Number(value)) = leaf.get(&settings)
+                && let Some(doubt) = doubt(leaf.name, value)
+            {
+                note(&format!("agv: {doubt}"));
+            }
+        }
         settings.parameters.check()?;
         *parameters = settings.parameters;
         Ok(())

@@ -2,6 +2,7 @@
 
 mod capture;
 pub mod commands;
+mod hostile;
 mod layout;
 mod live;
 mod minute;

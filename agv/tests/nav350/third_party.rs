@@ -138,6 +138,8 @@ fn a_client_that_reads_answers_one_by_one_finds_them_apart() {
         let heard = line.hear(0.2);
         let fields: Vec<&str> = heard.trim_matches(['\x02', '\x03']).split(' ').collect();
         assert!(fields.len() > 16, "{heard}");
+        // As the format of poses was set.
+        assert_eq!(number(fields[11]), 1, "{heard}");
         modes.push((number(fields[14]), number(fields[16])));
     }
     // By few reflectors a pose does not rest on reflectors alone.
@@ -304,6 +306,44 @@ fn mapping_takes_as_many_turns_as_it_is_told_and_answers_in_the_layout() {
         // In the frame of the sensor they would be metres away.
         assert!(errors.len() >= 3 && errors.iter().all(|error| *error < 0.1), "{errors:?}");
     }
+}
+
+#[test]
+fn reflectors_are_told_by_their_names_in_the_layout() {
+    use agv_wire::nav350::{CoordinateFormat, DataMask, LandmarkDataFormat, NavigationData, Setting};
+    let mut line = Line::new(0.0);
+    let layout = line.sensor.layout().to_vec();
+    asked(&mut line, &Request::Call(Method::SetAccessMode { level: 3, password: 0xF472_4744 }), |_| ());
+    asked(&mut line, &Request::Call(Method::ChangeState(OperatingMode::Navigation)), |_| ());
+    let format = LandmarkDataFormat { coordinates: CoordinateFormat::Cartesian, has_details: true, filter: 0 };
+    asked(&mut line, &Request::Write(Setting::LandmarkDataFormat(format)), |_| ());
+    let mut named = 0;
+    for _ in 0..10 {
+        line.wait(0.5);
+        let question = Request::Call(Method::GetData { wait: false, mask: DataMask::PoseAndReflectors });
+        asked(&mut line, &question, |answer| {
+            let Answer::Result(MethodResult::Data(data)) = answer else { panic!("{answer:?}") };
+            let NavigationData { pose: Some(pose), reflectors: Some(list), .. } = data else { return };
+            let (sine, cosine) = pose.heading.radians().sin_cos();
+            for reflector in list.reflectors.iter() {
+                let (x, y) = reflector.cartesian.unwrap();
+                let (x, y) = (x.metres(), y.metres());
+                let place = [pose.x.metres() + cosine * x - sine * y, pose.y.metres() + sine * x + cosine * y];
+                let distance = |known: &agv_wire::nav350::IdentifiedLandmark| {
+                    (known.landmark.x.metres() - place[0]).hypot(known.landmark.y.metres() - place[1])
+                };
+                let name = reflector.details.unwrap().global_id;
+                let Some(known) = layout.iter().find(|known| known.id == name) else {
+                    assert_eq!(name, u16::MAX);
+                    continue;
+                };
+                // The vehicle has moved on since it was seen.
+                assert!(distance(known) < 0.4 && layout.iter().all(|other| distance(known) <= distance(other)));
+                named += 1;
+            }
+        });
+    }
+    assert!(named > 5, "{named}");
 }
 
 #[test]

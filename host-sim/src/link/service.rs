@@ -42,6 +42,16 @@ pub enum ServiceError {
         /// Its version.
         version: u16,
     },
+    /// It gives another map than it says.
+    #[error("{host}: the map has {count} landmarks, and {got} came")]
+    Map {
+        /// The controller.
+        host: String,
+        /// Landmarks of its map, as it says.
+        count: usize,
+        /// Landmarks that came.
+        got: usize,
+    },
     /// It refuses.
     #[error("{}", explain(*.0))]
     Refused(Refusal),
@@ -236,20 +246,23 @@ impl Client {
     /// The map that the vehicle uses.
     ///
     /// # Errors
-    /// If it does not answer.
+    /// If it does not answer, or gives another number of landmarks than it says.
     pub fn download_map(&mut self) -> Result<Vec<Landmark>, ServiceError> {
         let mut landmarks: Vec<Landmark> = Vec::new();
         loop {
             let first = landmarks.len() as u16;
-            let is_end = self.ask(&Request::Map(first), |response| match response {
+            let (count, is_last) = self.ask(&Request::Map(first), |response| match response {
                 Response::Map { count, piece } => {
                     landmarks.extend(piece);
-                    Some(piece.is_empty() || landmarks.len() >= usize::from(*count))
+                    Some((usize::from(*count), piece.is_empty()))
                 }
                 _ => None,
             })?;
-            if is_end {
+            if landmarks.len() == count {
                 return Ok(landmarks);
+            }
+            if is_last || landmarks.len() > count {
+                return Err(ServiceError::Map { host: self.host.clone(), count, got: landmarks.len() });
             }
         }
     }

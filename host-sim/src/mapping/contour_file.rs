@@ -15,6 +15,7 @@ use std::path::Path;
 use agv_core::geometry::Point;
 
 use super::contour_map::{ContourMap, MapPoint};
+use crate::output_file;
 use crate::text_file::{self, TextFileError};
 
 /// First line of every such map.
@@ -76,5 +77,5 @@ pub fn write(path: &Path, map: &ContourMap) -> Result<(), TextFileError> {
         }
         text.push('\n');
     }
-    std::fs::write(path, text).map_err(|source| TextFileError::Io { path: path.to_owned(), source })
+    output_file::write(path, text).map_err(|source| TextFileError::Io { path: path.to_owned(), source })
 }

@@ -15,6 +15,7 @@ pub mod reflector_detector;
 pub mod scenario;
 pub mod shape;
 pub mod speed_profile;
+pub mod standard;
 pub mod vehicle;
 pub mod warehouse_hall;
 pub mod world;

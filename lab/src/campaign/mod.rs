@@ -53,13 +53,8 @@ fn one() -> u64 {
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The file cannot be read.
-    #[error("the campaign {path} cannot be read")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
+    #[error("{0}")]
+    Read(std::io::Error),
     /// The text is not a campaign.
     #[error("this is not a campaign, line {line}: {problem}")]
     Parse {
@@ -136,8 +131,7 @@ impl Campaign {
     /// # Errors
     /// See [`CampaignError`].
     pub fn read(path: &Path) -> Result<(Self, Scenario), CampaignError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| CampaignError::Read { path: path.to_path_buf(), source })?;
+        let text = std::fs::read_to_string(path).map_err(CampaignError::Read)?;
         let campaign: Self = toml::from_str(&text).map_err(|error| {
             let (line, problem) = toml_complaint(&text, &error);
             CampaignError::Parse { line, problem }

@@ -15,10 +15,8 @@ use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::{Replay, ReplayError, replay};
 use agv_host_sim::report::{FigureError, Page, Series, Table};
 use agv_host_sim::simulate::scenario::{Scenario, ScenarioError};
+use agv_host_sim::simulate::standard::{BLOCK_STORAGE, MAPPING};
 use agv_host_sim::simulate::{SimulateError, simulate};
-
-const DRIVE: &str = include_str!("../../../host-sim/scenarios/block_storage_p1.toml");
-const MAPPING: &str = include_str!("../../../host-sim/scenarios/block_storage_mapping.toml");
 
 /// What the localiser may use in each replay of the drive; the last one uses everything.
 const METHODS: [(&str, MapUse); 5] = [
@@ -70,7 +68,7 @@ pub enum DemonstrationError {
 /// See [`DemonstrationError`].
 pub fn run(mut begin: impl FnMut(&'static str)) -> Result<Vec<LocalisedDrive>, DemonstrationError> {
     begin("simulating the drive");
-    let mut recording = simulate(&Scenario::parse(DRIVE)?)?.recording;
+    let mut recording = simulate(&Scenario::parse(BLOCK_STORAGE)?)?.recording;
     begin("simulating the drive for the map");
     let mut mapping = simulate(&Scenario::parse(MAPPING)?)?.recording;
     begin("mapping");

@@ -21,15 +21,17 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
         .arg("--file")
         .arg(&tar)
         .arg(name))?;
-    run(Command::new("gzip").args(["--no-name", "--best", "--force"]).arg(&tar))?;
+    run(Command::new("gzip").args(["--no-name", "--force"]).arg(&tar))?;
     let mut packed = tar.into_os_string();
     packed.push(".gz");
     Ok(packed.into())
 }
 
-/// Writes `SHA256SUMS` of all files below a folder, as `sha256sum --check` reads it.
-pub fn write_checksums(folder: &Path) -> anyhow::Result<()> {
-    let script = "find . -type f ! -name SHA256SUMS -print0 | LC_ALL=C sort -z | xargs -0 sha256sum";
-    let sums = output(Command::new("sh").arg("-c").arg(format!("cd '{}' && {script}", folder.display())))?;
+/// Writes `SHA256SUMS` of all files in a folder, and of those in folders below it down to `depth`, as `sha256sum --check`
+/// reads it.
+pub fn write_checksums(folder: &Path, depth: usize) -> anyhow::Result<()> {
+    let find = format!("find . -maxdepth {depth} -type f ! -name SHA256SUMS -print0");
+    let script = format!("cd '{}' && {find} | LC_ALL=C sort -z | xargs -0 sha256sum", folder.display());
+    let sums = output(Command::new("sh").arg("-c").arg(script))?;
     write(&folder.join("SHA256SUMS"), &sums)
 }

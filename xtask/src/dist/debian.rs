@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, bail};
+use object::{Object as _, ObjectSection as _};
 
-use super::{VERSION, copy, output, run, write};
+use super::{VERSION, output, run, write};
 
 /// Packs the tree of the archive as a package that installs below `/usr`.
 pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
@@ -22,15 +23,16 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
     let sums = usr.join("SHA256SUMS");
     std::fs::remove_file(&sums).with_context(|| sums.display().to_string())?;
     let doc = usr.join("share/doc/agv");
-    copy(&doc.join("LICENSE-MIT"), &doc.join("copyright"))?;
+    write(&doc.join("copyright"), copyright(&doc)?.as_bytes())?;
+    let libc = libc(&usr.join("bin/agv"))?;
     let folder = root.with_file_name("package");
     let size = output(Command::new("du").args(["--summarize", "--apparent-size", "--block-size=1024"]).arg(&usr))?;
     let size = String::from_utf8(size)?.split_whitespace().next().unwrap_or("0").to_owned();
-    write(&folder.join("DEBIAN/control"), control(architecture, &size).as_bytes())?;
+    write(&folder.join("DEBIAN/control"), control(architecture, &size, &libc).as_bytes())?;
     let package = root.with_file_name(format!("agv_{VERSION}_{architecture}.deb"));
     run(Command::new("chmod").args(["--recursive", "u+rwX,go+rX,go-w"]).arg(&folder))?;
     run(Command::new("dpkg-deb")
-        .args(["--root-owner-group", "-Zgzip", "--build"])
+        .args(["--root-owner-group", "-Zgzip", "-z6", "--build"])
         .arg(&folder)
         .arg(&package)
         .env("SOURCE_DATE_EPOCH", epoch))?;
@@ -38,10 +40,33 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
     Ok(package)
 }
 
-fn control(architecture: &str, size: &str) -> String {
+/// Who may do what with the package.
+fn copyright(doc: &Path) -> anyhow::Result<String> {
+    let read = |name: &str| std::fs::read_to_string(doc.join(name)).with_context(|| name.to_owned());
+    let [mit, apache] = [read("LICENSE-MIT")?, read("LICENSE-APACHE")?];
+    Ok(format!(
+        "Either of the two licences below, as you like. What the program is built on has the licences that stand in\n\
+         LICENSES-OF-OTHERS.\n\n{mit}\n{apache}"
+    ))
+}
+
+/// The version of the C library that a program asks for: its symbols have the names of the versions that brought them.
+fn libc(program: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(program).with_context(|| program.display().to_string())?;
+    let file = object::File::parse(&*bytes).with_context(|| program.display().to_string())?;
+    let names = file.section_by_name(".dynstr").context("the program has no names of symbols")?.data()?;
+    let names = names.split(|byte| *byte == 0).filter_map(|name| std::str::from_utf8(name).ok());
+    let version = |name: &str| -> Option<Vec<u32>> {
+        name.strip_prefix("GLIBC_")?.split('.').map(|number| number.parse().ok()).collect()
+    };
+    let newest = names.filter_map(version).max().context("the program asks for no version of the C library")?;
+    Ok(newest.iter().map(u32::to_string).collect::<Vec<_>>().join("."))
+}
+
+fn control(architecture: &str, size: &str, libc: &str) -> String {
     format!(
         "Package: agv\nVersion: {VERSION}\nArchitecture: {architecture}\nMaintainer: The project's builders <agv@localhost>\n\
-         Installed-Size: {size}\nDepends: libc6, libgcc-s1\nSection: science\nPriority: optional\n\
+         Installed-Size: {size}\nDepends: libc6 (>= {libc}), libgcc-s1\nSection: science\nPriority: optional\n\
          Description: Localisation of automated guided vehicles\n \
          Replays, simulates, calibrates and measures the localisation controller of an\n \
          automated guided vehicle, and speaks with its sensors and with the controller.\n"

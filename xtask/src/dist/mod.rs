@@ -3,6 +3,9 @@
 mod archive;
 mod book;
 mod debian;
+mod licences;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,6 +23,9 @@ pub struct Dist {
     without_firmware: bool,
 }
 
+/// Folders of the archive lie in each other less deep than that.
+const DEEPEST: usize = 16;
+
 /// Version of everything.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -30,31 +36,60 @@ impl Dist {
         if folder.exists() {
             std::fs::remove_dir_all(&folder).context("target/dist cannot be emptied")?;
         }
-        let root = folder.join(format!("agv-{VERSION}"));
-        program(&root)?;
-        documents(&root)?;
-        book::write(&repository().join("docs/src"), &root.join("share/doc/agv/book"))?;
+        let agv = build()?;
         if !self.without_firmware {
-            images(&root.join("share/agv/firmware"))?;
+            firmware::build()?;
         }
-        archive::write_checksums(&root)?;
-        let epoch = epoch()?;
-        let archive = archive::pack(&root, &epoch)?;
-        let package = debian::pack(&root, &epoch)?;
-        for path in [archive, package] {
+        let texts = licences::of_program()?;
+        for path in pack(&folder, &Parts { agv, has_firmware: !self.without_firmware, texts }, &epoch()?)? {
             println!("{}", path.display());
         }
-        archive::write_checksums(&folder)
+        Ok(())
     }
 }
 
-/// The command, with what a shell and `man` know of it.
-fn program(root: &Path) -> anyhow::Result<()> {
-    let cargo = std::env::var_os("CARGO").map_or_else(|| PathBuf::from("cargo"), PathBuf::from);
-    run(Command::new(cargo).args(["build", "--release", "--package", "agv", "--features", "full"]))?;
+/// What was built, and goes into the archive.
+struct Parts {
+    /// The command.
+    agv: PathBuf,
+    /// Whether the images of the boards are packed, too.
+    has_firmware: bool,
+    /// The licences of what the command is built on.
+    texts: String,
+}
+
+/// Packs the archive and the Debian package into a folder, with their checksums. Nothing is built.
+fn pack(folder: &Path, parts: &Parts, epoch: &str) -> anyhow::Result<[PathBuf; 2]> {
+    let root = folder.join(format!("agv-{VERSION}"));
+    program(&root, &parts.agv)?;
+    documents(&root)?;
+    write(&root.join("share/doc/agv/LICENSES-OF-OTHERS"), parts.texts.as_bytes())?;
+    book::write(&repository().join("docs/src"), &root.join("share/doc/agv/book"))?;
+    if parts.has_firmware {
+        images(&root.join("share/agv/firmware"))?;
+    }
+    archive::write_checksums(&root, DEEPEST)?;
+    let packed = [archive::pack(&root, epoch)?, debian::pack(&root, epoch)?];
+    // Who has the two files has not what they were packed from.
+    archive::write_checksums(folder, 1)?;
+    Ok(packed)
+}
+
+/// Builds the command; gives its file.
+fn build() -> anyhow::Result<PathBuf> {
+    run(cargo().args(["build", "--release", "--package", "agv", "--features", "full"]))?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| repository().join("target"), PathBuf::from);
+    Ok(target.join("release/agv"))
+}
+
+fn cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").map_or_else(|| PathBuf::from("cargo"), PathBuf::from))
+}
+
+/// The command, with what a shell and `man` know of it.
+fn program(root: &Path, built: &Path) -> anyhow::Result<()> {
     let agv = root.join("bin/agv");
-    copy(&target.join("release/agv"), &agv)?;
+    copy(built, &agv)?;
     run(Command::new("strip").arg(&agv))?;
     for (shell, place) in [
         ("bash", "share/bash-completion/completions/agv"),
@@ -81,7 +116,6 @@ fn documents(root: &Path) -> anyhow::Result<()> {
 
 /// The vehicle's image of each board, and the map of its memory.
 fn images(folder: &Path) -> anyhow::Result<()> {
-    firmware::build()?;
     for board in BOARDS {
         copy(&board.image("vehicle")?, &folder.join(board.feature).join("vehicle.elf"))?;
         // As the firmware's build script chooses it.

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use agv_host_sim::output_file;
 use agv_lab::evaluate::windows::{TRAJECTORY_HEADER, WindowPose};
 use anyhow::Context;
 
@@ -12,5 +13,5 @@ pub fn write(path: &Path, poses: &[WindowPose]) -> anyhow::Result<()> {
     for pose in poses {
         let _ = writeln!(text, "{pose}");
     }
-    std::fs::write(path, text).with_context(|| path.display().to_string())
+    output_file::write(path, text).with_context(|| path.display().to_string())
 }
