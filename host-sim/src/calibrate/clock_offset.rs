@@ -63,8 +63,7 @@ pub fn clock_offset(input: &LogInput) -> Option<ClockOffset> {
     }
     let cost = |late: f64| mean(&pairs, |first, second| difference(&path, first, second, late).min(MOST).powi(2));
     let steps = (FARTHEST / STRIDE).round() as i32;
-    let coarse =
-        (-steps..=steps).map(|step| f64::from(step) * STRIDE).min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
+    let coarse = (-steps..=steps).map(|step| f64::from(step) * STRIDE).min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
     // The cost is a parabola near its least.
     let [before, at, after] = [coarse - STRIDE, coarse, coarse + STRIDE].map(cost);
     let curvature = (before + after - 2.0 * at) / (2.0 * STRIDE * STRIDE);

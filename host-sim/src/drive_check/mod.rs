@@ -1,5 +1,6 @@
 //! What is wrong with a drive that is lost or poor, and what to do next: findings in the order in which they are to be looked at.
 
+mod calibration;
 mod timing;
 
 use agv_core::localizer::Mode;
@@ -68,6 +69,11 @@ pub fn check(recording: &Recording, figures: &Figures, log: &str, progress: impl
         findings.push(mistakes(&explanations, log));
     }
     if clock.is_some() || (!is_sound && !explanations.is_empty()) {
+        return findings;
+    }
+    let is_too_sure = figures.innovations.iter().any(|seen| 0.5 * seen.mean_normalised_square > *HONEST.end());
+    if let Some(finding) = calibration::finding(&input, log).filter(|_| is_poor || is_too_sure) {
+        findings.push(finding);
         return findings;
     }
     if is_poor {

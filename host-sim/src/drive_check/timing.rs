@@ -41,7 +41,9 @@ pub(super) fn finding(offset: &ClockOffset, log: &str) -> Finding {
     let side = if offset.late > 0.0 { "late" } else { "early" };
     Finding::new(
         format!("the laser's times are {late:.0} ms too {side} for the encoders, give or take {deviation:.1} ms"),
-        format!("look at what gives them their times; this log can be mended: agv check {log} --put-right mended.agvlog"),
+        format!(
+            "look at what gives them their times; this log can be mended: agv check {log} --put-right mended.agvlog"
+        ),
     )
 }
 

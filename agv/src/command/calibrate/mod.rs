@@ -9,9 +9,9 @@ use std::path::PathBuf;
 use agv_core::calibration::{MountingSide, Offsets};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::odometry::Vehicle;
-use agv_host_sim::calibrate::causes::{Explanation, TRIES, differences, explain};
+use agv_host_sim::calibrate::causes::{Explanation, QUESTIONS, TRIES, differences, explain};
 use agv_host_sim::calibrate::drive::{Drive, Preparation};
-use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find};
+use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find, find_any};
 use agv_host_sim::calibrate::log_input::LogInput;
 use agv_host_sim::calibrate::mending::mended;
 use agv_host_sim::calibrate::model::PARAMETERS;
@@ -293,15 +293,17 @@ impl Calibrate {
         let Some((explanation, right)) = mended.filter(|_| self.mend) else {
             return Err(explained(&refusal, &explanations));
         };
-        let (found, mut drive) =
-            attempt(&right, preparation).map_err(|again: Refusal| explained(&again, &explanations))?;
+        // What explains the drive was found by one of these questions.
+        let asked: Vec<Question> = std::iter::once(self.question()).chain(QUESTIONS).collect();
+        let again = Drive::new(&right, preparation).and_then(|drive| find_any(drive, &asked));
+        let (found, mut drive) = again.map_err(|again| explained(&again, &explanations))?;
         drive.remarks.push(format!("{explanation}: mended"));
         Ok((found, drive))
     }
 
     /// What a result says that is no adjustment any more.
     fn differences(&self, drive: &Drive, found: &Found) -> Vec<String> {
-        let causes = differences(found, &drive.nominal);
+        let causes = differences(found, &drive.nominal, drive.is_from_stops());
         let mut remarks: Vec<String> = causes.iter().map(ToString::to_string).collect();
         let [wheelbase, deviation] = found.suggested_wheelbase;
         let stretch = (wheelbase - found.model.wheelbase).abs();
