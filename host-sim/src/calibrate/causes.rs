@@ -81,6 +81,17 @@ impl Cause {
         if matches!(self, Self::LaserPlace(..)) { 2 } else { 1 }
     }
 
+    /// Whether a parameter of the vehicle mends it. Of an offset of half a turn none does: the readings jump where the wheel looks
+    /// ahead, and the localiser takes the mean of two readings in a row.
+    #[must_use]
+    pub fn is_parameter(&self) -> bool {
+        match self {
+            Self::EncodersSwapped | Self::FewReflectors(_) => false,
+            Self::SteeringOffset(offset) => offset.abs() < HALF_TURN,
+            _ => true,
+        }
+    }
+
     /// Whether both say the same, as far as a drive tells it.
     fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
@@ -123,8 +134,7 @@ impl Explanation {
     /// Whether parameters of the vehicle mend it.
     #[must_use]
     pub fn is_mendable(&self) -> bool {
-        let is_parameter = |cause: &Cause| !matches!(cause, Cause::EncodersSwapped | Cause::FewReflectors(_));
-        !self.causes.is_empty() && self.causes.iter().all(is_parameter)
+        !self.causes.is_empty() && self.causes.iter().all(Cause::is_parameter)
     }
 
     /// What to do about it, with commands that name the log so.
@@ -136,8 +146,10 @@ impl Explanation {
         } else if has(|cause| matches!(cause, Cause::EncodersSwapped)) {
             "exchange the plugs, or what agv ctl HOST set can.drive_node and can.steering_node say; drive and check again"
                 .to_owned()
-        } else {
+        } else if self.is_mendable() {
             format!("agv calibrate {log} --mend --apply vehicle.toml")
+        } else {
+            "turn the steering encoder by half a turn, or preset it (object 6003h); drive and check again".to_owned()
         }
     }
 }
@@ -153,7 +165,9 @@ const WHEELBASE: f64 = 0.003;
 /// The same of the steering offset, rad.
 const STEERING: f64 = PI / 180.0;
 /// All of them for a day's drive, in which slip and drift of the heading are mistaken for them.
-const ROUGH: [f64; 4] = [1.5 * PI / 180.0, 0.12, 0.06, 2.0 * PI / 180.0];
+const ROUGH: [f64; 4] = [PI / 180.0, 0.08, 0.012, 1.5 * PI / 180.0];
+/// Offsets of the steering beyond it are half a turn, rad.
+const HALF_TURN: f64 = 0.75 * PI;
 /// Angles that differ by less are one mistake, rad.
 const SAME_ANGLE: f64 = 0.1;
 /// In standard deviations.

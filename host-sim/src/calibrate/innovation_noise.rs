@@ -10,6 +10,7 @@
 use agv_core::localizer::{LandmarkUse, Parameters, bounds};
 use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::Time;
+use agv_core::odometry::OdometryNoise;
 
 use crate::drive::KINDS;
 use crate::recording::{RecordedEvent, Recording};
@@ -96,18 +97,20 @@ enum Knob {
 }
 
 /// Steps of the search, in powers of e, and how often each goes round at most.
-const STEPS_OF_SEARCH: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
+const STEPS_OF_SEARCH: [f64; 3] = [1.0, 0.3, 0.1];
 const ROUNDS: usize = 5;
 /// Steps that [`find`] tells.
-pub const STEPS: usize = STEPS_OF_SEARCH.len() * ROUNDS;
+pub const STEPS: usize = (STEPS_OF_SEARCH.len() + 1) * ROUNDS;
 /// A change that gains less than this share of the observations is none.
 const GAIN: f64 = 1e-4;
 /// Squares of a component beyond this cost no more: that was something else.
 const FARTHEST_SQUARE: f64 = 16.0;
-/// What was nothing cannot grow by a factor.
+/// Least of what is changed, in the unit of each.
 const LEAST: f64 = 1e-4;
 /// Factors of what the map states. What the drive from which a map was made shares with it does not show in its innovations.
-const MAP: [f64; 2] = [0.25, 4.0];
+const MAP: [f64; 2] = [0.1, 4.0];
+/// What an observation costs that is no longer compared with anything: too small a noise must not win by losing the vehicle.
+const MISSING: f64 = 20.0;
 
 /// Finds the noise of every kind that the drive has seen often enough. `progress` is called with the rounds done, of [`STEPS`].
 ///
@@ -157,23 +160,50 @@ pub fn find(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<No
     Ok(Noise { kinds, settings: settings.collect(), map: map.collect(), recording: right })
 }
 
+/// Odometry beside which what is seen is weighed: noise a sample, and noise of the way.
+const ODOMETRY: [&str; 5] =
+    ["odometry.speed_deviation", "odometry.steering_deviation", "odometry.slip", "odometry.side_slip", "odometry.yaw"];
+
 fn knobs(seen: &[(LandmarkKind, usize)]) -> Vec<Knob> {
     let has = |wanted| seen.iter().any(|(kind, _)| *kind == wanted);
-    let mut knobs = Vec::new();
+    // What the map shares between sightings comes first: else the sensor is told the map's noise.
+    let mut knobs = vec![Knob::Setting("association.shared_map_error")];
     if has(LandmarkKind::Reflector) {
         knobs.extend(["reflectors.range_deviation", "reflectors.bearing_deviation"].map(Knob::Setting));
     }
-    knobs.push(Knob::Setting("association.shared_map_error"));
-    let features = [LandmarkKind::Corner, LandmarkKind::EndPoint].into_iter().filter(|kind| has(*kind));
-    let features: Vec<Knob> = features.map(Knob::Map).collect();
-    if !features.is_empty() {
+    if has(LandmarkKind::Corner) || has(LandmarkKind::EndPoint) {
         knobs.push(Knob::Setting("features.added_deviation"));
     }
-    knobs.extend(features);
+    knobs.extend(seen.iter().map(|(kind, _)| Knob::Map(*kind)));
+    knobs.extend(ODOMETRY.map(Knob::Setting));
     knobs
 }
 
-/// Goes along one axis after the other as long as it gains.
+/// Where else the search begins: odometry that errs with the way and hardly with time, and a map that agrees with itself better than
+/// it states, as one does that was surveyed as a whole.
+fn of_the_way(first: &Recording, knobs: &[Knob]) -> Vec<f64> {
+    let power = |knob: &Knob| {
+        let wanted = match knob {
+            Knob::Map(_) => 0.2_f64.ln(),
+            Knob::Setting(name) => {
+                let now = begin(&first.parameters, name);
+                let to = match *name {
+                    "odometry.speed_deviation" | "odometry.steering_deviation" => 0.1 * now,
+                    "odometry.slip" => 0.1,
+                    "odometry.side_slip" => 0.05,
+                    "odometry.yaw" => 0.02,
+                    "association.shared_map_error" => 1.0,
+                    _ => 0.4 * now,
+                };
+                (to / now).ln()
+            }
+        };
+        within(first, *knob, wanted)
+    };
+    knobs.iter().map(power).collect()
+}
+
+/// The powers under which the innovations are most likely.
 fn search(
     first: &Recording,
     seen: &[(LandmarkKind, usize)],
@@ -181,34 +211,63 @@ fn search(
     progress: &mut impl FnMut(usize),
 ) -> Result<Vec<f64>, NoiseError> {
     let least_gain = GAIN * seen.iter().map(|(_, count)| *count as f64).sum::<f64>();
-    let mut powers = vec![0.0; knobs.len()];
-    let mut best = cost(&told(first, knobs, &powers), seen)?;
-    for (index, step) in STEPS_OF_SEARCH.into_iter().enumerate() {
-        for round in 0..ROUNDS {
-            progress(index * ROUNDS + round);
-            let begun = best;
-            for axis in 0..knobs.len() {
+    let mut starts = Vec::new();
+    for powers in [vec![0.0; knobs.len()], of_the_way(first, knobs)] {
+        let cost = cost(&told(first, knobs, &powers), seen)?;
+        let search = Search { first, seen, knobs, least_gain, powers, cost };
+        starts.push(search.with_step(STEPS_OF_SEARCH[0])?);
+        progress(starts.len() * ROUNDS);
+    }
+    starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let mut best = starts.swap_remove(0);
+    for (index, step) in STEPS_OF_SEARCH.into_iter().enumerate().skip(1) {
+        best = best.with_step(step)?;
+        progress((index + 2) * ROUNDS);
+    }
+    Ok(best.powers)
+}
+
+/// A place on the way to the least cost.
+struct Search<'a> {
+    first: &'a Recording,
+    seen: &'a [(LandmarkKind, usize)],
+    knobs: &'a [Knob],
+    least_gain: f64,
+    powers: Vec<f64>,
+    cost: f64,
+}
+
+impl Search<'_> {
+    /// Goes along one axis after the other as long as it gains.
+    fn with_step(mut self, step: f64) -> Result<Self, ReplayError> {
+        for _ in 0..ROUNDS {
+            let begun = self.cost;
+            for axis in 0..self.knobs.len() {
                 for sign in [-1.0, 1.0] {
-                    loop {
-                        let mut tried = powers.clone();
-                        tried[axis] = within(first, knobs[axis], powers[axis] + sign * step);
-                        if tried[axis] == powers[axis] {
-                            break;
-                        }
-                        let found = cost(&told(first, knobs, &tried), seen)?;
-                        if found > best - least_gain {
-                            break;
-                        }
-                        (best, powers) = (found, tried);
-                    }
+                    while self.moves(axis, sign * step)? {}
                 }
             }
-            if best > begun - least_gain {
+            if self.cost > begun - self.least_gain {
                 break;
             }
         }
+        Ok(self)
     }
-    Ok(powers)
+
+    /// Takes one step if it gains.
+    fn moves(&mut self, axis: usize, step: f64) -> Result<bool, ReplayError> {
+        let mut tried = self.powers.clone();
+        tried[axis] = within(self.first, self.knobs[axis], self.powers[axis] + step);
+        if tried[axis] == self.powers[axis] {
+            return Ok(false);
+        }
+        let found = cost(&told(self.first, self.knobs, &tried), self.seen)?;
+        let gains = found < self.cost - self.least_gain;
+        if gains {
+            (self.cost, self.powers) = (found, tried);
+        }
+        Ok(gains)
+    }
 }
 
 /// A power that leaves what it changes within its bounds.
@@ -217,7 +276,7 @@ fn within(recording: &Recording, knob: Knob, power: f64) -> f64 {
         Knob::Map(_) => (MAP[0].ln(), MAP[1].ln()),
         Knob::Setting(name) => {
             let (least, most) = bounds(name).unwrap_or((LEAST, f64::INFINITY));
-            let now = value(&recording.parameters, name).max(LEAST);
+            let now = begin(&recording.parameters, name);
             ((least.max(LEAST) / now).ln(), (most / now).ln())
         }
     };
@@ -230,7 +289,7 @@ fn told(recording: &Recording, knobs: &[Knob], powers: &[f64]) -> Recording {
     for (knob, power) in knobs.iter().zip(powers) {
         match knob {
             Knob::Setting(name) => {
-                let now = value(&recording.parameters, name).max(LEAST);
+                let now = begin(&recording.parameters, name);
                 if let Some(place) = place(&mut changed.parameters, name) {
                     *place = now * power.exp();
                 }
@@ -283,7 +342,9 @@ fn cost(recording: &Recording, seen: &[(LandmarkKind, usize)]) -> Result<f64, Re
             .filter(|used| used.kind == *kind)
             .map(|used| of_component(used, 0) + of_component(used, 1))
             .collect();
-        if costs.is_empty() { f64::INFINITY } else { *count as f64 * costs.iter().sum::<f64>() / costs.len() as f64 }
+        let missing = MISSING * count.saturating_sub(costs.len()) as f64;
+        let mean = costs.iter().sum::<f64>() / costs.len().max(1) as f64;
+        *count as f64 * mean + missing
     };
     Ok(seen.iter().map(of_kind).sum())
 }
@@ -294,8 +355,20 @@ fn place<'a>(parameters: &'a mut Parameters, name: &str) -> Option<&'a mut f64> 
         "reflectors.bearing_deviation" => Some(&mut parameters.reflectors.bearing_deviation),
         "features.added_deviation" => Some(&mut parameters.features.added_deviation),
         "association.shared_map_error" => Some(&mut parameters.association.shared_map_error),
+        "odometry.speed_deviation" => Some(&mut parameters.odometry_noise.speed),
+        "odometry.steering_deviation" => Some(&mut parameters.odometry_noise.steering),
+        "odometry.slip" => Some(&mut parameters.odometry_noise.slip),
+        "odometry.side_slip" => Some(&mut parameters.odometry_noise.side_slip),
+        "odometry.yaw" => Some(&mut parameters.odometry_noise.yaw),
         _ => None,
     }
+}
+
+/// From what a setting is changed: one that is nothing cannot grow by a factor.
+fn begin(parameters: &Parameters, name: &str) -> f64 {
+    let usual = Parameters { odometry_noise: OdometryNoise::default(), ..*parameters };
+    let least = if ODOMETRY.contains(&name) { 0.1 * value(&usual, name) } else { LEAST };
+    value(parameters, name).max(least).max(LEAST)
 }
 
 fn value(parameters: &Parameters, name: &str) -> f64 {

@@ -12,6 +12,9 @@ use super::log_input::LogInput;
 pub fn mended(input: &LogInput, explanation: &Explanation) -> Option<LogInput> {
     let mut right = input.clone();
     let Vehicle::Tricycle(tricycle) = &mut right.parameters.vehicle else { return None };
+    if !explanation.is_mendable() {
+        return None;
+    }
     let laser = right.parameters.lasers.first_mut();
     for cause in &explanation.causes {
         match *cause {
@@ -27,8 +30,8 @@ pub fn mended(input: &LogInput, explanation: &Explanation) -> Option<LogInput> {
                 laser.x += ahead;
                 laser.y += left;
             }
-            Cause::EncodersSwapped | Cause::FewReflectors(_) => return None,
+            Cause::EncodersSwapped | Cause::FewReflectors(_) => {}
         }
     }
-    (!explanation.causes.is_empty()).then_some(right)
+    Some(right)
 }
