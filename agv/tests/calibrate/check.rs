@@ -276,3 +276,42 @@ fn a_wrong_clock_is_named_and_put_right() {
         }
     }
 }
+
+#[test]
+fn noise_and_the_map_of_another_place_are_named() {
+    let files = Files::new();
+    let noises = [
+        Planted {
+            name: "too little noise is told",
+            recording: |drive| drive.parameters.reflectors.range_deviation = 2e-3,
+            named: &["innovations are not what the filter expects"],
+            ..NONE
+        },
+        Planted {
+            name: "too much noise is told",
+            recording: |drive| drive.parameters.reflectors.range_deviation = 5e-2,
+            named: &["innovations are not what the filter expects"],
+            ..NONE
+        },
+    ];
+    for planted in &noises {
+        let log = drive(&files, HALL, planted);
+        let [_, next] = finding(&files, &log, planted);
+        follow(&files, &format!("{next} --output measured.agvlog"));
+        // What was mended is not complained of again.
+        assert_eq!(findings(&files, "measured.agvlog"), Vec::<[String; 2]>::new(), "{}", planted.name);
+    }
+    let elsewhere = Planted {
+        name: "elsewhere",
+        recording: |drive| {
+            let mut scenario = Scenario::parse(HALL).unwrap();
+            (scenario.seed, scenario.laser.scans) = (7, false);
+            drive.landmarks = simulate(&scenario).unwrap().recording.landmarks;
+        },
+        named: &["map of another place"],
+        ..NONE
+    };
+    let log = drive(&files, HALL, &elsewhere);
+    let found = findings(&files, &log);
+    assert!(found.iter().any(|[what, _]| what.contains(elsewhere.named[0])), "{found:?}");
+}

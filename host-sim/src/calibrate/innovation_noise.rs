@@ -1,5 +1,5 @@
-//! The noise of what is seen, from the innovations of a drive: what the filter is told is changed until the innovations of the
-//! first half of the drive are most likely under it, and is then held against the second half.
+//! The noise of what is seen, from the innovations of a drive: what the filter is told is changed until the innovations of
+//! one half of the drive are most likely under it, and is then held against the other half.
 //!
 //! The mean of the normalised squared innovation of two components is 2 if the noise is right (Bar-Shalom, Li, Kirubarajan,
 //! Estimation with Applications to Tracking and Navigation, 5.4.2); here it is stated for one degree of freedom. What is fitted is
@@ -41,16 +41,16 @@ pub struct Changed {
 pub struct KindNoise {
     /// Of what.
     pub kind: LandmarkKind,
-    /// First half, as the log was.
+    /// The fitted half, as the log was.
     pub before: Squares,
-    /// First half, with what was found.
+    /// The same with what was found.
     pub after: Squares,
-    /// Second half, with what was found: it had no part in it.
+    /// The other half, with what was found: it had no part in it.
     pub check: Squares,
 }
 
 impl KindNoise {
-    /// Whether the second half agrees.
+    /// Whether the other half agrees.
     #[must_use]
     pub fn is_good(&self) -> bool {
         self.check.count >= FEWEST && HONEST.contains(&self.check.mean)
@@ -98,7 +98,7 @@ enum Knob {
 
 /// Steps of the search, in powers of e, and how often each goes round at most.
 const STEPS_OF_SEARCH: [f64; 3] = [1.0, 0.3, 0.1];
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 3;
 /// Steps that [`find`] tells.
 pub const STEPS: usize = (STEPS_OF_SEARCH.len() + 1) * ROUNDS;
 /// A change that gains less than this share of the observations is none.
@@ -108,7 +108,7 @@ const FARTHEST_SQUARE: f64 = 16.0;
 /// Least of what is changed, in the unit of each.
 const LEAST: f64 = 1e-4;
 /// Factors of what the map states. What the drive from which a map was made shares with it does not show in its innovations.
-const MAP: [f64; 2] = [0.1, 4.0];
+const MAP: [f64; 2] = [0.25, 4.0];
 /// What an observation costs that is no longer compared with anything: too small a noise must not win by losing the vehicle.
 const MISSING: f64 = 20.0;
 
@@ -117,31 +117,31 @@ const MISSING: f64 = 20.0;
 /// # Errors
 /// See [`NoiseError`].
 pub fn find(recording: &Recording, mut progress: impl FnMut(usize)) -> Result<Noise, NoiseError> {
-    let middle = middle(recording).ok_or(NoiseError::TooLittle)?;
-    let first = Recording { events: until(recording, middle), ..recording.clone() };
-    let uses = uses(&first)?;
-    let before = KINDS.map(|kind| squares(&uses, kind, &first.parameters));
+    let halves = Halves::of(recording).ok_or(NoiseError::TooLittle)?;
+    let all = uses(recording)?;
+    let squares_of = |uses: &[LandmarkUse], kind, is_fitted| {
+        let half: Vec<LandmarkUse> =
+            uses.iter().filter(|used| halves.is_fitted(used.time) == is_fitted).copied().collect();
+        squares(&half, kind, &recording.parameters)
+    };
     let seen: Vec<(LandmarkKind, usize)> = KINDS
         .into_iter()
-        .zip(before)
-        .filter(|(_, squares)| squares.count >= FEWEST)
-        .map(|(kind, all)| (kind, all.count))
+        .map(|kind| (kind, squares_of(&all, kind, true).count))
+        .filter(|(_, count)| *count >= FEWEST)
         .collect();
     if seen.is_empty() {
         return Err(NoiseError::TooLittle);
     }
     let knobs = knobs(&seen);
-    let powers = search(&first, &seen, &knobs, &mut progress)?;
+    let powers = search(recording, &halves, &seen, &knobs, &mut progress)?;
     let right = told(recording, &knobs, &powers);
-    let after = self::uses(&told(&first, &knobs, &powers))?;
-    let mut check = self::uses(&right)?;
-    check.retain(|used| used.time > middle);
+    let after = uses(&right)?;
     progress(STEPS);
     let kinds = seen.iter().map(|(kind, _)| KindNoise {
         kind: *kind,
-        before: squares(&uses, *kind, &recording.parameters),
-        after: squares(&after, *kind, &right.parameters),
-        check: squares(&check, *kind, &right.parameters),
+        before: squares_of(&all, *kind, true),
+        after: squares_of(&after, *kind, true),
+        check: squares_of(&after, *kind, false),
     });
     let kinds: Vec<KindNoise> = kinds.collect();
     if kinds.iter().any(|noise| noise.check.count < FEWEST) {
@@ -174,7 +174,8 @@ fn knobs(seen: &[(LandmarkKind, usize)]) -> Vec<Knob> {
     if has(LandmarkKind::Corner) || has(LandmarkKind::EndPoint) {
         knobs.push(Knob::Setting("features.added_deviation"));
     }
-    knobs.extend(seen.iter().map(|(kind, _)| Knob::Map(*kind)));
+    // Of reflectors a survey says it, and how far the pose may be off rests on that.
+    knobs.extend(seen.iter().filter(|(kind, _)| *kind != LandmarkKind::Reflector).map(|(kind, _)| Knob::Map(*kind)));
     knobs.extend(ODOMETRY.map(Knob::Setting));
     knobs
 }
@@ -206,6 +207,7 @@ fn of_the_way(first: &Recording, knobs: &[Knob]) -> Vec<f64> {
 /// The powers under which the innovations are most likely.
 fn search(
     first: &Recording,
+    halves: &Halves,
     seen: &[(LandmarkKind, usize)],
     knobs: &[Knob],
     progress: &mut impl FnMut(usize),
@@ -213,8 +215,8 @@ fn search(
     let least_gain = GAIN * seen.iter().map(|(_, count)| *count as f64).sum::<f64>();
     let mut starts = Vec::new();
     for powers in [vec![0.0; knobs.len()], of_the_way(first, knobs)] {
-        let cost = cost(&told(first, knobs, &powers), seen)?;
-        let search = Search { first, seen, knobs, least_gain, powers, cost };
+        let cost = cost(&told(first, knobs, &powers), halves, seen)?;
+        let search = Search { first, halves, seen, knobs, least_gain, powers, cost };
         starts.push(search.with_step(STEPS_OF_SEARCH[0])?);
         progress(starts.len() * ROUNDS);
     }
@@ -230,6 +232,7 @@ fn search(
 /// A place on the way to the least cost.
 struct Search<'a> {
     first: &'a Recording,
+    halves: &'a Halves,
     seen: &'a [(LandmarkKind, usize)],
     knobs: &'a [Knob],
     least_gain: f64,
@@ -261,7 +264,7 @@ impl Search<'_> {
         if tried[axis] == self.powers[axis] {
             return Ok(false);
         }
-        let found = cost(&told(self.first, self.knobs, &tried), self.seen)?;
+        let found = cost(&told(self.first, self.knobs, &tried), self.halves, self.seen)?;
         let gains = found < self.cost - self.least_gain;
         if gains {
             (self.cost, self.powers) = (found, tried);
@@ -303,17 +306,27 @@ fn told(recording: &Recording, knobs: &[Knob], powers: &[f64]) -> Recording {
     changed
 }
 
-/// When half of the drive is over.
-fn middle(recording: &Recording) -> Option<Time> {
-    let times = || recording.events.iter().filter_map(RecordedEvent::time);
-    let (first, last) = (times().min()?, times().max()?);
-    Some(first.offset(0.5 * last.since(first)))
+/// A drive in two halves: pieces of it in turn, as a drive is not the same from its beginning to its end.
+struct Halves {
+    begin: Time,
+    piece: f64,
 }
 
-fn until(recording: &Recording, end: Time) -> Vec<RecordedEvent> {
-    let is_before = |event: &&RecordedEvent| event.time().is_none_or(|time| time <= end);
-    recording.events.iter().filter(is_before).cloned().collect()
+impl Halves {
+    fn of(recording: &Recording) -> Option<Self> {
+        let times = || recording.events.iter().filter_map(RecordedEvent::time);
+        let (first, last) = (times().min()?, times().max()?);
+        Some(Self { begin: first, piece: (last.since(first) / f64::from(PIECES)).max(f64::MIN_POSITIVE) })
+    }
+
+    /// Whether what happens then is fitted, or else held against it.
+    fn is_fitted(&self, time: Time) -> bool {
+        (time.since(self.begin) / self.piece).floor() % 2.0 == 0.0
+    }
 }
+
+/// Pieces into which a drive is cut.
+const PIECES: u32 = 16;
 
 /// What was compared with a landmark, and is it or is too far from it.
 fn uses(recording: &Recording) -> Result<Vec<LandmarkUse>, ReplayError> {
@@ -330,8 +343,9 @@ fn squares(uses: &[LandmarkUse], kind: LandmarkKind, parameters: &Parameters) ->
 
 /// Twice the negative logarithm of the likelihood of the components, but for a constant. Each kind counts by how often it was seen
 /// at first: what is accepted changes with what is told.
-fn cost(recording: &Recording, seen: &[(LandmarkKind, usize)]) -> Result<f64, ReplayError> {
-    let uses = uses(recording)?;
+fn cost(recording: &Recording, halves: &Halves, seen: &[(LandmarkKind, usize)]) -> Result<f64, ReplayError> {
+    let mut uses = uses(recording)?;
+    uses.retain(|used| halves.is_fitted(used.time));
     let of_kind = |(kind, count): &(LandmarkKind, usize)| {
         let of_component = |used: &LandmarkUse, index: usize| {
             let deviation = used.residual_deviation[index].max(f64::MIN_POSITIVE);

@@ -152,7 +152,7 @@ fn place(recording: &Recording, log: &str) -> Option<Finding> {
     match find_start(&first) {
         Err(StartSearchError::Unknown) => Some(Finding::new(
             "no place of the map looks like what is seen: it is the map of another place, or the reflectors were moved",
-            format!("agv map {log} --output new.csv, and compare it with the map"),
+            format!("agv map {log} --output new.csv --kind reflectors --slam, then agv replay {log} --map new.csv"),
         )),
         Err(StartSearchError::Ambiguous) => Some(Finding::new(
             "two places of the map look like what is seen",

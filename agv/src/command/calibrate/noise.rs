@@ -14,9 +14,10 @@ use crate::command::progress;
 use crate::command::setting_arguments::SettingArguments;
 
 const HELP: &str = "\
-The noise is fitted on the first half of the drive and held against the second half. A squared innovation is stated by the one that
+The drive is cut into sixteen pieces. The noise is fitted on every other one and held against those between. A squared innovation is stated by the one that
 the filter expects, for one degree of freedom: 1 if the noise is right, less if the filter is told too much of it.
-Of natural features it is also found how exact the map is: a factor of the deviations that it states.
+What the map shares between sightings, how exact it is, and what the odometry does are found with it: each is told apart from the
+others by every sighting.
 
 Examples:
   agv calibrate noise drive.agvlog
@@ -82,7 +83,7 @@ impl Noise {
             println!("{:<32} {factor:.3} of what the map states", format!("deviation of {}", kind_name(*kind)));
         }
         for noise in found.kinds.iter().filter(|noise| !noise.is_good()) {
-            println!("{}: the second half of the drive disagrees", kind_name(noise.kind));
+            println!("{}: the other half of the drive disagrees", kind_name(noise.kind));
         }
         match &self.output {
             Some(path) => println!("next: agv accept {}", path.display()),
