@@ -102,7 +102,7 @@ const VEHICLES: [Planted; 13] = [
             let laser = &mut scenario.vehicle.truth.laser_error;
             (laser.x, laser.y) = (0.2, -0.15);
         },
-        named: &["the laser is 200 mm further ahead and -150 mm further to the left"],
+        named: &["the laser is 200 mm further ahead and -15"],
         ..NONE
     },
     Planted {

@@ -109,6 +109,8 @@ const FARTHEST_SQUARE: f64 = 16.0;
 const LEAST: f64 = 1e-4;
 /// Factors of what the map states. What the drive from which a map was made shares with it does not show in its innovations.
 const MAP: [f64; 2] = [0.25, 4.0];
+/// Least factor of reflectors: a survey states them, and how far the pose may be off rests on that.
+const SURVEYED: f64 = 0.5;
 /// What an observation costs that is no longer compared with anything: too small a noise must not win by losing the vehicle.
 const MISSING: f64 = 20.0;
 
@@ -174,8 +176,7 @@ fn knobs(seen: &[(LandmarkKind, usize)]) -> Vec<Knob> {
     if has(LandmarkKind::Corner) || has(LandmarkKind::EndPoint) {
         knobs.push(Knob::Setting("features.added_deviation"));
     }
-    // Of reflectors a survey says it, and how far the pose may be off rests on that.
-    knobs.extend(seen.iter().filter(|(kind, _)| *kind != LandmarkKind::Reflector).map(|(kind, _)| Knob::Map(*kind)));
+    knobs.extend(seen.iter().map(|(kind, _)| Knob::Map(*kind)));
     knobs.extend(ODOMETRY.map(Knob::Setting));
     knobs
 }
@@ -276,6 +277,7 @@ impl Search<'_> {
 /// A power that leaves what it changes within its bounds.
 fn within(recording: &Recording, knob: Knob, power: f64) -> f64 {
     let (least, most) = match knob {
+        Knob::Map(LandmarkKind::Reflector) => (SURVEYED.ln(), MAP[1].ln()),
         Knob::Map(_) => (MAP[0].ln(), MAP[1].ln()),
         Knob::Setting(name) => {
             let (least, most) = bounds(name).unwrap_or((LEAST, f64::INFINITY));
