@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use agv_host_sim::calibrate::causes::TRIES;
 use agv_host_sim::drive::{Figures, Track};
-use agv_host_sim::drive_check::{Finding, check, poor_share};
+use agv_host_sim::drive_check::{Finding, check, moved, poor_share};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::replay::replay;
 use anyhow::Context;
@@ -19,6 +19,7 @@ Looks at what is missing, at times, at the encoders and the laser against each o
 Examples:
   agv check drive.agvlog
   agv check drive.agvlog --json
+  agv check drive.agvlog --put-right mended.agvlog
 
 Keys of --json: poor_share, damage, findings [what, next].";
 
@@ -30,6 +31,9 @@ pub struct Check {
     log: PathBuf,
     #[command(flatten)]
     settings: SettingArguments,
+    /// Write the log with the laser's times moved to those of the encoders, if they are off; an older one is replaced.
+    #[arg(long, value_name = "LOG2")]
+    put_right: Option<PathBuf>,
     /// Print one JSON object instead of sentences.
     #[arg(long)]
     json: bool,
@@ -48,6 +52,13 @@ impl Check {
         let Contents { mut recording, damages, .. } = log::read_contents(&self.log, |_| ())?;
         self.settings.apply(&mut recording.parameters)?;
         let name = self.log.display().to_string();
+        if let Some(path) = &self.put_right {
+            let (right, offset) =
+                moved(&recording).with_context(|| format!("{name}: the laser's times are not off"))?;
+            log::write(path, &right)?;
+            println!("{}: the laser's times moved by {:.1} ms", path.display(), -1e3 * offset.late);
+            return Ok(());
+        }
         let replay = replay(&recording, |_| ()).with_context(|| name.clone())?;
         let figures = Figures::new(&recording, &replay, &Track::new(&recording, &replay));
         let bar = progress::bar("looking", TRIES as u64);

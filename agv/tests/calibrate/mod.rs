@@ -2,6 +2,7 @@
 
 mod bad_logs;
 mod causes;
+mod check;
 mod command;
 mod counters;
 mod drives;

@@ -1,21 +1,27 @@
 //! What is wrong with a vehicle whose encoders and laser do not tell one motion: every mistake that hands make is undone in turn,
 //! and those are named under which the drive makes sense.
 //!
-//! Some mistakes cannot be told apart by any drive: a drive counter that counts the wrong way does to the motion exactly what a
-//! steering offset of 180 degrees does. Both are named then.
+//! What no drive tells apart by its motion:
+//! - A drive counter that counts the wrong way moves the vehicle as a steering offset of 180 degrees does. A driving wheel looks
+//!   ahead rather than back, so that is believed under which it does.
+//! - Both at once undo each other: the drive makes sense as it is. A drive counter that counts the wrong way, with an offset of 90
+//!   degrees, is an offset of -90 degrees.
+//! - Two counters that count the wrong way are a laser that looks back from the other end of the vehicle. A place of the laser that
+//!   has to be exactly there is a coincidence, so it is believed last.
+//! - With fewer reflectors at once than [`FEWEST_REFLECTORS`] nothing else is told.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt;
 
 use agv_core::calibration::Offsets;
-use agv_core::geometry::wrap;
+use agv_core::geometry::{difference, wrap};
 use agv_core::measurement::EncoderSample;
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 
-use super::counted::count;
+use super::counted::{Counted, count};
 use super::counting_direction::{POOR, unexplained};
-use super::drive::{Drive, Preparation, is_followed, located_poses};
-use super::found::{Found, Method, Question, find};
+use super::drive::{Drive, is_followed, located_poses};
+use super::found::{Found, Method, Question, find_any};
 use super::log_input::LogInput;
 use super::model::VehicleModel;
 use super::odometry_path::OdometryPath;
@@ -70,23 +76,29 @@ impl fmt::Display for Cause {
 }
 
 impl Cause {
-    /// What to do about it.
+    /// Mistakes that it stands for: a place is two measures, and both would have to be wrong.
+    const fn weight(&self) -> usize {
+        if matches!(self, Self::LaserPlace(..)) { 2 } else { 1 }
+    }
+
+    /// Whether a parameter of the vehicle mends it. Of an offset of half a turn none does: the readings jump where the wheel looks
+    /// ahead, and the localiser takes the mean of two readings in a row.
     #[must_use]
-    pub fn remedy(&self) -> String {
+    pub fn is_parameter(&self) -> bool {
         match self {
-            Self::DriveReversed => {
-                "change the sign of vehicle.drive_scale: agv calibrate LOG --mend --apply vehicle.toml".into()
+            Self::EncodersSwapped | Self::FewReflectors(_) => false,
+            Self::SteeringOffset(offset) => offset.abs() < HALF_TURN,
+            _ => true,
+        }
+    }
+
+    /// Whether both say the same, as far as a drive tells it.
+    fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::SteeringOffset(first), Self::SteeringOffset(second)) => {
+                difference(*first, *second).abs() < SAME_ANGLE
             }
-            Self::SteeringReversed => {
-                "change the sign of vehicle.steering_scale: agv calibrate LOG --mend --apply vehicle.toml".into()
-            }
-            Self::EncodersSwapped => "exchange can.drive_node and can.steering_node, or the plugs".into(),
-            Self::SteeringOffset(offset) => {
-                format!("add {:.4} rad to vehicle.steering_offset_forward and vehicle.steering_offset_backward", offset)
-            }
-            Self::Wheelbase(_) => "measure it, or: agv calibrate LOG --wheelbase --apply vehicle.toml".into(),
-            Self::LaserHeading(_) | Self::LaserPlace(..) => "agv calibrate LOG --apply vehicle.toml".into(),
-            Self::FewReflectors(_) => "put up more reflectors, or look why they are not seen: agv view LOG".into(),
+            _ => std::mem::discriminant(self) == std::mem::discriminant(other),
         }
     }
 }
@@ -98,6 +110,48 @@ pub struct Explanation {
     pub causes: Vec<Cause>,
     /// Residual noise by the usual one; 1 is usual.
     pub noise: f64,
+    /// Whether the driving wheel then looks back rather than ahead for most of the way, as hardly any does.
+    pub is_wheel_behind: bool,
+}
+
+impl fmt::Display for Explanation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let causes: Vec<String> = self.causes.iter().map(ToString::to_string).collect();
+        formatter.write_str(&causes.join(", and "))
+    }
+}
+
+impl Explanation {
+    fn weight(&self) -> usize {
+        self.causes.iter().map(Cause::weight).sum::<usize>() + usize::from(self.is_wheel_behind)
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        let holds = |all: &[Cause], one: &Cause| all.iter().any(|cause| cause.is_like(one));
+        self.causes.len() == other.causes.len() && self.causes.iter().all(|cause| holds(&other.causes, cause))
+    }
+
+    /// Whether parameters of the vehicle mend it.
+    #[must_use]
+    pub fn is_mendable(&self) -> bool {
+        !self.causes.is_empty() && self.causes.iter().all(Cause::is_parameter)
+    }
+
+    /// What to do about it, with commands that name the log so.
+    #[must_use]
+    pub fn remedy(&self, log: &str) -> String {
+        let has = |is: fn(&Cause) -> bool| self.causes.iter().any(is);
+        if has(|cause| matches!(cause, Cause::FewReflectors(_))) {
+            format!("put up more reflectors, or look why they are not seen: agv view {log}")
+        } else if has(|cause| matches!(cause, Cause::EncodersSwapped)) {
+            "exchange the plugs, or what agv ctl HOST set can.drive_node and can.steering_node say; drive and check again"
+                .to_owned()
+        } else if self.is_mendable() {
+            format!("agv calibrate {log} --mend --apply vehicle.toml")
+        } else {
+            "turn the steering encoder by half a turn, or preset it (object 6003h); drive and check again".to_owned()
+        }
+    }
 }
 
 /// Reflectors that must be seen at once.
@@ -108,6 +162,14 @@ const NOISIER: f64 = 2.0;
 const HEADING: f64 = 0.5 * PI / 180.0;
 const PLACE: f64 = 0.05;
 const WHEELBASE: f64 = 0.003;
+/// The same of the steering offset, rad.
+const STEERING: f64 = PI / 180.0;
+/// All of them for a day's drive, in which slip and drift of the heading are mistaken for them.
+const ROUGH: [f64; 4] = [PI / 180.0, 0.08, 0.012, 1.5 * PI / 180.0];
+/// Offsets of the steering beyond it are half a turn, rad.
+const HALF_TURN: f64 = 0.75 * PI;
+/// Angles that differ by less are one mistake, rad.
+const SAME_ANGLE: f64 = 0.1;
 /// In standard deviations.
 const CLEAR: f64 = 4.0;
 
@@ -118,6 +180,13 @@ const QUESTION: Question = Question {
     is_steering_ratio_free: false,
     side: None,
 };
+
+/// What a drive may tell, from a drive that was made for it down to one that only goes forward.
+pub const QUESTIONS: [Question; 3] = [
+    QUESTION,
+    Question { offsets: Offsets::Common, ..QUESTION },
+    Question { offsets: Offsets::Common, is_wheelbase_free: false, ..QUESTION },
+];
 
 /// Mistakes with encoders, as they are undone: exchanged, steering reversed, quarter turns of the steering. Half a turn of the
 /// steering is also what a reversed drive counter is.
@@ -152,17 +221,21 @@ impl Undone {
         LogInput { encoders: input.encoders.iter().map(undo).collect(), ..input.clone() }
     }
 
-    /// Sets of mistakes that do the same.
-    fn sets(self) -> Vec<Vec<Cause>> {
+    /// Sets of mistakes that do the same, and whether the driving wheel looks the other way under each.
+    fn sets(self) -> Vec<(Vec<Cause>, bool)> {
         let mut common = Vec::new();
         common.extend(self.swapped.then_some(Cause::EncodersSwapped));
         common.extend(self.reversed.then_some(Cause::SteeringReversed));
-        let alternatives: Vec<Option<Cause>> = match self.quarters {
-            0 => vec![None],
-            2 => vec![Some(Cause::DriveReversed), Some(Cause::SteeringOffset(PI))],
-            quarters => vec![Some(Cause::SteeringOffset(wrap(f64::from(quarters) * FRAC_PI_2)))],
+        let offset = |quarters: u8| match quarters % 4 {
+            0 => None,
+            quarters => Some(Cause::SteeringOffset(wrap(f64::from(quarters) * FRAC_PI_2))),
         };
-        alternatives.into_iter().map(|last| common.iter().copied().chain(last).collect()).collect()
+        let set = |is_drive_reversed: bool| {
+            let offset = offset(self.quarters + 2 * u8::from(is_drive_reversed));
+            let drive = is_drive_reversed.then_some(Cause::DriveReversed);
+            (common.iter().copied().chain(drive).chain(offset).collect(), is_drive_reversed)
+        };
+        vec![set(false), set(true)]
     }
 }
 
@@ -177,7 +250,7 @@ pub fn explain(input: &LogInput, mut progress: impl FnMut(usize)) -> Vec<Explana
     let Vehicle::Tricycle(tricycle) = input.parameters.vehicle else { return Vec::new() };
     let seen = reflectors_at_once(input);
     if seen < FEWEST_REFLECTORS && input.laser_poses.len() < 2 && input.given_poses.len() < 2 {
-        return vec![Explanation { causes: vec![Cause::FewReflectors(seen)], noise: f64::NAN }];
+        return vec![Explanation { causes: vec![Cause::FewReflectors(seen)], noise: f64::NAN, is_wheel_behind: false }];
     }
     let mut tried = 0;
     let mut candidates = Vec::new();
@@ -195,31 +268,11 @@ pub fn explain(input: &LogInput, mut progress: impl FnMut(usize)) -> Vec<Explana
             }
         }
         // One mistake at the most: no other direction of the laser explains the drive with fewer.
-        if candidates.iter().any(|candidate: &Explanation| candidate.causes.len() <= 1) {
+        if candidates.iter().any(|candidate: &Explanation| candidate.weight() <= 1) {
             break;
         }
     }
     simplest(candidates)
-}
-
-/// The same log of a vehicle that is believed to count as one of the explanations says; None if none of them says that a counter
-/// counts the wrong way, or all of them something that no sign mends.
-#[must_use]
-pub fn with_signs(input: &LogInput, explanations: &[Explanation]) -> Option<LogInput> {
-    let is_sign = |cause: &Cause| matches!(cause, Cause::DriveReversed | Cause::SteeringReversed);
-    let is_mendable = |cause: &Cause| !matches!(cause, Cause::EncodersSwapped | Cause::SteeringOffset(_));
-    let chosen =
-        explanations.iter().find(|found| found.causes.iter().any(is_sign) && found.causes.iter().all(is_mendable))?;
-    let mut signed = input.clone();
-    let Vehicle::Tricycle(tricycle) = &mut signed.parameters.vehicle else { return None };
-    for cause in &chosen.causes {
-        match cause {
-            Cause::DriveReversed => tricycle.drive_scale = -tricycle.drive_scale,
-            Cause::SteeringReversed => tricycle.steering_scale = -tricycle.steering_scale,
-            _ => {}
-        }
-    }
-    Some(signed)
 }
 
 /// Tries that [`explain`] tells.
@@ -272,13 +325,41 @@ fn makes_sense(input: &LogInput, tricycle: &Tricycle) -> bool {
 /// What is wrong if these mistakes are undone and the drive then makes sense.
 fn candidate(turned: &LogInput, tricycle: &Tricycle, undone: Undone, input: &LogInput) -> Vec<Explanation> {
     let right = undone.apply(turned, tricycle);
-    let Ok(drive) = Drive::new(&right, &Preparation::default()) else { return Vec::new() };
-    let Ok(found) = find(&drive, &QUESTION) else { return Vec::new() };
+    let Ok(drive) = Drive::among_few(&right) else { return Vec::new() };
+    let Ok((found, drive)) = find_any(drive, &QUESTIONS) else { return Vec::new() };
     let nominal = VehicleModel::nominal(tricycle, input.parameters.lasers.first());
-    let measured = differences(&found, &nominal);
-    let noise = level(&found);
-    let sets = undone.sets().into_iter();
-    sets.map(|set| Explanation { causes: set.into_iter().chain(measured.iter().copied()).collect(), noise }).collect()
+    let measured = differences(&found, &nominal, drive.is_from_stops());
+    let (noise, is_behind) = (level(&found), is_wheel_behind(&drive.counted, &found.model));
+    let explanation = |(set, is_other_way): (Vec<Cause>, bool)| Explanation {
+        causes: together(set, &measured),
+        noise,
+        is_wheel_behind: is_behind != is_other_way,
+    };
+    undone.sets().into_iter().map(explanation).collect()
+}
+
+/// Mistakes that were undone with what was measured beside them: an offset of the steering is one.
+fn together(mut causes: Vec<Cause>, measured: &[Cause]) -> Vec<Cause> {
+    for cause in measured {
+        let known = causes.iter_mut().find_map(|known| match known {
+            Cause::SteeringOffset(offset) => Some(offset),
+            _ => None,
+        });
+        match (cause, known) {
+            (Cause::SteeringOffset(more), Some(offset)) => *offset = wrap(*offset + more),
+            _ => causes.push(*cause),
+        }
+    }
+    causes
+}
+
+/// Whether the driving wheel looks back rather than ahead for most of the way.
+fn is_wheel_behind(counted: &[Counted], model: &VehicleModel) -> bool {
+    let ahead = |pair: &[Counted]| {
+        let way = (pair[1].ticks - pair[0].ticks).abs();
+        way * (pair[1].steering + model.offset_forward).cos()
+    };
+    counted.windows(2).map(ahead).sum::<f64>() < 0.0
 }
 
 /// How much noise is left, by the usual one.
@@ -287,32 +368,46 @@ fn level(found: &Found) -> f64 {
     (found.noise.slip / usual.slip).max(found.noise.steering / usual.steering)
 }
 
-/// Parameters that are not those of the log.
+/// Parameters that are not those of the log; more is asked of those from a drive that does not go from stop to stop.
 #[must_use]
-pub fn differences(found: &Found, nominal: &VehicleModel) -> Vec<Cause> {
-    let [.., wheelbase, _, x, y, heading] = found.deviations;
+pub fn differences(found: &Found, nominal: &VehicleModel, is_from_stops: bool) -> Vec<Cause> {
+    let [heading_limit, place_limit, wheelbase_limit, steering_limit] =
+        if is_from_stops { [HEADING, PLACE, WHEELBASE, STEERING] } else { ROUGH };
+    let [forward, backward, _, wheelbase, _, x, y, heading] = found.deviations;
     let mut causes = Vec::new();
+    let offsets = |model: &VehicleModel| [model.offset_forward, model.offset_backward];
+    let [ahead, back] = [0, 1].map(|sense| wrap(offsets(&found.model)[sense] - offsets(nominal)[sense]));
+    let offset = wrap(ahead + 0.5 * wrap(back - ahead));
+    if offset.abs() > (CLEAR * forward.max(backward)).max(steering_limit) {
+        causes.push(Cause::SteeringOffset(offset));
+    }
     let stretch = found.model.wheelbase - nominal.wheelbase;
-    if stretch.abs() > (CLEAR * wheelbase).max(WHEELBASE * nominal.wheelbase) {
+    if stretch.abs() > (CLEAR * wheelbase).max(wheelbase_limit * nominal.wheelbase) {
         causes.push(Cause::Wheelbase(found.model.wheelbase));
     }
     let turn = wrap(found.model.laser.theta - nominal.laser.theta);
-    if turn.abs() > (CLEAR * heading).max(HEADING) {
+    if turn.abs() > (CLEAR * heading).max(heading_limit) {
         causes.push(Cause::LaserHeading(turn));
     }
     let (ahead, left) = (found.model.laser.x - nominal.laser.x, found.model.laser.y - nominal.laser.y);
-    if ahead.abs() > (CLEAR * x).max(PLACE) || left.abs() > (CLEAR * y).max(PLACE) {
+    if ahead.abs() > (CLEAR * x).max(place_limit) || left.abs() > (CLEAR * y).max(place_limit) {
         causes.push(Cause::LaserPlace(ahead, left));
     }
     causes
 }
 
-/// Those that leave little noise, and of these the ones with the fewest mistakes.
+/// Those that leave little noise, and of these the ones with the fewest mistakes; each once.
 fn simplest(mut candidates: Vec<Explanation>) -> Vec<Explanation> {
     let least = candidates.iter().map(|candidate| candidate.noise).fold(f64::INFINITY, f64::min);
     candidates.retain(|candidate| candidate.noise <= NOISIER * least.max(0.1));
-    let fewest = candidates.iter().map(|candidate| candidate.causes.len()).min().unwrap_or_default();
-    candidates.retain(|candidate| candidate.causes.len() == fewest);
+    let fewest = candidates.iter().map(Explanation::weight).min().unwrap_or_default();
+    candidates.retain(|candidate| candidate.weight() == fewest);
     candidates.sort_by(|a, b| a.noise.total_cmp(&b.noise));
-    candidates
+    let mut each: Vec<Explanation> = Vec::new();
+    for candidate in candidates {
+        if !each.iter().any(|known| known.is_like(&candidate)) {
+            each.push(candidate);
+        }
+    }
+    each
 }

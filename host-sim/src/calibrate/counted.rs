@@ -12,7 +12,7 @@ pub struct Counted {
     pub time: Time,
     /// Ticks of the driving wheel since the first sample.
     pub ticks: f64,
-    /// Steering angle that the nominal scale gives, without offset, rad.
+    /// Steering angle that the nominal scale gives, without offset and without jumps, rad.
     pub steering: f64,
 }
 
@@ -114,11 +114,16 @@ pub fn count(samples: &[EncoderSample], nominal: &Tricycle, mend: bool) -> (Vec<
         }
         index = end + 1;
     }
-    let angle = |sample: &EncoderSample| nominal.steering_scale * nominal.steering_range.signed(sample.steering) as f64;
+    let range = nominal.steering_range;
     let mut ticks = 0.0;
+    let mut steering = ordered.first().map_or(0, |first| range.signed(first.steering));
     let counted = ordered.iter().enumerate().map(|(index, sample)| {
-        ticks += if index == 0 { 0.0 } else { steps[index - 1] };
-        Counted { time: sample.time, ticks, steering: angle(sample) }
+        if let Some(before) = index.checked_sub(1) {
+            ticks += steps[before];
+            // Beyond half a turn too: a wheel that looks back goes to and fro there.
+            steering += range.step(ordered[before].steering, sample.steering);
+        }
+        Counted { time: sample.time, ticks, steering: nominal.steering_scale * steering as f64 }
     });
     (counted.collect(), faults)
 }

@@ -1,5 +1,6 @@
 //! From a log to windows.
 
+use agv_core::geometry::difference;
 use agv_core::maps::Landmark;
 use agv_core::measurement::EncoderSample;
 use agv_core::odometry::{Tricycle, Vehicle};
@@ -142,6 +143,18 @@ impl Drive {
     /// # Errors
     /// [`Refusal`].
     pub fn new(input: &LogInput, preparation: &Preparation) -> Result<Self, Refusal> {
+        Self::cut(input, preparation, false)
+    }
+
+    /// The same; where too few reflectors are seen from both ends of the ways between stops, the drive is cut by time.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn among_few(input: &LogInput) -> Result<Self, Refusal> {
+        Self::cut(input, &Preparation::default(), true)
+    }
+
+    fn cut(input: &LogInput, preparation: &Preparation, may_be_few: bool) -> Result<Self, Refusal> {
         let Vehicle::Tricycle(tricycle) = input.parameters.vehicle else {
             return Err(Refusal::OtherVehicle);
         };
@@ -173,7 +186,10 @@ impl Drive {
             drive.poses = located;
             let (stops, noise) = stops(&standstills(&drive.counted, tricycle.drive_scale), &tracked);
             if stops.len() >= FEWEST_STOPS {
-                drive.cut_at_stops(&stops, &noise, shortest, preparation.map)?;
+                match drive.cut_at_stops(&stops, &noise, shortest, preparation.map) {
+                    Err(Refusal::FewReflectors { .. }) if may_be_few => drive.windows.clear(),
+                    cut => cut?,
+                }
             }
             if drive.windows.is_empty() {
                 drive.cut_by_poses(MotionSource::ReflectorsWhileDriving, shortest);
@@ -192,6 +208,20 @@ impl Drive {
         let source = if is_measured { MotionSource::LaserPoses } else { MotionSource::GivenPoses };
         drive.cut_by_poses(source, shortest);
         Ok(drive)
+    }
+
+    /// The same drive cut by time where it was cut at stops: for drives with so few of them that nothing is told.
+    #[must_use]
+    pub fn without_stops(mut self) -> Self {
+        let shortest = SHORTEST_WAY / self.tricycle.drive_scale;
+        self.cut_by_poses(MotionSource::ReflectorsWhileDriving, shortest);
+        self
+    }
+
+    /// Whether its windows go from stop to stop, as those of a drive for calibration do.
+    #[must_use]
+    pub fn is_from_stops(&self) -> bool {
+        matches!(self.source, MotionSource::ReflectorsAtStops | MotionSource::ReflectorMap)
     }
 
     /// Follows the reflectors, and turns the counter that counts the wrong way; `direct` are poses that others have found.
@@ -226,7 +256,11 @@ impl Drive {
             |is_steering| self.is_mended && self.faults.contains(&CounterFault::WrongDirection { is_steering });
         let sign = |is_turned: bool| if is_turned { -1.0 } else { 1.0 };
         let found = model.apply(&self.tricycle);
+        // Both offsets in one turn: one just below 180 degrees and one just above it are neighbours.
+        let backward =
+            found.steering_offset_forward + difference(found.steering_offset_backward, found.steering_offset_forward);
         Tricycle {
+            steering_offset_backward: backward,
             drive_scale: sign(is_wrong(false) != self.is_drive_turned) * found.drive_scale,
             steering_scale: sign(is_wrong(true)) * found.steering_scale,
             ..found

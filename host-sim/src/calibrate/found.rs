@@ -109,6 +109,27 @@ pub fn find(drive: &Drive, question: &Question) -> Result<Found, Refusal> {
     Ok(found)
 }
 
+/// Finds the parameters of a drive by the first of several questions that it answers; where it has too few stops, by what happens
+/// between them.
+///
+/// # Errors
+/// Why the first question has no answer.
+pub fn find_any(drive: Drive, questions: &[Question]) -> Result<(Found, Drive), Refusal> {
+    let mut reason = None;
+    let drive =
+        if drive.is_from_stops() && drive.windows.len() < FEWEST_STOPS_APART { drive.without_stops() } else { drive };
+    for question in questions {
+        match find(&drive, question) {
+            Ok(found) => return Ok((found, drive)),
+            Err(refusal) => reason = reason.or(Some(refusal)),
+        }
+    }
+    Err(reason.unwrap_or(Refusal::TooFewSegments { found: 0, needed: 2 }))
+}
+
+/// Ways from stop to stop that say enough without what happens between the stops.
+const FEWEST_STOPS_APART: usize = 6;
+
 /// Where the fit's estimate of the noise begins: the usual noise, unless the closed form has left much more or much less.
 fn expected_noise(left: &NoiseModel) -> NoiseModel {
     let usual = NoiseModel::default();

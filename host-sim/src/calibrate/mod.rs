@@ -1,6 +1,7 @@
 //! Calibration from a log: windows of motion, encoder faults, the closed forms of the core and a joint nonlinear fit.
 
 pub mod causes;
+pub mod clock_offset;
 pub mod closed_form;
 pub mod counted;
 mod counting_direction;
@@ -11,6 +12,7 @@ pub mod innovation_noise;
 pub mod joint;
 mod least_squares;
 pub mod log_input;
+pub mod mending;
 pub mod model;
 pub mod noise;
 pub mod odometry_path;

@@ -9,10 +9,11 @@ use std::path::PathBuf;
 use agv_core::calibration::{MountingSide, Offsets};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::odometry::Vehicle;
-use agv_host_sim::calibrate::causes::{Cause, Explanation, TRIES, differences, explain, with_signs};
+use agv_host_sim::calibrate::causes::{Explanation, QUESTIONS, TRIES, differences, explain};
 use agv_host_sim::calibrate::drive::{Drive, Preparation};
-use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find};
+use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find, find_any};
 use agv_host_sim::calibrate::log_input::LogInput;
+use agv_host_sim::calibrate::mending::mended;
 use agv_host_sim::calibrate::model::PARAMETERS;
 use agv_host_sim::calibrate::refusal::Refusal;
 use agv_host_sim::calibrate::report::{add_calibration, parameter_rows, remark_rows};
@@ -66,7 +67,8 @@ pub struct Calibrate {
     /// Map of the reflectors, to place each stop in it.
     #[arg(long, value_name = "MAP")]
     map: Option<PathBuf>,
-    /// Mend the faults of the encoders that are found.
+    /// Mend what is wrong in what is believed of the vehicle: signs of the encoders, offsets of the steering, the wheelbase, the
+    /// laser; and faults of the counting.
     #[arg(long)]
     mend: bool,
     /// Write the parameters to a file that `agv replay --vehicle` takes.
@@ -189,16 +191,20 @@ fn explanations(input: &LogInput) -> Vec<Explanation> {
 
 /// Why there is no result, with the mistakes that would explain the drive.
 fn explained(refusal: &Refusal, explanations: &[Explanation]) -> anyhow::Error {
-    let together = |causes: &[Cause]| causes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
-    let causes: Vec<String> =
-        explanations.iter().filter(|found| !found.causes.is_empty()).map(|found| together(&found.causes)).collect();
+    let wrong = || explanations.iter().filter(|found| !found.causes.is_empty());
+    let causes: Vec<String> = wrong().map(ToString::to_string).collect();
     if causes.is_empty() {
         return anyhow::anyhow!("{refusal}");
     }
-    let is_sign = |cause: &Cause| matches!(cause, Cause::DriveReversed | Cause::SteeringReversed);
-    let mend = explanations.iter().flat_map(|found| &found.causes).any(is_sign);
-    let next = if mend { "; --mend --apply FILE mends a sign" } else { "" };
-    anyhow::anyhow!("{refusal}; the drive makes sense if {}{next}; agv check says what to do", causes.join(", or if "))
+    let causes = causes.join(", or if ");
+    let mend = if wrong().any(Explanation::is_mendable) { "; --mend --apply FILE mends that" } else { "" };
+    // Of what counts the wrong way the causes say it better.
+    let begin = if matches!(refusal, Refusal::WrongDirection(_)) {
+        "encoders and laser contradict each other".to_owned()
+    } else {
+        refusal.to_string()
+    };
+    anyhow::anyhow!("{begin}; the drive makes sense if {causes}{mend}; agv check says what to do")
 }
 
 impl Calibrate {
@@ -266,27 +272,38 @@ impl Calibrate {
         Ok(())
     }
 
-    /// The parameters; of counters that count the other way if that explains the drive and is to be mended.
+    /// The parameters; with what explains the drive mended, if that is wanted.
     fn calibrated(&self, input: &LogInput, preparation: &Preparation) -> anyhow::Result<(Found, Drive)> {
-        let attempt = |input: &LogInput| {
+        let attempt = |input: &LogInput, preparation: &Preparation| {
             let drive = Drive::new(input, preparation)?;
             Ok((find(&drive, &self.question())?, drive))
         };
-        let refusal: Refusal = match attempt(input) {
+        // What turns a counter must first have been held against everything else that does the same.
+        let as_it_is = Drive::new(input, &Preparation { mend: false, ..*preparation });
+        let first = match as_it_is {
+            Err(refusal @ Refusal::WrongDirection(_)) => Err(refusal),
+            _ => attempt(input, preparation),
+        };
+        let refusal: Refusal = match first {
             Ok(found) => return Ok(found),
             Err(refusal) => refusal,
         };
         let explanations = explanations(input);
-        let signed = if self.mend { with_signs(input, &explanations) } else { None };
-        let Some(signed) = signed else { return Err(explained(&refusal, &explanations)) };
-        let (found, mut drive) = attempt(&signed).map_err(|again: Refusal| explained(&again, &explanations))?;
-        drive.remarks.push("a counter counts the wrong way, mended: its scale is negative".to_owned());
+        let mended = explanations.iter().find_map(|found| Some((found, mended(input, found)?)));
+        let Some((explanation, right)) = mended.filter(|_| self.mend) else {
+            return Err(explained(&refusal, &explanations));
+        };
+        // What explains the drive was found by one of these questions.
+        let asked: Vec<Question> = std::iter::once(self.question()).chain(QUESTIONS).collect();
+        let again = Drive::new(&right, preparation).and_then(|drive| find_any(drive, &asked));
+        let (found, mut drive) = again.map_err(|again| explained(&again, &explanations))?;
+        drive.remarks.push(format!("{explanation}: mended"));
         Ok((found, drive))
     }
 
     /// What a result says that is no adjustment any more.
     fn differences(&self, drive: &Drive, found: &Found) -> Vec<String> {
-        let causes = differences(found, &drive.nominal);
+        let causes = differences(found, &drive.nominal, drive.is_from_stops());
         let mut remarks: Vec<String> = causes.iter().map(ToString::to_string).collect();
         let [wheelbase, deviation] = found.suggested_wheelbase;
         let stretch = (wheelbase - found.model.wheelbase).abs();

@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
-use agv_host_sim::calibrate::innovation_noise::{HONEST, STEPS, SourceNoise, Squares, find};
+use agv_host_sim::calibrate::innovation_noise::{KindNoise, Noise as Found, STEPS, Squares, find};
+use agv_host_sim::drive::kind_name;
 use agv_host_sim::log;
+use agv_host_sim::mapping::map_file;
+use agv_host_sim::replay::replay;
 use anyhow::Context;
 use serde_json::json;
 
@@ -11,14 +14,18 @@ use crate::command::progress;
 use crate::command::setting_arguments::SettingArguments;
 
 const HELP: &str = "\
-The noise is fitted on the first half of the drive and held against the second half. A squared innovation is stated by the one that
+The drive is cut into sixteen pieces. The noise is fitted on every other one and held against those between. A squared innovation is stated by the one that
 the filter expects, for one degree of freedom: 1 if the noise is right, less if the filter is told too much of it.
+What the map shares between sightings, how exact it is, and what the odometry does are found with it: each is told apart from the
+others by every sighting.
 
 Examples:
   agv calibrate noise drive.agvlog
-  agv calibrate noise drive.agvlog --json
+  agv calibrate noise drive.agvlog --output measured.agvlog
+  agv calibrate noise drive.agvlog --map-output map.csv --json
 
-Keys of --json: sources [source, good, before, after, check {count, mean}, settings [name, before, after]].";
+Keys of --json: good, sources [source, good, before, after, check {count, mean}], settings [name, before, after],
+map [source, factor].";
 
 /// Find the noise of reflectors and features from a drive with a map
 #[derive(clap::Args)]
@@ -28,6 +35,12 @@ pub struct Noise {
     log: PathBuf,
     #[command(flatten)]
     settings: SettingArguments,
+    /// Write the log with the noise that was found, and with what the localiser then answers.
+    #[arg(short, long, value_name = "LOG2")]
+    output: Option<PathBuf>,
+    /// Write the map with the deviations that were found.
+    #[arg(long, value_name = "MAP")]
+    map_output: Option<PathBuf>,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -38,55 +51,65 @@ impl Noise {
     pub fn run(self) -> anyhow::Result<()> {
         let (mut recording, _) = log::read(&self.log)?;
         self.settings.apply(&mut recording.parameters)?;
+        let name = || self.log.display().to_string();
         let bar = progress::bar("replaying", STEPS as u64);
-        let found =
-            find(&recording, |done| bar.set_position(done as u64)).with_context(|| self.log.display().to_string())?;
+        let found = find(&recording, |done| bar.set_position(done as u64)).with_context(name)?;
         bar.finish_and_clear();
+        if let Some(path) = &self.output {
+            let answers = replay(&found.recording, |_| ()).with_context(name)?;
+            log::write_with_outputs(path, &found.recording, |event| answers.output(event))?;
+        }
+        if let Some(path) = &self.map_output {
+            map_file::write(path, &found.recording.landmarks)?;
+        }
         if self.json {
-            let sources: Vec<_> = found.iter().map(entry).collect();
-            println!("{}", serde_json::to_string_pretty(&json!({ "sources": sources }))?);
-            return Ok(());
+            println!("{}", serde_json::to_string_pretty(&summary(&found))?);
+        } else {
+            self.print(&found);
         }
+        Ok(())
+    }
+
+    fn print(&self, found: &Found) {
         println!("{:<18} {:>10} {:>10} {:>10}", "squared innovation", "before", "after", "check");
-        for noise in &found {
+        for noise in &found.kinds {
             let [before, after, check] = [noise.before, noise.after, noise.check].map(|squares| squares.mean);
-            println!("{:<18} {before:>10.2} {after:>10.2} {check:>10.2}", noise.source.name());
+            println!("{:<18} {before:>10.2} {after:>10.2} {check:>10.2}", kind_name(noise.kind));
         }
-        for changed in found.iter().flat_map(|noise| noise.settings) {
+        for changed in &found.settings {
             println!("{:<32} {:.6} was {:.6}", changed.name, changed.after, changed.before);
         }
-        for noise in found.iter().filter(|noise| !noise.is_good()) {
-            let why = if HONEST.contains(&noise.after.mean) {
-                "the second half of the drive disagrees"
-            } else {
-                "no setting brings it to 1, as the detector or the map states another noise"
-            };
-            println!("{}: {why}", noise.source.name());
+        for (kind, factor) in &found.map {
+            println!("{:<32} {factor:.3} of what the map states", format!("deviation of {}", kind_name(*kind)));
         }
-        println!("next: agv accept {}{}", self.log.display(), options(&found));
-        Ok(())
+        for noise in found.kinds.iter().filter(|noise| !noise.is_good()) {
+            println!("{}: the other half of the drive disagrees", kind_name(noise.kind));
+        }
+        match &self.output {
+            Some(path) => println!("next: agv accept {}", path.display()),
+            None => println!("next: agv calibrate noise {} --output measured.agvlog", self.log.display()),
+        }
     }
 }
 
-fn entry(noise: &SourceNoise) -> serde_json::Value {
+fn summary(found: &Found) -> serde_json::Value {
     let squares = |squares: Squares| json!({ "count": squares.count, "mean": squares.mean });
-    let settings: Vec<_> = noise
-        .settings
-        .iter()
+    let source = |noise: &KindNoise| {
+        json!({
+            "source": kind_name(noise.kind),
+            "good": noise.is_good(),
+            "before": squares(noise.before),
+            "after": squares(noise.after),
+            "check": squares(noise.check),
+        })
+    };
+    let sources: Vec<_> = found.kinds.iter().map(source).collect();
+    let settings = found.settings.iter();
+    let settings: Vec<_> = settings
         .map(|changed| json!({ "name": changed.name, "before": changed.before, "after": changed.after }))
         .collect();
-    json!({
-        "source": noise.source.name(),
-        "good": noise.is_good(),
-        "before": squares(noise.before),
-        "after": squares(noise.after),
-        "check": squares(noise.check),
-        "settings": settings,
-    })
-}
-
-/// The settings as options of other commands: all of them, as they were found together.
-fn options(found: &[SourceNoise]) -> String {
-    let settings = found.iter().flat_map(|noise| noise.settings);
-    settings.map(|changed| format!(" --set {}={:.6}", changed.name, changed.after)).collect()
+    let map: Vec<_> =
+        found.map.iter().map(|(kind, factor)| json!({ "source": kind_name(*kind), "factor": factor })).collect();
+    let is_good = found.kinds.iter().all(KindNoise::is_good);
+    json!({ "good": is_good, "sources": sources, "settings": settings, "map": map })
 }

@@ -1,15 +1,20 @@
 //! What is wrong with a drive that is lost or poor, and what to do next: findings in the order in which they are to be looked at.
 
+mod calibration;
+mod timing;
+
 use agv_core::localizer::Mode;
-use agv_core::measurement::Time;
 use serde::Serialize;
 
-use crate::calibrate::causes::{Cause, Explanation, explain};
+use crate::calibrate::causes::{Explanation, explain};
 use crate::calibrate::innovation_noise::HONEST;
 use crate::calibrate::log_input::LogInput;
+use crate::calibrate::mending::mended;
 use crate::drive::{Figures, kind_name};
 use crate::recording::{RecordedEvent, Recording};
 use crate::replay::{StartSearchError, find_start};
+
+pub use timing::moved;
 
 /// Something that is wrong, or that could not be looked at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -32,8 +37,6 @@ pub const POOR: f64 = 0.02;
 const ACCEPTED: f64 = 0.9;
 /// Observations below which nothing is said of them.
 const FEWEST: usize = 100;
-/// Longest gap of the encoders that the localiser bridges, s.
-const LONGEST_GAP: f64 = 0.1;
 
 /// Share of a drive's time that is lost, degraded, without odometry, or not localised at all.
 #[must_use]
@@ -45,18 +48,38 @@ pub fn poor_share(figures: &Figures) -> f64 {
     if all > 0.0 { poor / all + 0.0 } else { 1.0 }
 }
 
-/// Everything that there is to say of a drive. `log` is how the commands name it; `progress` is called as by [`explain`].
+/// Everything that there is to say of a drive. `log` is how the commands name it; `progress` is called as by [`explain`]. What a
+/// wrong clock or a wrong vehicle spoils is not looked at before that is mended.
 #[must_use]
 pub fn check(recording: &Recording, figures: &Figures, log: &str, progress: impl FnMut(usize)) -> Vec<Finding> {
     let mut findings = what_is_missing(recording, log);
-    findings.extend(timing(recording, log));
+    findings.extend(timing::gaps(recording, log));
     let is_poor = poor_share(figures) > POOR;
-    let explanations = explain(&LogInput::of(recording), progress);
-    if is_poor || !explanations.is_empty() {
-        findings.extend(mistakes(&explanations, log));
-    }
+    let mut input = LogInput::of(recording);
+    let clock = timing::put_right(&mut input);
+    let explanations = explain(&input, progress);
+    // A clock shows itself only where the encoders tell the motion.
+    let clock = clock.or_else(|| {
+        let mut right = explanations.iter().find_map(|explanation| mended(&input, explanation))?;
+        timing::put_right(&mut right)
+    });
+    findings.extend(clock.map(|offset| timing::finding(&offset, log)));
     let is_sound = explanations.iter().any(|explanation| explanation.causes.is_empty());
+    if !is_sound && !explanations.is_empty() {
+        findings.push(mistakes(&explanations, log));
+    }
+    if clock.is_some() || (!is_sound && !explanations.is_empty()) {
+        return findings;
+    }
+    let is_too_sure = figures.innovations.iter().any(|seen| 0.5 * seen.mean_normalised_square > *HONEST.end());
+    if let Some(finding) = calibration::finding(&input, log).filter(|_| is_poor || is_too_sure) {
+        findings.push(finding);
+        return findings;
+    }
     if is_poor {
+        if explanations.is_empty() {
+            findings.push(untold());
+        }
         findings.extend(place(recording, log));
     }
     findings.extend(map(recording, figures, is_sound, log));
@@ -101,43 +124,23 @@ fn what_is_missing(recording: &Recording, log: &str) -> Vec<Finding> {
     findings
 }
 
-/// Gaps of the encoders, and scans that do not come in their turn.
-fn timing(recording: &Recording, log: &str) -> Option<Finding> {
-    let encoders = recording.events.iter().filter(|event| matches!(event, RecordedEvent::Encoders(_)));
-    let times: Vec<Time> = encoders.filter_map(RecordedEvent::time).collect();
-    let gaps = || times.windows(2).map(|pair| (pair[0], pair[1].since(pair[0])));
-    let back = gaps().filter(|(_, gap)| *gap < 0.0).count();
-    let long = gaps().filter(|(_, gap)| *gap > LONGEST_GAP).count();
-    if back + long == 0 {
-        return None;
-    }
-    let longest = gaps().map(|(_, gap)| gap).fold(0.0, f64::max);
-    Some(Finding::new(
-        format!("the encoders leave {long} gaps, the longest of {longest:.2} s, and go back in time {back} times"),
-        format!("look at the bus and its load: agv view {log}"),
-    ))
+/// What is to be said if neither the vehicle as it is believed to be nor any other one explains the drive.
+fn untold() -> Finding {
+    Finding::new(
+        "the drive does not tell whether encoders and laser agree: it has too few arcs or reflectors for that",
+        "agv calibrate plan --area 14x11, drive that, and check its log",
+    )
 }
 
-fn mistakes(explanations: &[Explanation], log: &str) -> Vec<Finding> {
-    if explanations.is_empty() {
-        return vec![Finding::new(
-            "the drive does not tell whether encoders and laser agree: it has too few arcs or reflectors for that",
-            "agv calibrate plan --area 14x11, drive that, and check its log",
-        )];
-    }
-    if explanations.iter().any(|explanation| explanation.causes.is_empty()) {
-        return Vec::new();
-    }
-    let together = |causes: &[Cause]| causes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
-    let what: Vec<String> = explanations.iter().map(|explanation| together(&explanation.causes)).collect();
+fn mistakes(explanations: &[Explanation], log: &str) -> Finding {
+    let what: Vec<String> = explanations.iter().map(ToString::to_string).collect();
     let mut next: Vec<String> = Vec::new();
-    for cause in explanations.iter().flat_map(|explanation| &explanation.causes) {
-        let remedy = cause.remedy().replace("LOG", log);
+    for remedy in explanations.iter().map(|explanation| explanation.remedy(log)) {
         if !next.contains(&remedy) {
             next.push(remedy);
         }
     }
-    vec![Finding::new(what.join("; or: "), next.join("; or: "))]
+    Finding::new(what.join("; or: "), next.join("; or: "))
 }
 
 /// Whether the vehicle would find itself in the map by its first revolutions.
@@ -149,7 +152,7 @@ fn place(recording: &Recording, log: &str) -> Option<Finding> {
     match find_start(&first) {
         Err(StartSearchError::Unknown) => Some(Finding::new(
             "no place of the map looks like what is seen: it is the map of another place, or the reflectors were moved",
-            format!("agv map {log} --output new.csv, and compare it with the map"),
+            format!("agv map {log} --output new.csv --kind reflectors --slam, then agv replay {log} --map new.csv"),
         )),
         Err(StartSearchError::Ambiguous) => Some(Finding::new(
             "two places of the map look like what is seen",
