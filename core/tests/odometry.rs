@@ -236,6 +236,43 @@ fn the_asymmetric_model_uses_the_offset_of_the_direction() {
     assert!((backward.displacement.theta - 0.02f64.sin() / WHEELBASE).abs() < 1e-15);
 }
 
+/// An encoder that was mounted half a turn round passes the end of its range when the wheel passes straight ahead.
+#[test]
+fn an_encoder_that_is_mounted_half_a_turn_round_tells_the_same() {
+    let straight_at_zero = Tricycle {
+        steering_scale: std::f64::consts::TAU / 4096.0,
+        steering_range: CounterRange::new(4096).unwrap(),
+        ..tricycle()
+    };
+    let half_a_turn = std::f64::consts::PI;
+    let turned =
+        Tricycle { steering_offset_forward: half_a_turn, steering_offset_backward: half_a_turn, ..straight_at_zero };
+    let motions = |tricycle: Tricycle, zero: i64| {
+        let mut odometer = VehicleOdometer::new(
+            &Vehicle::Tricycle(tricycle),
+            &OdometerParameters {
+                noise: OdometryNoise::default(),
+                integration: Integration::RungeKutta2,
+                fastest: 100.0,
+                longest_interval: 0.25,
+            },
+        );
+        let readings = [-40_i64, -3, 2, 45, 1, -2, -30];
+        let samples = (0_u32..).zip(readings).map(|(number, reading)| EncoderSample {
+            time: Time::from_micros(100_000 * u64::from(number)),
+            drive: 1000 * number,
+            steering: (reading + zero).rem_euclid(4096) as u32,
+        });
+        samples.filter_map(|sample| odometer.encoders(&sample).ok()).collect::<Vec<Motion>>()
+    };
+    let (expected, found) = (motions(straight_at_zero, 0), motions(turned, 2048));
+    assert_eq!(found.len(), 6);
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!(same(&found.displacement, &expected.displacement, 1e-12), "{found:?} {expected:?}");
+        assert!((found.covariance - expected.covariance).norm() < 1e-12 * expected.covariance.norm());
+    }
+}
+
 #[test]
 fn a_counter_that_counts_the_wrong_way_has_the_offset_of_the_same_direction() {
     let right = Tricycle { steering_offset_forward: 0.01, steering_offset_backward: -0.02, ..tricycle() };
