@@ -45,7 +45,7 @@ fn the_worst_size_of_each_kind_is_judged_as_it_was() {
     assert!(missing.is_empty(), "the table has no line of {missing:?}");
     let trials: Vec<Trial> =
         named.iter().flat_map(|&(kind, size)| SEEDS.map(|seed| Trial { kind, size, with: None, seed })).collect();
-    let rows = sweep::run(&trials, Shard::ALL, || ()).unwrap();
+    let rows = sweep::run(&trials, Shard::ALL, &|_| (), || ()).unwrap();
     let mut found = String::from("kind,worst size,runs that fail,hazardous events,misleading\n");
     for (&(kind, size), rows) in named.iter().zip(rows.chunks(SEEDS.len())) {
         writeln!(found, "{}", line(&kind.name, size, &rows.iter().collect::<Vec<_>>())).unwrap();
