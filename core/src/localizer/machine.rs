@@ -316,15 +316,15 @@ impl<C: Capacities> Localizer<C> {
         let replacement = self.replaced_by(fix);
         self.integrity.restart(self.parameters.consistency, replacement.as_ref());
         if self.parameters.protection {
-            if matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge)) {
-                self.separation.doubt_mounting();
-            }
             self.separation.step(self.timeline.now(), self.timeline.odometry_pose());
         }
         self.timeline.begin(fix.time, state);
         if self.parameters.protection {
             let (now, state) = (self.timeline.now(), self.timeline.state());
             self.separation.begin(now, &state.pose, &state.covariance_entries(), self.timeline.odometry_pose());
+            if matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge)) {
+                self.separation.doubt_mounting(now);
+            }
         }
         self.slam.begin(fix.time, &state, &self.parameters.slam);
         self.lost = None;

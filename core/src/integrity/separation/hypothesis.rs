@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::sensor_information::SensorInformation;
-use super::solution::Solution;
+use super::solution::{Laser, Solution};
 use crate::measurement::Time;
 
 /// Landmarks that one solution leaves out.
@@ -56,6 +56,8 @@ pub struct FreeSince {
     pub is_needed: bool,
     /// How well it fits.
     pub fit: Fit,
+    /// Whether the place of the laser is free and the heading has not been found yet.
+    pub has_crooked_arm: bool,
     /// The solution.
     pub solution: Solution,
 }
@@ -98,7 +100,27 @@ impl FreeSince {
     /// Begins at `since`.
     #[must_use]
     pub const fn new(since: Time, solution: Solution) -> Self {
-        Self { since, turned: 0.0, driven: 0.0, is_needed: false, fit: Fit { mean: 0.0 }, solution }
+        Self {
+            since,
+            turned: 0.0,
+            driven: 0.0,
+            is_needed: false,
+            fit: Fit { mean: 0.0 },
+            has_crooked_arm: false,
+            solution,
+        }
+    }
+
+    /// Takes what landmarks say; true if the solution does not hold. While the heading was hardly known, the arm to the laser pointed
+    /// elsewhere in each step, which looks like a turn and tells a place of the laser that nothing has shown: what was learned of
+    /// places until then is forgotten.
+    pub fn correct(&mut self, told: &SensorInformation, laser: &Laser) -> bool {
+        let square = self.solution.correct(told, laser);
+        if self.has_crooked_arm && self.solution.is_heading_sure() {
+            self.has_crooked_arm = false;
+            self.solution.forget_places();
+        }
+        self.fit.refutes(square)
     }
 
     /// Whether a free place and yaw of the laser have been found.
@@ -107,12 +129,17 @@ impl FreeSince {
         self.turned >= ENOUGH.0 && self.has_found_yaw()
     }
 
+    /// Whether it knows its pose well, mounting and all.
+    #[must_use]
+    pub fn is_well_known(&self) -> bool {
+        let (position, heading) = self.solution.variances();
+        position <= WELL_KNOWN.0 * WELL_KNOWN.0 && heading <= WELL_KNOWN.1 * WELL_KNOWN.1
+    }
+
     /// Whether its bound counts: it is needed, or it has found the place of the laser, or knows its pose well without.
     #[must_use]
     pub fn counts(&self) -> bool {
-        let (position, heading) = self.solution.variances();
-        let is_well_known = position <= WELL_KNOWN.0 * WELL_KNOWN.0 && heading <= WELL_KNOWN.1 * WELL_KNOWN.1;
-        self.is_needed || self.has_found_mounting() || is_well_known
+        self.is_needed || self.has_found_mounting() || self.is_well_known()
     }
 
     /// Whether a free yaw of the laser has been found.

@@ -163,12 +163,14 @@ impl SolutionSeparation {
         self.rest_on(pose, 1.0);
     }
 
-    /// The map has contradicted the pose, and nobody knows why: a laser that is mounted elsewhere counts from now on, however
-    /// little is known of it, until a turn has shown its place.
-    pub fn doubt_mounting(&mut self) {
-        if let Some(mounting) = &mut self.mounting {
-            mounting.is_needed = true;
-        }
+    /// The map has contradicted the pose at `now`, and nobody knows why: mounting or clock of the laser may be others since then, so
+    /// they are free again, and that counts at once, until a turn has shown them.
+    /// To be called behind [`Self::begin`].
+    pub fn doubt_mounting(&mut self, now: Time) {
+        self.mounting = Some(FreeSince { is_needed: true, ..self.free_mounting(now) });
+        self.next_mounting = None;
+        let pose = self.pose;
+        self.rest_on(&pose, self.surprise);
     }
 
     /// Whether the corrections say that the laser has moved: as long as they do, the solutions count in which it has.
@@ -181,7 +183,7 @@ impl SolutionSeparation {
         let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
         solution.free_mounting();
         solution.free_clock();
-        FreeSince::new(since, solution)
+        FreeSince { has_crooked_arm: true, ..FreeSince::new(since, solution) }
     }
 
     /// A laser that was turned before has shown a wrong heading.
@@ -390,8 +392,7 @@ impl SolutionSeparation {
             let Some(free) = one else { return false };
             free.driven += driven;
             free.turned += turned;
-            let square = free.solution.correct(told, laser);
-            let is_refuted = free.fit.refutes(square);
+            let is_refuted = free.correct(told, laser);
             if is_refuted {
                 *one = None;
             }
@@ -409,7 +410,7 @@ impl SolutionSeparation {
             self.yaw = None;
             self.next_mounting = Some(self.free_mounting(now));
         }
-        if let Some(found) = self.next_mounting.take_if(|next| next.has_found_mounting()) {
+        if let Some(found) = self.next_mounting.take_if(|next| next.has_found_mounting() && next.is_well_known()) {
             // Whatever was knocked before is free in it.
             self.knocks.retain(|knock| !knock.is_over || knock.from >= found.since);
             self.mounting = Some(found);

@@ -63,7 +63,8 @@ const YAW: usize = 5;
 const CLOCK: usize = 6;
 const ODOMETRY: usize = 7;
 
-/// Deviations of what is free: place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
+/// Deviations of what is free: position of R, m; place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
+const FREE_POSITION: f64 = 1.0;
 const FREE_PLACE: f64 = 0.6;
 const FREE_YAW: f64 = 0.175;
 const FREE_CLOCK: f64 = 0.2;
@@ -209,6 +210,18 @@ impl Solution {
     /// The laser may be anywhere within what a knock can do.
     pub fn free_mounting(&mut self) {
         self.forget(MOUNTING, &[FREE_PLACE, FREE_PLACE, FREE_YAW]);
+    }
+
+    /// Nothing is known of the places of R and of the laser.
+    pub fn forget_places(&mut self) {
+        self.forget(0, &[FREE_POSITION, FREE_POSITION]);
+        self.forget(MOUNTING, &[FREE_PLACE, FREE_PLACE]);
+    }
+
+    /// Whether the heading is known so well that the model is linear.
+    #[must_use]
+    pub fn is_heading_sure(&self) -> bool {
+        self.variances().1 <= SURE_HEADING
     }
 
     /// The clock of the laser may be off.
