@@ -195,11 +195,20 @@ fn each_remedy_for_a_symptom_runs() {
     };
     succeed("agv calibrate plan --area 14x11 --steering 18..50 --time 300 --scenario plan.toml");
     succeed("agv simulate plan.toml --output drive.agvlog");
+    // Noise is found on a day's drive of a vehicle that is calibrated.
+    succeed("agv simulate host-sim/scenarios/warehouse_hall.toml --output hall.agvlog");
     let sensor = Server::start(&[]);
     let remedies = remedies(&page);
     assert!(remedies.len() >= 4, "{remedies:?}");
     for remedy in &remedies {
-        succeed(&remedy.replace("LOG", "drive.agvlog").replace("HOST", &sensor.host));
+        if remedy.contains(" --put-right ") {
+            // The clock of this drive is right, and the command says so; one that is off is mended in the tests of the calibration.
+            let output = run(&remedy.replace("LOG", "drive.agvlog"), folder.path());
+            assert!(!output.status.success() && text(&output.stderr).contains("times are not off"), "{output:?}");
+            continue;
+        }
+        let log = if remedy.contains(" noise ") { "hall.agvlog" } else { "drive.agvlog" };
+        succeed(&remedy.replace("LOG", log).replace("HOST", &sensor.host));
     }
     // What needs a controller runs against one that is emulated, with the file that the calibration has left.
     std::fs::write(folder.path().join("agv.key"), ctl::KEY).unwrap();

@@ -9,8 +9,9 @@ use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use agv_core::maps::Landmark;
-use agv_core::measurement::EncoderSample;
+use agv_core::geometry::Point;
+use agv_core::maps::{Landmark, LandmarkKind};
+use agv_core::measurement::{EncoderSample, ReflectorObservation};
 use agv_core::state::Mode;
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, Setting};
@@ -31,6 +32,9 @@ const SECONDS: f64 = 120.0;
 /// A machine that keeps the encoders waiting for longer shows faults of its own, s.
 const LONGEST_STALL: f64 = 0.012;
 
+/// Reflectors that it sees: a vehicle that stands is not believed to have found itself with fewer than five.
+const SEEN: usize = 8;
+
 /// The standard hall, seen by a vehicle that stands at the start of the drive.
 fn standing() -> Recording {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/scenarios/warehouse_hall.toml");
@@ -42,13 +46,26 @@ fn standing() -> Recording {
         })
     };
     let stand = first(&recording.events).unwrap();
-    let is_seen =
-        |event: &&RecordedEvent| matches!(event, RecordedEvent::Reflectors(seen) if !seen.observations.is_empty());
-    let mut events = vec![recording.events.iter().find(is_seen).unwrap().clone()];
+    let sensor = recording.truth[0].pose.compose(recording.parameters.lasers.first());
+    let places = recording.landmarks.iter().filter(|landmark| landmark.kind == LandmarkKind::Reflector);
+    let mut seen: Vec<_> = places.map(|landmark| sensor.inverse_transform(&landmark.position())).collect();
+    seen.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let revolution = recording.events.iter().find(|event| matches!(event, RecordedEvent::Reflectors(_))).unwrap();
+    let revolutions = (0..(8.0 * SECONDS) as u32).map(|number| {
+        let mut revolution = revolution.clone();
+        if let RecordedEvent::Reflectors(told) = &mut revolution {
+            let time = stand.time.offset(0.125 * f64::from(number) + 0.06);
+            let observe =
+                |at: &Point| ReflectorObservation { time, range: at.norm() as f32, bearing: at.y.atan2(at.x) as f32 };
+            told.observations = seen[..SEEN].iter().map(observe).collect();
+        }
+        revolution
+    });
     let counts = (0..(100.0 * SECONDS) as u32).map(|step| {
         RecordedEvent::Encoders(EncoderSample { time: stand.time.offset(0.01 * f64::from(step)), ..stand })
     });
-    events.extend(counts);
+    let mut events: Vec<RecordedEvent> = revolutions.chain(counts).collect();
+    events.sort_by_key(RecordedEvent::time);
     recording.events = events;
     let pose = recording.truth[0].pose;
     recording.truth.iter_mut().for_each(|truth| truth.pose = pose);
