@@ -230,24 +230,26 @@ fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
     let lidar = lidar(rings);
     let scene = scene(hall, &mut random);
     let cuboids: Vec<Cuboid> = scene.fixed.iter().copied().chain(scene.changing.iter().copied().flatten()).collect();
-    let mut contexts = Vec::new();
-    let mut places = Vec::new();
+    let mut stored = Vec::new();
     for lane in mapped(hall) {
         for step in 0..20 {
             let pose = Pose { place: [-19.0 + 2.0 * step as f32, *lane], heading: 0.0 };
             let found = seen(&scan(&cuboids, &pose, &lidar, &mut random), &lidar);
-            contexts.push(found.context);
-            places.push(Place { pose, image: found.image, panorama: found.panorama });
+            stored.push((pose, found));
         }
     }
-    let index = PlaceIndex::new(&places, RIGHT);
+    let places: Vec<Place> =
+        stored.iter().map(|(pose, seen)| Place { pose: *pose, image: &seen.image, panorama: &seen.panorama }).collect();
+    let index = PlaceIndex::new(places.clone(), RIGHT);
+    let limit = index.learnt_limit(|_| ());
+    let index = index.with_limit(limit);
     let mut outcome = Outcome {
         answerable: 0,
         context: Vec::new(),
         verified: Vec::new(),
         believed: [0; 2],
         ambiguous: 0,
-        limit: index.limit(),
+        limit,
         errors: Vec::new(),
     };
     for number in 0..queries {
@@ -260,7 +262,7 @@ fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
         let asked = seen(&points, &lidar);
         let is_in_map = places.iter().any(|place| place.pose.apart(&pose) <= RIGHT);
         outcome.answerable += usize::from(is_in_map);
-        let distances = contexts.iter().map(|context| context.distance(&asked.context) as f32).enumerate();
+        let distances = stored.iter().map(|(_, place)| place.context.distance(&asked.context) as f32).enumerate();
         let (node, distance) = distances.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         outcome.context.push((distance, places[node].pose.apart(&pose) <= RIGHT));
         let scan = Asked::new(&asked.panorama, asked.points.iter().copied());

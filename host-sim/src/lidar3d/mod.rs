@@ -6,6 +6,7 @@ pub mod decoder;
 pub mod kind;
 pub mod live;
 pub mod place_map;
+pub mod place_search;
 pub mod refinement;
 pub mod revolution;
 pub mod setup;
@@ -14,6 +15,7 @@ pub mod signatures;
 pub mod source;
 pub mod stand;
 pub mod survey;
+pub mod view;
 
 pub use revolution::{Revolution, Revolutions};
 pub use setup::Setup;

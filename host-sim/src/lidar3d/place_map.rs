@@ -2,10 +2,14 @@
 
 use std::path::Path;
 
-use agv_lidar3d::place::{BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, from_key_scans};
+use agv_lidar3d::place::{
+    BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, Panorama, PlaceImage, Span,
+    from_key_scans,
+};
 use serde::{Deserialize, Serialize};
 
 use super::signatures::{Method, Signatures};
+use super::view::{Standing, View};
 use crate::output_file;
 use crate::text_file::TextFileError;
 
@@ -18,7 +22,10 @@ const NUMBERS_APART: usize = 15;
 const LEARNING_PLACES: usize = 128;
 
 /// First bytes of a file of places: of this program, and their version.
-const MAGIC: [u8; 8] = *b"AGVP3D\x01\n";
+const MAGIC: [u8; 8] = *b"AGVP3D\x02\n";
+
+/// The same of files without images and panoramas.
+const OLDER: [u8; 8] = *b"AGVP3D\x01\n";
 
 /// A place as it is stored.
 #[derive(Clone, Debug)]
@@ -29,13 +36,21 @@ pub struct StoredPlace {
     pub pose: Option<[f64; 3]>,
     /// Its signatures.
     pub signatures: Signatures,
+    /// What it looks like.
+    pub view: View,
 }
 
 /// Places that can be searched.
 #[derive(Clone, Debug)]
 pub struct PlaceMap {
-    /// Height of the sensor above the ground, m.
-    pub sensor_height: f32,
+    /// How the sensor stands above the floor.
+    pub standing: Standing,
+    /// Its rings.
+    pub rings: usize,
+    /// Between which elevations it looks.
+    pub span: Span,
+    /// The score from which answers are believed, if it was learnt.
+    pub limit: Option<f32>,
     /// The places.
     pub places: Vec<StoredPlace>,
 }
@@ -119,6 +134,11 @@ const FACING_SCALE: f32 = 65_535.0;
 #[derive(Serialize, Deserialize)]
 struct File {
     sensor_height: f32,
+    is_height_given: bool,
+    rings: u16,
+    /// Least and greatest elevation, rad.
+    span: [f32; 2],
+    limit: Option<f32>,
     places: Vec<Entry>,
 }
 
@@ -132,6 +152,10 @@ struct Entry {
     orientation: Vec<u16>,
     /// Walls by direction, in 1/65535.
     facing: Vec<u16>,
+    image: Vec<u8>,
+    panorama: Vec<u8>,
+    /// Of the sensor above the floor, m.
+    height: f32,
 }
 
 /// Writes places; an older file of that name is replaced.
@@ -146,8 +170,18 @@ pub fn write(path: &Path, map: &PlaceMap) -> Result<(), TextFileError> {
         enriched: place.signatures.enriched.0.to_vec(),
         orientation: place.signatures.orientation.0.iter().map(|range| (100.0 * range).round() as u16).collect(),
         facing: place.signatures.facing.0.iter().map(|share| (FACING_SCALE * share).round() as u16).collect(),
+        image: place.view.image.to_bytes().to_vec(),
+        panorama: place.view.panorama.to_bytes().to_vec(),
+        height: place.view.panorama.height(),
     });
-    let file = File { sensor_height: map.sensor_height, places: places.collect() };
+    let file = File {
+        sensor_height: map.standing.height(),
+        is_height_given: matches!(map.standing, Standing::Given(_)),
+        rings: map.rings as u16,
+        span: [map.span.least, map.span.most],
+        limit: map.limit,
+        places: places.collect(),
+    };
     let failed = |reason: String| TextFileError::of_system(path, std::io::Error::other(reason));
     let bytes = postcard::to_extend(&file, MAGIC.to_vec()).map_err(|error| failed(error.to_string()))?;
     output_file::write(path, bytes).map_err(|source| TextFileError::of_system(path, source))
@@ -161,21 +195,35 @@ pub fn read(path: &Path) -> Result<PlaceMap, TextFileError> {
     let bytes = std::fs::read(path).map_err(|source| TextFileError::of_system(path, source))?;
     let foreign =
         || TextFileError::of_line(path, 1, "this is no file of places that 'agv lidar3d places index' has written");
-    let body = bytes.strip_prefix(&MAGIC).ok_or_else(foreign)?;
+    let old = || TextFileError::of_line(path, 1, "an older version has stored these places: index them again");
+    let body = bytes.strip_prefix(&MAGIC).ok_or_else(|| if bytes.starts_with(&OLDER) { old() } else { foreign() })?;
     let file: File = postcard::from_bytes(body).map_err(|_| foreign())?;
-    let places: Option<Vec<StoredPlace>> = file.places.iter().map(place).collect();
-    match places {
-        Some(places) if file.sensor_height.is_finite() => Ok(PlaceMap { sensor_height: file.sensor_height, places }),
-        _ => Err(foreign()),
-    }
+    map(&file).ok_or_else(foreign)
 }
 
-fn place(entry: &Entry) -> Option<StoredPlace> {
+fn map(file: &File) -> Option<PlaceMap> {
+    let height = file.sensor_height;
+    let [least, most] = file.span;
+    let is_sound = height.is_finite() && least < most && file.rings > 0;
+    let (span, rings) = (Span { least, most }, usize::from(file.rings));
+    let places: Option<Vec<StoredPlace>> = file.places.iter().map(|entry| place(entry, rings, span)).collect();
+    is_sound.then_some(PlaceMap {
+        standing: if file.is_height_given { Standing::Given(height) } else { Standing::Found(height) },
+        rings,
+        span,
+        limit: file.limit.filter(|limit| limit.is_finite()),
+        places: places?,
+    })
+}
+
+fn place(entry: &Entry, rings: usize, span: Span) -> Option<StoredPlace> {
     let histogram: [u32; BINS] = entry.histogram.as_slice().try_into().ok()?;
     let enriched: [i8; ENRICHED_LENGTH] = entry.enriched.as_slice().try_into().ok()?;
     let orientation: [u16; DIRECTIONS] = entry.orientation.as_slice().try_into().ok()?;
     let facing: [u16; DIRECTIONS] = entry.facing.as_slice().try_into().ok()?;
-    if entry.pose.is_some_and(|pose| !pose.iter().all(|value| value.is_finite())) {
+    let image = PlaceImage::from_bytes(entry.image.as_slice().try_into().ok()?)?;
+    let panorama = Panorama::from_bytes(entry.panorama.as_slice().try_into().ok()?, rings, span, entry.height);
+    if !entry.height.is_finite() || entry.pose.is_some_and(|pose| !pose.iter().all(|value| value.is_finite())) {
         return None;
     }
     let counts = Histogram(histogram.map(f64::from));
@@ -186,5 +234,5 @@ fn place(entry: &Entry) -> Option<StoredPlace> {
         orientation: Orientation(orientation.map(|range| 0.01 * f32::from(range))),
         facing: Facing(facing.map(|share| f32::from(share) / FACING_SCALE)),
     };
-    Some(StoredPlace { scan: entry.scan as usize, pose: entry.pose, signatures })
+    Some(StoredPlace { scan: entry.scan as usize, pose: entry.pose, signatures, view: View { image, panorama } })
 }

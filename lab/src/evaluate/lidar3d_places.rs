@@ -1,14 +1,17 @@
 //! How well signatures of multi-beam scans recognise places.
 //!
 //! Protocol A: the map is every other key scan, 1 m apart, of the first 150 m; queries are the others of the whole route;
-//! an answer within 3 m is right. A10: the nodes of the map are 10 m apart, right is within 5.5 m. A query beyond the map
-//! has no right answer. Poses, computed by another program, are used to choose key scans and to judge, never to answer.
+//! an answer within 3 m is right. A10: the nodes of the map are 10 m apart, right is within 5.5 m. A10b: the same, and answers
+//! of 5.5 to 7.5 m, near-misses of the same street, count neither way. A query beyond the map has no right answer. Poses, computed by another program, are used to choose key scans and to judge, never to answer.
 
 use std::path::Path;
 use std::time::Instant;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{DIRECTIONS, Histogram, Neighbours, chi_square, from_key_scans};
+use agv_lidar3d::place::{
+    Asked, AskedImage, DIRECTIONS, Floor, Histogram, Neighbours, Panorama, PlaceImage, SECTORS, Span, Stored,
+    chi_square, from_key_scans,
+};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -17,8 +20,30 @@ use serde::Serialize;
 use agv_host_sim::import::range_image::{RangeImageError, RangeImages};
 use agv_host_sim::lidar3d::place_map::APART;
 use agv_host_sim::lidar3d::signatures::{Method, Signatures, sensor_height};
+use agv_host_sim::lidar3d::view::View;
 
 const SEED: u64 = 1;
+/// Places that are aligned, and the farthest that an alignment is looked for, m.
+const CANDIDATES: usize = 10;
+const REACH: f32 = 6.0;
+
+/// Which scans are the map, and which answers are right.
+#[derive(Clone, Copy)]
+struct Protocol {
+    name: &'static str,
+    /// Key scans from one node to the next.
+    spacing: usize,
+    /// Answers within this are right, m.
+    right: f64,
+    /// From here on they are wrong, m.
+    wrong: f64,
+}
+
+const PROTOCOLS: [Protocol; 3] = [
+    Protocol { name: "A", spacing: 2, right: 3.0, wrong: 3.0 },
+    Protocol { name: "A10", spacing: 10, right: 5.5, wrong: 5.5 },
+    Protocol { name: "A10b", spacing: 10, right: 5.5, wrong: 7.5 },
+];
 
 /// What a method achieves by one protocol.
 #[derive(Clone, Debug, Serialize)]
@@ -33,10 +58,10 @@ pub struct Outcome {
     pub recall_at_full_precision: f64,
     /// Best harmonic mean of precision and recall over all thresholds.
     pub max_f1: f64,
-    /// Precision with the threshold that was learned from the map alone.
-    pub learned_precision: f64,
+    /// Precision with the threshold that was learned from the map alone; None of alignments, which learn it in `PlaceIndex`.
+    pub learned_precision: Option<f64>,
     /// Recall with it.
-    pub learned_recall: f64,
+    pub learned_recall: Option<f64>,
     /// Time for a signature, ms.
     pub signature_ms: f64,
     /// Time for a comparison, us.
@@ -56,8 +81,11 @@ struct Described {
     signatures: Signatures,
     /// The thesis's histogram of fitted planes.
     planes: Histogram,
-    /// Seconds for the histogram, for the enriched signature with it, and for the histogram of planes.
-    seconds: [f64; 3],
+    view: View,
+    /// Points above the floor.
+    points: Vec<[f32; 3]>,
+    /// Seconds for the histogram, for the enriched signature with it, for the histogram of planes, and for the view.
+    seconds: [f64; 4],
 }
 
 /// What is measured.
@@ -68,13 +96,17 @@ enum Experiment {
     Checked(Method),
     /// The thesis's histogram of fitted planes, chi-square of counts.
     Planes,
+    /// Images of places.
+    Image,
+    /// The ten places whose images are most alike, aligned.
+    Aligned,
 }
 
 impl Experiment {
     fn all() -> impl Iterator<Item = Self> {
         let checked = Method::ALL.into_iter().filter(|method| *method != Method::Enriched);
         let methods = Method::ALL.into_iter().map(Self::Method);
-        methods.chain(checked.map(Self::Checked)).chain([Self::Planes])
+        methods.chain(checked.map(Self::Checked)).chain([Self::Planes, Self::Image, Self::Aligned])
     }
 
     fn name(self) -> &'static str {
@@ -82,6 +114,8 @@ impl Experiment {
             Self::Method(method) => method.name(),
             Self::Checked(method) => method.checked_name(),
             Self::Planes => "thesis chi-square, plane fit",
+            Self::Image => "image",
+            Self::Aligned => "image, ten aligned",
         }
     }
 
@@ -94,6 +128,8 @@ impl Experiment {
             Self::Method(method) => method.bytes(),
             Self::Checked(method) => method.bytes() + DIRECTIONS,
             Self::Planes => Method::ChiSquare.bytes(),
+            Self::Image => PlaceImage::BYTES,
+            Self::Aligned => PlaceImage::BYTES + Panorama::BYTES,
         }
     }
 
@@ -101,27 +137,38 @@ impl Experiment {
         match self {
             Self::Method(method) | Self::Checked(method) => method.distance(&one.signatures, &other.signatures),
             Self::Planes => chi_square(&one.planes, &other.planes),
+            Self::Image | Self::Aligned => {
+                let likeness = other.view.image.likeness(&one.view.image);
+                likeness.map_or(f64::MAX, |likeness| f64::from(likeness.distance))
+            }
         }
     }
 
     /// Seconds for the signature of a scan.
     fn seconds(self, described: &Described) -> f64 {
-        let [histogram, enriched, planes] = described.seconds;
+        let [histogram, enriched, planes, view] = described.seconds;
         match self {
             Self::Method(Method::Enriched) => enriched,
             Self::Method(_) | Self::Checked(_) => histogram,
             Self::Planes => planes,
+            Self::Image | Self::Aligned => view,
         }
     }
 }
 
 impl Described {
-    fn new(points: &[Option<[f32; 3]>], rings: usize, sensor_height: f32) -> Option<Self> {
+    fn new(points: &[Option<[f32; 3]>], rings: usize, sensor_height: f32, span: Span) -> Option<Self> {
         let cloud = Cloud::new(points, rings)?;
         let (signatures, [histogram, enriched]) = Signatures::timed(&cloud, sensor_height);
         let start = Instant::now();
         let planes = Histogram::of_planes(&cloud, &Neighbours::default());
-        Some(Self { signatures, planes, seconds: [histogram, enriched, start.elapsed().as_secs_f64()] })
+        let planes_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let floor = Floor::find(&cloud).map_or(Floor::level(sensor_height), Floor::without_small_slope);
+        let view = View::new(&cloud, &floor, span);
+        let seconds = [histogram, enriched, planes_seconds, start.elapsed().as_secs_f64()];
+        let points = cloud.seen().map(|point| floor.levelled(point)).collect();
+        Some(Self { signatures, planes, view, points, seconds })
     }
 }
 
@@ -147,6 +194,8 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
     let images = RangeImages::open(&folder.join("velodyne_dist"))?;
     let keys = key_scans(&folder.join("kiss_icp_poses_derived.txt"), images.files.len())?;
     let rings = images.elevations.len();
+    let span = Span::of_elevations(images.elevations.iter().map(|elevation| *elevation as f32));
+    let span = span.unwrap_or(Span::HDL64E);
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let mut height = None;
     let mut whole = Vec::new();
@@ -160,22 +209,22 @@ pub fn moosmann(folder: &Path, mut progress: impl FnMut(usize)) -> Result<Vec<Ou
         let halved: Vec<_> = points.chunks_exact(columns).flat_map(|row| row.iter().step_by(2).copied()).collect();
         let turn: f32 = random.random_range(-3.1..3.1);
         turns.push(f64::from(turn));
-        whole.extend(Described::new(&points, rings, height));
-        half.extend(Described::new(&halved, rings, height));
-        asked_turn.extend(Described::new(&turned(&points, turn), rings, height).map(|found| found.signatures));
+        whole.extend(Described::new(&points, rings, height, span));
+        half.extend(Described::new(&halved, rings, height, span));
+        asked_turn.extend(Described::new(&turned(&points, turn), rings, height, span).map(|found| found.signatures));
         progress(keys.len());
     }
     let mut outcomes = Vec::new();
-    for (protocol, spacing, right) in [("A", 2usize, 3.0), ("A10", 10, 5.5)] {
+    for protocol in PROTOCOLS {
         let map: Vec<usize> =
-            (0..keys.len()).step_by(spacing).filter(|index| keys[*index].travelled <= 150.0).collect();
+            (0..keys.len()).step_by(protocol.spacing).filter(|index| keys[*index].travelled <= 150.0).collect();
         let queries: Vec<usize> = (1..keys.len()).step_by(2).collect();
         for half_columns in [false, true] {
             for experiment in Experiment::all() {
                 let asked = if half_columns { &half } else { &whole };
-                let test = Test { keys: &keys, map: &map, queries: &queries, stored: &whole, asked, right };
+                let test = Test { keys: &keys, map: &map, queries: &queries, stored: &whole, asked, protocol };
                 let mut outcome = test.run(experiment);
-                outcome.protocol = protocol;
+                outcome.protocol = protocol.name;
                 outcome.half_columns = half_columns;
                 outcome.orientation_within_2_deg = orientation(&test, &asked_turn, &turns);
                 outcomes.push(outcome);
@@ -191,10 +240,34 @@ struct Test<'a> {
     queries: &'a [usize],
     stored: &'a [Described],
     asked: &'a [Described],
-    right: f64,
+    protocol: Protocol,
 }
 
 impl Test<'_> {
+    /// The node that is nearest to a query, and its distance.
+    fn nearest(&self, experiment: Experiment, query: usize) -> Option<(f64, usize)> {
+        let distance = |&node: &usize| (experiment.distance(&self.asked[query], &self.stored[node]), node);
+        self.map.iter().map(distance).filter(|(distance, _)| *distance < f64::MAX).min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Of the best by their images the one that agrees most when it is aligned; answers that lie farther away than right ones
+    /// are none.
+    fn aligned(&self, query: usize) -> Option<(f64, usize)> {
+        let asked = &self.asked[query];
+        let image = AskedImage::new(&asked.view.image);
+        let likeness = |&node: &usize| Some((image.likeness(&self.stored[node].view.image)?, node));
+        let mut alike: Vec<_> = self.map.iter().filter_map(likeness).collect();
+        alike.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
+        let scan = Asked::new(&asked.view.panorama, asked.points.iter().copied());
+        let found = alike.into_iter().take(CANDIDATES).filter_map(|(likeness, node)| {
+            let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
+            let found = Stored::new(&self.stored[node].view.panorama).align(&scan, &headings, REACH)?;
+            let is_near = f64::from(found.pose.place[0].hypot(found.pose.place[1])) <= self.protocol.right;
+            is_near.then_some((1.0 - f64::from(found.score), node))
+        });
+        found.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
     fn apart(&self, one: usize, other: usize) -> f64 {
         let (a, b) = (self.keys[one].position, self.keys[other].position);
         (a[0] - b[0]).hypot(a[1] - b[1])
@@ -203,7 +276,7 @@ impl Test<'_> {
     /// The node of the map that is nearest to a query, if it is near enough to be right.
     fn truth(&self, query: usize) -> Option<usize> {
         let nearest = self.map.iter().copied().min_by(|a, b| self.apart(query, *a).total_cmp(&self.apart(query, *b)));
-        nearest.filter(|node| self.apart(query, *node) <= self.right)
+        nearest.filter(|node| self.apart(query, *node) <= self.protocol.right)
     }
 
     fn run(&self, experiment: Experiment) -> Outcome {
@@ -217,11 +290,11 @@ impl Test<'_> {
         let start = Instant::now();
         let mut found = Vec::new();
         for &query in self.queries {
-            let distances =
-                self.map.iter().map(|&node| (experiment.distance(&self.asked[query], &self.stored[node]), node));
-            if let Some((distance, node)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                found.push((distance, query, node));
-            }
+            let nearest = match experiment {
+                Experiment::Aligned => self.aligned(query),
+                _ => self.nearest(experiment, query),
+            };
+            found.extend(nearest.map(|(distance, node)| (distance, query, node)));
         }
         let compare_us = start.elapsed().as_secs_f64() * 1e6 / (self.queries.len() * self.map.len()) as f64;
         let answerable = self.queries.iter().filter(|query| self.truth(**query).is_some()).count();
@@ -229,10 +302,14 @@ impl Test<'_> {
             let [one, other] = [&self.asked[query], &self.stored[node]].map(|described| &described.signatures.facing);
             !is_checked || f64::from(one.distance(other)) < check
         };
+        let is_right = |query: usize, node: usize| {
+            let apart = self.apart(query, node);
+            (apart <= self.protocol.right || apart > self.protocol.wrong).then_some(apart <= self.protocol.right)
+        };
         let mut answers: Vec<(f64, bool)> = found
             .into_iter()
             .filter(|(_, query, node)| is_like(*query, *node))
-            .map(|(distance, query, node)| (distance, self.apart(query, node) <= self.right))
+            .filter_map(|(distance, query, node)| Some((distance, is_right(query, node)?)))
             .collect();
         let threshold = from_key_scans(&places, APART, |one, other| {
             experiment.distance(&self.stored[self.map[one]], &self.stored[self.map[other]])
@@ -241,7 +318,8 @@ impl Test<'_> {
         answers.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (recall_at_full_precision, max_f1) = best_scores(&answers, answerable);
         let learned = answers.partition_point(|(distance, _)| *distance < threshold);
-        let (learned_precision, learned_recall) = score(&answers[..learned], answerable);
+        let is_aligned = matches!(experiment, Experiment::Aligned);
+        let (learned_precision, learned_recall) = (!is_aligned).then(|| score(&answers[..learned], answerable)).unzip();
         let mut seconds: Vec<f64> = self.asked.iter().map(|described| experiment.seconds(described)).collect();
         seconds.sort_by(f64::total_cmp);
         Outcome {

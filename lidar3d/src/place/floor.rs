@@ -1,5 +1,6 @@
 //! The floor under a sensor: how high the sensor stands above it, and how it leans.
 
+use super::solved::solved;
 use crate::cloud::Cloud;
 
 /// Points of floor are looked for at these distances, m, first the nearer ones: a leaning sensor sees the farther ones at
@@ -114,25 +115,4 @@ fn lowest_plane(cloud: &Cloud<'_>) -> Option<f32> {
     let most = counts.iter().copied().fold(0.0, f32::max);
     let class = counts.iter().rposition(|count| most > 0.0 && *count >= LEAST * most)?;
     Some(HEIGHTS[0] + CLASS * (class as f32 + 0.5))
-}
-
-/// The solution of three equations by elimination; None if they have none.
-fn solved(mut rows: [[f64; 4]; 3]) -> Option<[f64; 3]> {
-    for pivot in 0..3 {
-        let best = (pivot..3).max_by(|a, b| libm::fabs(rows[*a][pivot]).total_cmp(&libm::fabs(rows[*b][pivot])))?;
-        rows.swap(pivot, best);
-        let lead = rows[pivot];
-        if libm::fabs(lead[pivot]) < 1e-9 {
-            return None;
-        }
-        for (number, row) in rows.iter_mut().enumerate() {
-            if number != pivot {
-                let factor = row[pivot] / lead[pivot];
-                for (value, lead) in row.iter_mut().zip(lead) {
-                    *value -= factor * lead;
-                }
-            }
-        }
-    }
-    Some([0, 1, 2].map(|at| rows[at][3] / rows[at][at]))
 }

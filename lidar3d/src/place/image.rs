@@ -59,7 +59,12 @@ impl PlaceImage {
         }
         let beams = (cloud.rings() * cloud.columns()) as f32 / SECTORS as f32;
         let is_known = |(_, count): &(usize, &u32)| **count as f32 > KNOWN * beams;
-        let known = returned.iter().enumerate().filter(is_known).fold(0, |known, (sector, _)| known | 1 << sector);
+        let known = returned.iter().enumerate().filter(is_known).fold(0_u64, |known, (sector, _)| known | 1 << sector);
+        for (sector, rings) in bins.iter_mut().enumerate() {
+            if known >> sector & 1 == 0 {
+                *rings = [0; RINGS];
+            }
+        }
         Self { bins, known }
     }
 
@@ -67,9 +72,73 @@ impl PlaceImage {
     /// best of all turns. None if they nowhere know enough in common.
     #[must_use]
     pub fn likeness(&self, asked: &Self) -> Option<Likeness> {
+        AskedImage::new(asked).likeness(self)
+    }
+
+    /// Squares of the lengths of the sectors, as they are compared; nothing of those that it does not know.
+    fn squares(&self) -> [u32; SECTORS] {
+        self.bins.map(|rings| rings.iter().map(|bin| u32::from(*bin) * u32::from(*bin)).sum())
+    }
+
+    /// As it is stored: bins, sector after sector, and a bit a sector that it knows.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let known = self.known.to_le_bytes();
+        for (byte, value) in bytes.iter_mut().zip(self.bins.as_flattened().iter().chain(&known)) {
+            *byte = *value;
+        }
+        bytes
+    }
+
+    /// What [`Self::to_bytes`] has made; None if it is something else.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Option<Self> {
+        let (rings, known) = bytes.split_at(SECTORS * RINGS);
+        let known = u64::from_le_bytes(known.try_into().ok()?);
+        let mut bins = [[0; RINGS]; SECTORS];
+        for (bin, value) in bins.as_flattened_mut().iter_mut().zip(rings) {
+            *bin = *value;
+        }
+        let is_empty = |(sector, rings): (usize, &[u8; RINGS])| known >> sector & 1 == 1 || *rings == [0; RINGS];
+        (known >> SECTORS == 0 && bins.iter().enumerate().all(is_empty)).then_some(Self { bins, known })
+    }
+
+    /// Rings of the sectors that it knows.
+    pub(super) fn sectors(&self) -> impl Iterator<Item = &[u8; RINGS]> {
+        self.bins.iter().enumerate().filter(|(sector, _)| self.known >> sector & 1 == 1).map(|(_, rings)| rings)
+    }
+
+    /// Number of sectors that it knows.
+    #[must_use]
+    pub fn known_sectors(&self) -> u32 {
+        self.known.count_ones()
+    }
+}
+
+/// An image that is asked for, ready to be compared with many.
+#[derive(Clone, Debug)]
+pub struct AskedImage {
+    /// Its sectors, twice round.
+    bins: [[[u8; RINGS]; SECTORS]; 2],
+    known: u64,
+    squares: [u32; SECTORS],
+}
+
+impl AskedImage {
+    /// Of an image.
+    #[must_use]
+    pub fn new(image: &PlaceImage) -> Self {
+        Self { bins: [image.bins; 2], known: image.known, squares: image.squares() }
+    }
+
+    /// How alike it is to a stored one: see [`PlaceImage::likeness`].
+    #[must_use]
+    pub fn likeness(&self, stored: &PlaceImage) -> Option<Likeness> {
+        let squares = stored.squares();
         let mut distances = [f32::MAX; SECTORS];
         for (turn, distance) in distances.iter_mut().enumerate() {
-            *distance = self.distance_at(asked, turn);
+            *distance = self.distance_at(stored, &squares, turn);
         }
         let best = |except: Option<usize>| {
             let turns =
@@ -82,32 +151,28 @@ impl PlaceImage {
     }
 
     /// Distance where the asked scene is turned by so many sectors.
-    fn distance_at(&self, asked: &Self, turn: usize) -> f32 {
-        let (mut both, mut own, mut other, mut sectors) = (0_u32, 0_u32, 0_u32, 0_u32);
-        for (sector, bins) in self.bins.iter().enumerate() {
-            let there = (sector + turn) % SECTORS;
-            if self.known >> sector & 1 == 0 || asked.known >> there & 1 == 0 {
-                continue;
-            }
-            let Some(others) = asked.bins.get(there) else { continue };
-            sectors += 1;
-            for (a, b) in bins.iter().zip(others) {
-                let (a, b) = (u32::from(*a), u32::from(*b));
-                both += a * b;
-                own += a * a;
-                other += b * b;
-            }
+    fn distance_at(&self, stored: &PlaceImage, squares: &[u32; SECTORS], turn: usize) -> f32 {
+        const ALL: u64 = (1 << SECTORS) - 1;
+        // The sectors of the asked image, turned back.
+        let known = if turn == 0 { self.known } else { (self.known >> turn | self.known << (SECTORS - turn)) & ALL };
+        let common = known & stored.known;
+        if common.count_ones() < LEAST_SECTORS {
+            return f32::MAX;
         }
-        if sectors < LEAST_SECTORS || own == 0 || other == 0 {
+        let turned = self.bins.as_flattened().get(turn..turn + SECTORS).unwrap_or_default();
+        // What one of them does not know is empty there.
+        let pairs = stored.bins.as_flattened().iter().zip(turned.as_flattened());
+        let both: u32 = pairs.map(|(a, b)| u32::from(*a) * u32::from(*b)).sum();
+        let length = |squares: &[u32; SECTORS], known: u64| -> u32 {
+            squares.iter().enumerate().map(|(sector, square)| (known >> sector & 1) as u32 * square).sum()
+        };
+        let own = length(squares, common);
+        let other =
+            length(&self.squares, if turn == 0 { common } else { (common << turn | common >> (SECTORS - turn)) & ALL });
+        if own == 0 || other == 0 {
             return f32::MAX;
         }
         1.0 - both as f32 / libm::sqrtf(own as f32 * other as f32)
-    }
-
-    /// Number of sectors that it knows.
-    #[must_use]
-    pub fn known_sectors(&self) -> u32 {
-        self.known.count_ones()
     }
 }
 

@@ -3,11 +3,16 @@
 use super::Floor;
 use crate::cloud::Cloud;
 
-/// Rows and columns of a panorama.
-pub const ROWS: usize = 32;
-pub const COLUMNS: usize = 240;
-/// Length of a count of range, m.
-const COUNT: f32 = 0.005;
+/// Directions of a panorama.
+const DIRECTIONS: usize = 7680;
+/// A sensor of so few rings has half of the rows, and twice the columns.
+const FEW_RINGS: usize = 16;
+/// Columns of a panorama: of few rings, and of more.
+pub const COLUMNS: usize = 480;
+const FEW_COLUMNS: usize = 240;
+/// Length of a count of range, m, and the greatest count: what is farther is seen there.
+const COUNT: f32 = 0.02;
+const MOST: f32 = 4095.0;
 const TAU: f32 = core::f32::consts::TAU;
 
 /// Elevations between which a sensor looks, rad.
@@ -20,6 +25,22 @@ pub struct Span {
 }
 
 impl Span {
+    /// Of lasers at these elevations, rad: half of the mean step farther than the outermost. None without two of them.
+    #[must_use]
+    pub fn of_elevations(elevations: impl Iterator<Item = f32>) -> Option<Self> {
+        let (mut least, mut most, mut count) = (f32::MAX, f32::MIN, 0_u16);
+        for elevation in elevations.filter(|elevation| elevation.is_finite()) {
+            least = least.min(elevation);
+            most = most.max(elevation);
+            count += 1;
+        }
+        if count < 2 || least >= most {
+            return None;
+        }
+        let half = 0.5 * (most - least) / f32::from(count - 1);
+        Some(Self { least: least - half, most: most + half })
+    }
+
     /// Of an HDL-64E.
     pub const HDL64E: Self = Self { least: -0.445, most: 0.0436 };
     /// Of a VLP-16.
@@ -29,25 +50,29 @@ impl Span {
 /// The least range in each direction from the sensor, levelled; none where nothing was seen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panorama {
-    counts: [[u16; COLUMNS]; ROWS],
+    /// Row after row.
+    counts: [u16; DIRECTIONS],
+    columns: usize,
     span: Span,
     /// Of the sensor above the floor, m.
     height: f32,
 }
 
 impl Panorama {
-    /// Bytes of the counts when they are stored.
-    pub const BYTES: usize = 2 * ROWS * COLUMNS;
+    /// Bytes of the counts when they are stored: twelve bits each.
+    pub const BYTES: usize = 3 * DIRECTIONS / 2;
 
     /// The panorama of a scan above its floor.
     #[must_use]
     pub fn new(cloud: &Cloud<'_>, floor: &Floor, span: Span) -> Self {
-        let mut panorama = Self { counts: [[0; COLUMNS]; ROWS], span, height: floor.height };
+        let columns = Self::columns_of(cloud.rings());
+        let mut panorama = Self { counts: [0; DIRECTIONS], columns, span, height: floor.height };
         for point in cloud.seen() {
             let point = floor.levelled(point);
-            let Some((row, column, range)) = panorama.direction(point) else { continue };
-            let count = (range / COUNT + 0.5) as u16;
-            if let Some(place) = panorama.counts.get_mut(row).and_then(|row| row.get_mut(column))
+            let (column, level) = panorama.column(point);
+            let Some((row, range)) = panorama.row(point, level) else { continue };
+            let count = (range / COUNT + 0.5).min(MOST) as u16;
+            if let Some(place) = panorama.counts.get_mut(row * columns + column)
                 && (*place == 0 || count < *place)
             {
                 *place = count;
@@ -56,39 +81,119 @@ impl Panorama {
         panorama
     }
 
-    /// Row, column and range at which a point is seen that lies at a height above the floor; None if it is not between the
-    /// elevations.
+    /// As it is stored: two counts in three bytes, row after row.
     #[must_use]
-    pub fn direction(&self, [x, y, up]: [f32; 3]) -> Option<(usize, usize, f32)> {
-        let level = libm::sqrtf(x * x + y * y);
-        let z = up - self.height;
-        let share = (self.span.most - libm::atan2f(z, level)) / (self.span.most - self.span.least);
-        if !(0.0..1.0).contains(&share) {
-            return None;
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let pairs = self.counts.as_chunks::<2>().0;
+        for (bytes, [one, other]) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(pairs) {
+            let [low, high] = one.to_le_bytes();
+            let [other_low, other_high] = (other << 4).to_le_bytes();
+            *bytes = [low, high | other_low, other_high];
         }
+        bytes
+    }
+
+    /// What [`Self::to_bytes`] has made, of a sensor with so many rings and that span, so high above the floor, m.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; Self::BYTES], rings: usize, span: Span, height: f32) -> Self {
+        let mut counts = [0; DIRECTIONS];
+        let pairs = counts.as_chunks_mut::<2>().0;
+        for (pair, [low, middle, high]) in pairs.iter_mut().zip(bytes.as_chunks::<3>().0) {
+            *pair = [u16::from_le_bytes([*low, middle & 0xf]), u16::from_le_bytes([*middle, *high]) >> 4];
+        }
+        Self { counts, columns: Self::columns_of(rings), span, height }
+    }
+
+    const fn columns_of(rings: usize) -> usize {
+        if rings <= FEW_RINGS { COLUMNS } else { FEW_COLUMNS }
+    }
+
+    const fn rows(&self) -> usize {
+        DIRECTIONS / self.columns
+    }
+
+    /// Number of columns.
+    pub(super) const fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Between which elevations it looks.
+    #[must_use]
+    pub const fn span(&self) -> Span {
+        self.span
+    }
+
+    /// Height of the sensor above the floor, m.
+    #[must_use]
+    pub const fn height(&self) -> f32 {
+        self.height
+    }
+
+    /// Column of a point, and how far it lies away on the level, m.
+    pub(super) fn column(&self, [x, y, _]: [f32; 3]) -> (usize, f32) {
         let turn = libm::atan2f(y, x) / TAU;
         let turn = if turn < 0.0 { turn + 1.0 } else { turn };
-        let column = ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1);
-        Some(((share * ROWS as f32) as usize, column, libm::sqrtf(level * level + z * z)))
+        (((turn * self.columns as f32) as usize).min(self.columns - 1), libm::sqrtf(x * x + y * y))
+    }
+
+    /// Row and range, m, of a point that lies so far away on the level, with its height above the floor; None if it is not
+    /// between the elevations.
+    pub(super) fn row(&self, [_, _, up]: [f32; 3], level: f32) -> Option<(usize, f32)> {
+        let z = up - self.height;
+        let share = (self.span.most - libm::atan2f(z, level)) / (self.span.most - self.span.least);
+        (0.0..1.0).contains(&share).then(|| ((share * self.rows() as f32) as usize, libm::sqrtf(level * level + z * z)))
+    }
+
+    /// The point in the middle of a column, so far away on the level, m; columns go on round.
+    pub(super) fn on_level(&self, column: usize, level: f32) -> [f32; 2] {
+        let (sin, cos) = libm::sincosf((column as f32 + 0.5) / self.columns as f32 * TAU);
+        [level * cos, level * sin]
+    }
+
+    /// In which of 480 directions something is seen, in two rows at least of the column or those beside it.
+    pub(super) fn known_directions(&self) -> [bool; COLUMNS] {
+        let wide = COLUMNS / self.columns;
+        core::array::from_fn(|direction| {
+            let column = direction / wide + self.columns;
+            let seen = |row: &usize| (column - 1..=column + 1).any(|column| self.range(*row, column).is_some());
+            (0..self.rows()).filter(seen).nth(1).is_some()
+        })
     }
 
     /// Range in a direction, m; columns go on round.
     #[must_use]
     pub fn range(&self, row: usize, column: usize) -> Option<f32> {
-        let count = *self.counts.get(row)?.get(column % COLUMNS)?;
+        let count = *self.counts.get(row * self.columns + column % self.columns)?;
         (count > 0).then(|| f32::from(count) * COUNT)
     }
 
     /// Its points, with their heights above the floor, m: each in the middle of its direction.
     pub fn points(&self) -> impl Iterator<Item = [f32; 3]> + use<'_> {
-        (0..ROWS).flat_map(move |row| {
-            let share = (row as f32 + 0.5) / ROWS as f32;
+        let direction = |column: usize| libm::sincosf((column as f32 + 0.5) / self.columns as f32 * TAU);
+        let directions: [(f32, f32); COLUMNS] = core::array::from_fn(direction);
+        (0..self.rows()).flat_map(move |row| {
+            let share = (row as f32 + 0.5) / self.rows() as f32;
             let (sin, cos) = libm::sincosf(self.span.most - share * (self.span.most - self.span.least));
-            (0..COLUMNS).filter_map(move |column| {
+            directions.into_iter().take(self.columns).enumerate().filter_map(move |(column, (y, x))| {
                 let range = self.range(row, column)?;
-                let (y, x) = libm::sincosf((column as f32 + 0.5) / COLUMNS as f32 * TAU);
                 Some([range * cos * x, range * cos * y, range * sin + self.height])
             })
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stored_panorama_is_the_same() {
+        let counts = core::array::from_fn(|number| (number as u16).wrapping_mul(2741) % 4096);
+        for (rings, columns) in [(16, 480), (64, 240)] {
+            let panorama = Panorama { counts, columns, span: Span::VLP16, height: 1.9 };
+            assert_eq!(Panorama::from_bytes(&panorama.to_bytes(), rings, Span::VLP16, 1.9), panorama);
+        }
+        assert!(counts.contains(&4095) && counts.contains(&0));
     }
 }

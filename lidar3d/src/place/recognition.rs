@@ -7,10 +7,16 @@
 use std::vec::Vec;
 
 use super::image::Likeness;
-use super::{Alignment, Asked, Panorama, PlaceImage, Pose, SECTORS, Stored};
+use super::{Alignment, Asked, AskedImage, Panorama, PlaceImage, Pose, RingKey, SECTORS, Stored};
 
 /// Places that are aligned.
 const CANDIDATES: usize = 10;
+/// Places whose images are compared at the most: those whose keys are nearest.
+const COMPARED: usize = 4000;
+/// Places from which the limit is learnt at the most, and the share of them that may look more alike to others than it: these
+/// have limits of their own.
+const LEARNING: usize = 512;
+const ALIKE: f32 = 0.03;
 /// Places this far apart are different ones, m; aligned poses of one spot are nearer than the second, m.
 const APART: f32 = 6.0;
 const SAME_SPOT: f32 = 1.5;
@@ -18,14 +24,14 @@ const SAME_SPOT: f32 = 1.5;
 const GAP: f32 = 0.08;
 
 /// A stored place.
-#[derive(Clone, Debug)]
-pub struct Place {
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
     /// Where the scan was made, in the map.
     pub pose: Pose,
     /// From above.
-    pub image: PlaceImage,
+    pub image: &'a PlaceImage,
     /// From where the sensor stood.
-    pub panorama: Panorama,
+    pub panorama: &'a Panorama,
 }
 
 /// An answer.
@@ -37,7 +43,7 @@ pub struct Answer {
     pub pose: Pose,
     /// Part of the floor plan that agrees, 0 to 1.
     pub score: f32,
-    /// Whether the score is above the limit that the map teaches.
+    /// Whether the score is above the limit that the map teaches, and above all that the place has with others of the map.
     pub is_believed: bool,
     /// Whether another pose agrees nearly as well.
     pub is_ambiguous: bool,
@@ -45,8 +51,8 @@ pub struct Answer {
 
 /// Stored places, ready to be asked.
 pub struct PlaceIndex<'a> {
-    places: &'a [Place],
-    stored: Vec<Stored<'a>>,
+    places: Vec<Place<'a>>,
+    keys: Vec<RingKey>,
     /// How far from a place a scan may be taken to belong to it, m.
     reach: f32,
     limit: f32,
@@ -60,55 +66,52 @@ pub struct Query<'a> {
     pub scan: Asked<'a>,
 }
 
-impl Pose {
-    /// This pose, given in the frame of another one, in that one's own frame.
-    #[must_use]
-    pub fn within(&self, frame: &Self) -> Self {
-        let [x, y, _] = frame.of([self.place[0], self.place[1], 0.0]);
-        Self { place: [x, y], heading: frame.heading + self.heading }
-    }
-
-    /// Distance between two poses, m.
-    #[must_use]
-    pub fn apart(&self, other: &Self) -> f32 {
-        libm::hypotf(self.place[0] - other.place[0], self.place[1] - other.place[1])
-    }
-}
-
 impl<'a> PlaceIndex<'a> {
-    /// Of places that lie at most `reach` from where scans are to be recognised, m. Learns what to believe: takes as long as
-    /// ten alignments a place.
+    /// Of places that lie at most `reach` from where scans are to be recognised, m. Believes every answer.
     #[must_use]
-    pub fn new(places: &'a [Place], reach: f32) -> Self {
-        let stored = places.iter().map(|place| Stored::new(&place.panorama)).collect();
-        let mut index = Self { places, stored, reach, limit: 0.0 };
-        index.limit = index.learnt_limit();
-        index
+    pub fn new(places: Vec<Place<'a>>, reach: f32) -> Self {
+        let keys = places.iter().map(|place| RingKey::new(place.image)).collect();
+        Self { places, keys, reach, limit: 0.0 }
     }
 
-    /// The score from which answers are believed: the greatest of a place of the map with another one that lies apart. Pairs
-    /// that are aligned to the very spot where both lie see the same things rightly, and teach nothing.
-    fn learnt_limit(&self) -> f32 {
-        let mut limit = 0.0_f32;
-        for place in self.places {
-            let points = place.panorama.points();
-            let scan = Asked::new(&place.panorama, points);
-            let others = self.alike(&place.image, |other| other.pose.apart(&place.pose) > APART);
-            for (likeness, number) in others {
-                let Some(found) = self.aligned(number, &likeness, &scan) else { continue };
-                let pose = found.pose.within(&self.places[number].pose);
-                if pose.apart(&place.pose) > SAME_SPOT {
-                    limit = limit.max(found.score);
-                }
-            }
-        }
-        limit
+    /// The same, with a limit that was learnt before.
+    #[must_use]
+    pub fn with_limit(self, limit: f32) -> Self {
+        Self { limit, ..self }
     }
 
-    /// The score from which answers are believed.
+    /// Learns from which score on answers are believed, but for places that look more alike to others: from 512 places at the most, as long as ten alignments take for each. `progress` is called after each with
+    /// how many there are.
     #[must_use]
-    pub fn limit(&self) -> f32 {
-        self.limit
+    pub fn learnt_limit(&self, mut progress: impl FnMut(usize)) -> f32 {
+        let step = self.places.len().div_ceil(LEARNING).max(1);
+        let count = self.places.len().div_ceil(step);
+        let learnt = self.places.iter().step_by(step).map(|place| {
+            progress(count);
+            self.look_alike(place)
+        });
+        let mut scores: Vec<f32> = learnt.collect();
+        scores.sort_by(|a, b| b.total_cmp(a));
+        scores.get((ALIKE * scores.len() as f32) as usize).copied().unwrap_or(0.0)
+    }
+
+    /// The greatest score of a place with another one of the map that lies apart. Pairs that are aligned to the very spot where
+    /// both lie see the same things rightly, and teach nothing.
+    fn look_alike(&self, place: &Place<'_>) -> f32 {
+        let scan = Asked::new(place.panorama, place.panorama.points());
+        let others = self.alike(place.image, |other| other.pose.apart(&place.pose) > APART);
+        let score = |(likeness, number): (Likeness, usize)| {
+            let found = self.aligned(number, &likeness, &scan)?;
+            let pose = found.pose.within(&self.places.get(number)?.pose);
+            (pose.apart(&place.pose) > SAME_SPOT).then_some(found.score)
+        };
+        others.into_iter().filter_map(score).fold(0.0, f32::max)
+    }
+
+    /// The places whose images are most alike to one, best first: those that are aligned.
+    #[must_use]
+    pub fn candidates(&self, image: &PlaceImage) -> Vec<usize> {
+        self.alike(image, |_| true).into_iter().map(|(_, number)| number).collect()
     }
 
     /// The place that a scan is of; None if no place is like it.
@@ -129,24 +132,38 @@ impl<'a> PlaceIndex<'a> {
             place: best.1,
             pose,
             score: best.0.score,
-            is_believed: best.0.score > self.limit,
+            is_believed: best.0.score > self.limit && best.0.score > self.look_alike(self.places.get(best.1)?),
             is_ambiguous: found.iter().skip(1).any(|other| is_rival(&other)),
         })
     }
 
     /// The places whose images are most alike, of those that are wanted, best first.
-    fn alike(&self, image: &PlaceImage, is_wanted: impl Fn(&Place) -> bool) -> Vec<(Likeness, usize)> {
-        let wanted = self.places.iter().enumerate().filter(|(_, place)| is_wanted(place));
-        let mut alike: Vec<_> =
-            wanted.filter_map(|(number, place)| Some((place.image.likeness(image)?, number))).collect();
+    fn alike(&self, image: &PlaceImage, is_wanted: impl Fn(&Place<'_>) -> bool) -> Vec<(Likeness, usize)> {
+        let asked = AskedImage::new(image);
+        let compare = |number: usize| {
+            let place = self.places.get(number).filter(|place| is_wanted(place))?;
+            Some((asked.likeness(place.image)?, number))
+        };
+        let mut alike: Vec<_> = self.near(&RingKey::new(image)).into_iter().filter_map(compare).collect();
         alike.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
         alike.truncate(CANDIDATES);
         alike
     }
 
+    /// The places whose keys are nearest.
+    fn near(&self, asked: &RingKey) -> Vec<usize> {
+        let mut numbers: Vec<usize> = (0..self.places.len()).collect();
+        if numbers.len() > COMPARED {
+            let distances: Vec<u32> = self.keys.iter().map(|key| key.square_distance(asked)).collect();
+            numbers.select_nth_unstable_by_key(COMPARED, |number| distances.get(*number).copied());
+            numbers.truncate(COMPARED);
+        }
+        numbers
+    }
+
     fn aligned(&self, number: usize, likeness: &Likeness, scan: &Asked<'_>) -> Option<Alignment> {
         let headings = likeness.turns.map(|turn| -(turn as f32) * core::f32::consts::TAU / SECTORS as f32);
-        let found = self.stored.get(number)?.align(scan, &headings, self.reach)?;
+        let found = Stored::new(self.places.get(number)?.panorama).align(scan, &headings, self.reach)?;
         (libm::hypotf(found.pose.place[0], found.pose.place[1]) <= self.reach).then_some(found)
     }
 }

@@ -1,12 +1,13 @@
 //! `agv evaluate lidar3d-places`.
 
 use agv_host_sim::data;
-use agv_lab::evaluate::lidar3d_places;
+use agv_lab::evaluate::lidar3d_places::{self, Outcome};
 use anyhow::Context;
 
 use crate::command::progress;
 
-/// How well signatures of multi-beam scans recognise places: the thesis's, normalised, and the enriched one.
+/// How well multi-beam scans recognise places: by signatures of the thesis, normalised and enriched, by images, and by images and
+/// alignment of the ten most alike.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  agv evaluate lidar3d-places --set moosmann\n  agv evaluate lidar3d-places --set moosmann --json"
@@ -45,14 +46,13 @@ impl Lidar3dPlaces {
         );
         for outcome in outcomes {
             println!(
-                "{:<31} {:<8} {:<7} {:>9.3} {:>7.3} {:>6.3} / {:.3} {:>5.2} {:>5.3} {:>6.3} {:>6}",
+                "{:<31} {:<8} {:<7} {:>9.3} {:>7.3} {:>13} {:>5.2} {:>5.3} {:>6.3} {:>6}",
                 outcome.method,
                 outcome.protocol,
                 if outcome.half_columns { "half" } else { "all" },
                 outcome.recall_at_full_precision,
                 outcome.max_f1,
-                outcome.learned_precision,
-                outcome.learned_recall,
+                learned(&outcome),
                 outcome.signature_ms,
                 outcome.compare_us,
                 outcome.orientation_within_2_deg,
@@ -61,4 +61,9 @@ impl Lidar3dPlaces {
         }
         Ok(())
     }
+}
+
+fn learned(outcome: &Outcome) -> String {
+    let shares = outcome.learned_precision.zip(outcome.learned_recall);
+    shares.map_or("-".to_owned(), |(precision, recall)| format!("{precision:.3} / {recall:.3}"))
 }

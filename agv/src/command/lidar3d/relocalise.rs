@@ -6,22 +6,19 @@ use std::path::{Path, PathBuf};
 use agv_core::geometry::Pose;
 use agv_core::localizer::PoseFix;
 use agv_host_sim::lidar3d::Source;
-use agv_host_sim::lidar3d::place_map::{self, Limits};
-use agv_host_sim::lidar3d::signatures::Method;
+use agv_host_sim::lidar3d::place_map;
+use agv_host_sim::lidar3d::place_search::PlaceSearch;
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::replay::find_start;
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 
 use super::arguments::SensorArguments;
 use super::places::Drive;
+use crate::command::stop;
 
-/// Standard deviation of the turn that is found, rad.
-const HEADING_DEVIATION: f64 = 2.0 * std::f64::consts::PI / 180.0;
-/// Standard deviation of a position within a place, as a share of the distance to the next one: evenly anywhere between
-/// half way to the one and half way to the other.
-const POSITION_SHARE: f64 = 0.29;
-/// The least that is claimed, m: the way is not exactly the same a second time.
-const LEAST_POSITION_DEVIATION: f64 = 0.5;
+/// Standard deviations of the pose that an alignment finds, m and rad.
+const POSITION_DEVIATION: f64 = 0.2;
+const HEADING_DEVIATION: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// Scans that are looked at for a place, at the most.
 const SCANS: usize = 20;
 
@@ -93,27 +90,24 @@ impl Relocalisation {
     /// The pose of the logical point at the first event of a log, by a multi-beam lidar.
     fn fix(&self, recording: &Recording, path: &Path, source: &Source) -> anyhow::Result<PoseFix> {
         let map = place_map::read(path)?;
-        let named = || path.display().to_string();
-        ensure!(map.places.iter().all(|place| place.pose.is_some()), "{}: the places have no poses", named());
-        let distance = map.threshold(Method::Enriched);
-        let distance = distance.with_context(|| format!("{}: too few places to learn a threshold", named()))?;
-        let limits = Limits { distance, facing: None };
+        let named = || format!("{}: the places have no poses", path.display());
+        let search = PlaceSearch::new(&map).with_context(named)?;
         let (mut found, mut asked) = (None, 0);
         let drive = Drive { source: source.clone(), sensor: self.sensor.clone() };
-        drive.for_each(Some(map.sensor_height), |_, signatures| {
+        let stop = stop::on_interrupt()?;
+        drive.for_each(Some(map.standing), &stop, |_, cloud, _| {
             asked += 1;
-            found = map.find(Method::Enriched, &limits, &signatures).filter(|answer| answer.is_believed);
+            found = search.find(cloud).filter(|answer| answer.is_believed && !answer.is_ambiguous);
             if found.is_some() || asked >= SCANS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        let Some(answer) = found else { bail!("{}: none of {asked} scans is of a stored place", source.name()) };
-        let [x, y, heading] = map.places[answer.place].pose.unwrap_or_default();
-        let sensor = Pose::new(x, y, heading + answer.turn);
+        let Some(found) = found else { bail!("{}: none of {asked} scans is of a stored place", source.name()) };
+        let [x, y, heading] = found.pose;
+        let sensor = Pose::new(x, y, heading);
         let time = recording.events.iter().filter_map(RecordedEvent::time).min();
-        let position_deviation = (POSITION_SHARE * map.spacing().unwrap_or(0.0)).max(LEAST_POSITION_DEVIATION);
         Ok(PoseFix {
             time: time.context("the log has no events")?,
             pose: sensor.compose(&self.mount.inverse()),
-            position_deviation,
+            position_deviation: POSITION_DEVIATION,
             heading_deviation: HEADING_DEVIATION,
         })
     }
