@@ -194,6 +194,8 @@ fn said_by(pose: &PublishedPose) -> Option<&'static str> {
         Reason::LaserMoved => Some("mounting"),
         Reason::OdometryDisagrees => Some("odometry"),
         Reason::OdometrySilent => Some("odometry silent"),
+        Reason::WheelsSlip => Some("turns"),
+        Reason::GyroFault => Some("gyro"),
     }
 }
 

@@ -1,7 +1,7 @@
 //! A campaign on one page.
 
 use agv_core::integrity::AlertLimits;
-use agv_host_sim::report::{FigureError, Page, StanfordDiagram, Table, stanford_diagram};
+use agv_host_sim::report::{Figure, FigureError, Page, StanfordDiagram, Table, stanford_diagram};
 
 use super::figures::Figures;
 use super::outcome::CELLS;
@@ -18,8 +18,9 @@ pub fn page(figures: &Figures) -> Result<Page, FigureError> {
          is above its protection level; to the right of an alert limit, and below it, an output is hazardous. The last cells \
          of each axis have all that is larger.",
     );
-    page.figure(&diagram(&figures.stanford_nominal)?, "Without faults");
-    page.figure(&diagram(&figures.stanford_faults)?, "With faults");
+    let [nominal, faults] = diagrams(figures)?;
+    page.figure(&nominal, "Without faults");
+    page.figure(&faults, "With faults");
     page.section("Kinds of faults").paragraph("Each at its worst size; hazardous outputs of one event.");
     let heading =
         ["kind", "class", "worst size", "failures", "runs", "worst seed", "HMI, s", "HMI, m", "found by", "claimed, %"];
@@ -41,7 +42,15 @@ pub fn page(figures: &Figures) -> Result<Page, FigureError> {
     Ok(page)
 }
 
-fn diagram(of: &Stanford) -> Result<agv_host_sim::report::Figure, FigureError> {
+/// The Stanford diagrams without faults and with them.
+///
+/// # Errors
+/// If a picture cannot be drawn.
+pub fn diagrams(figures: &Figures) -> Result<[Figure; 2], FigureError> {
+    Ok([diagram(&figures.stanford_nominal)?, diagram(&figures.stanford_faults)?])
+}
+
+fn diagram(of: &Stanford) -> Result<Figure, FigureError> {
     let AlertLimits { travel, docking } = AlertLimits::default();
     let limits = [travel, docking].map(|limit| 1e3 * limit.position);
     stanford_diagram(&StanfordDiagram { cells: &of.cells, cell_mm: of.cell_mm, count: CELLS, limits: &limits })

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use agv_core::localizer::Parameters;
+use agv_host_sim::output_file;
 use agv_lab::campaign::Shard;
 use agv_lab::trust::figures::{Figures, figures};
 use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
-use agv_lab::trust::page::page;
+use agv_lab::trust::page::{diagrams, page};
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
 use agv_lab::trust::trial::Trial;
@@ -52,20 +53,23 @@ pub struct Trust {
     first_seed: u64,
     /// Make only the runs of part I of N, counted from 0, and write their rows to --output: those of the sweep, or with --swept
     /// those of the worst sizes, without a fault and of pairs.
-    #[arg(long, value_name = "I/N", requires = "output")]
+    #[arg(long, value_name = "I/N", requires = "output", conflicts_with = "set")]
     shard: Option<Shard>,
     /// Where the rows of a part go, a line of JSON each.
     #[arg(long, requires = "shard")]
     output: Option<PathBuf>,
     /// The rows of all parts of the sweep, so that it is not driven again.
-    #[arg(long, num_args = 1.., value_name = "ROWS")]
+    #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with = "set")]
     swept: Vec<PathBuf>,
     /// Tell the figures of the rows of all parts, and drive nothing.
-    #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with_all = ["shard", "swept"])]
+    #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with_all = ["shard", "swept", "set"])]
     merge: Vec<PathBuf>,
     /// Write a page with the Stanford diagrams.
     #[arg(long, value_name = "FILE.html", conflicts_with = "shard")]
     report: Option<PathBuf>,
+    /// Write the Stanford diagrams, `stanford_nominal.svg` and `stanford_faults.svg`, into a folder.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "shard")]
+    diagrams: Option<PathBuf>,
     /// One JSON object instead of the table.
     #[arg(long)]
     json: bool,
@@ -82,7 +86,7 @@ Examples:
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
-  agv evaluate trust --merge worst0.jsonl worst1.jsonl --json
+  agv evaluate trust --merge worst0.jsonl worst1.jsonl --json --diagrams docs/src/trust
 
 Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
@@ -146,6 +150,12 @@ impl Trust {
         let figures = figures(rows, catalogue);
         if let Some(report) = &self.report {
             page(&figures)?.write(report).with_context(|| report.display().to_string())?;
+        }
+        if let Some(folder) = &self.diagrams {
+            for (name, diagram) in ["stanford_nominal.svg", "stanford_faults.svg"].iter().zip(diagrams(&figures)?) {
+                let path = folder.join(name);
+                output_file::write(&path, diagram.one_line()).with_context(|| path.display().to_string())?;
+            }
         }
         if self.json {
             let mut told = serde_json::to_value(&figures)?;
