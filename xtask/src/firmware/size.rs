@@ -7,8 +7,6 @@ use object::{Object, ObjectSection, SectionFlags, SectionKind};
 
 use super::image::{BOARDS, Board};
 
-/// Most flash of an image, bytes.
-const FLASH: u64 = 512 * 1024;
 /// Images that only measure need not fit a vehicle.
 const UNLIMITED: [&str; 7] = ["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart"];
 
@@ -30,12 +28,12 @@ pub fn print() -> anyhow::Result<()> {
             let size = read(&board.image(name)?, board)?;
             println!("{:<8} {name:<16} {:>12}   {}", board.feature, size.flash, in_regions(board, &size.ram));
             let is_over = board.ram.iter().zip(&size.ram).any(|(region, used)| *used > region.budget);
-            if !UNLIMITED.contains(name) && (size.flash > FLASH || is_over) {
+            if !UNLIMITED.contains(name) && (size.flash > board.flash || is_over) {
                 too_large.push(format!("{} of {}", name, board.feature));
             }
         }
         let budgets: Vec<u64> = board.ram.iter().map(|region| region.budget).collect();
-        println!("{:<8} {:<16} {FLASH:>12}   {}", board.feature, "at most", in_regions(board, &budgets));
+        println!("{:<8} {:<16} {:>12}   {}", board.feature, "at most", board.flash, in_regions(board, &budgets));
     }
     if too_large.is_empty() { Ok(()) } else { bail!("too large: {}", too_large.join(", ")) }
 }
