@@ -14,7 +14,9 @@ fn no_sequence_of_events_breaks_the_localiser() {
 #[test]
 fn a_seed_says_the_same_again() {
     assert_eq!(event_fuzz::run(7, 2_000), event_fuzz::run(7, 2_000));
-    assert_ne!(event_fuzz::run(7, 2_000).localised, event_fuzz::run(8, 2_000).localised);
+    // Some vehicles know where they are from the first event to the last.
+    let others: Vec<u64> = (7..12).map(|seed| event_fuzz::run(seed, 2_000).localised).collect();
+    assert!(others.iter().any(|localised| *localised != others[0]), "{others:?}");
 }
 
 #[test]

@@ -29,7 +29,13 @@ struct House {
 const HOUSES: [House; 7] = [
     House {
         folder: "controller",
-        floors: &[&["encoders", "laser", "standstill"], &["progress"], &["localization"], &["bus"], &["controller"]],
+        floors: &[
+            &["encoders", "gyro", "laser", "setting_objects", "standstill"],
+            &["progress"],
+            &["localization"],
+            &["bus"],
+            &["controller"],
+        ],
     },
     House {
         folder: "core",
@@ -45,7 +51,10 @@ const HOUSES: [House; 7] = [
         ],
     },
     House { folder: "wire", floors: &[&["can", "cola"], &["nav350"]] },
-    House { folder: "settings", floors: &[&["settings"], &["leaf"], &["leaves"], &["store"], &["service"]] },
+    House {
+        folder: "settings",
+        floors: &[&["settings"], &["bus_load"], &["contradiction"], &["leaf"], &["leaves"], &["store"], &["service"]],
+    },
     House {
         folder: "lidar3d",
         floors: &[

@@ -1,12 +1,14 @@
 """The bus when it is not as it should be."""
 
-from bench import check_sound, emergencies, longest_gap, poses
+from bench import check_sound, emergencies, longest_gap, poses, start
 from emulated_chip.can_bus import CanFrame
 from emulated_chip.clock import MILLISECOND, SECOND
+from stored_settings import BIT_RATE_250, FIRST_PAGE, write
 
 # Oldest pose that may be sent when the bus is back.
 OLDEST = 30 * MILLISECOND
 BACK_FROM_OFF = 0x8140
+HEARTBEAT_LOST = 0x8130
 COUNTS = 16
 PERIOD = 10 * MILLISECOND
 
@@ -108,4 +110,77 @@ def tells_of_an_overrun(bench):
     assert 0x8110 in emergencies(chip, begin), f"emergencies: {emergencies(chip, begin)}"
 
 
-CHECKS = [sends_nothing_stale, comes_back_from_bus_off, hears_only_what_is_meant_for_it, tells_of_an_overrun]
+def ask(chip, *data):
+    """The answer to a request for an object (CiA 301, 7.2.4)."""
+    begin = chip.clock.now()
+    chip.can_bus.send(chip.listener, CanFrame(0x610, bytes(data)))
+    chip.run_for(10 * MILLISECOND)
+    answers = chip.listener.of(0x590, begin)
+    assert len(answers) == 1, f"{len(answers)} answers"
+    return answers[0][1].data
+
+
+def serves_its_objects(bench):
+    """The name of the board comes in segments; what there is not is refused with its reason."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    first = ask(chip, 0x40, 0x09, 0x10, 0, 0, 0, 0, 0)
+    length, name, toggle = int.from_bytes(first[4:], "little"), b"", 0
+    assert first[0] == 0x41, f"the name begins with {first.hex()}"
+    while len(name) < length:
+        segment = ask(chip, 0x60 | toggle, 0, 0, 0, 0, 0, 0, 0)
+        name += segment[1 : 8 - (segment[0] >> 1 & 7)]
+        toggle ^= 0x10
+    assert name == b"Nucleo-H743ZI", f"the name is {name}"
+    # Mode, object 2013h:1: a vehicle without a map is not localised. Block transfers are refused (7.2.4.3.17).
+    assert ask(chip, 0x40, 0x13, 0x20, 1, 0, 0, 0, 0)[:5] == bytes([0x4F, 0x13, 0x20, 1, 0])
+    assert ask(chip, 0xA0, 0x09, 0x10, 0, 0, 0, 0, 0)[4:] == (0x0504_0001).to_bytes(4, "little")
+    check_sound(chip)
+
+
+def watches_a_heartbeat(bench):
+    """A master has node 25h watched: its frames come through from then on, and its silence is told (7.2.8.3.2.2)."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    fdcan = chip.peripherals["FDCAN1"]
+    heartbeat = CanFrame(0x725, bytes([5]))
+    refused = fdcan.refused
+    chip.can_bus.send(chip.listener, heartbeat)
+    chip.run_for(10 * MILLISECOND)
+    assert fdcan.refused == refused + 1, "a node that nobody has named is heard"
+    assert ask(chip, 0x23, 0x16, 0x10, 1, 200, 0, 0x25, 0)[0] == 0x60, "the watch is refused"
+    for _ in range(3):
+        chip.can_bus.send(chip.listener, heartbeat)
+        chip.run_for(100 * MILLISECOND)
+    assert fdcan.refused == refused + 1, "the node that is watched is not heard"
+    begin = chip.clock.now()
+    assert HEARTBEAT_LOST not in emergencies(chip), "it was told too early"
+    chip.run_for(150 * MILLISECOND)
+    assert HEARTBEAT_LOST in emergencies(chip, begin), f"emergencies: {emergencies(chip, begin)}"
+    check_sound(chip)
+
+
+def runs_at_the_bit_rate_that_is_set(bench):
+    """250 kbit/s in flash: the timing of a bit as CiA 301 (table 1) wants it, and poses on the bus."""
+    chip = bench.chip()
+    write(chip.settings_flash, FIRST_PAGE, BIT_RATE_250)
+    chip.can_bus.bit_rate = 250_000
+    start(chip)
+    chip.run_for(200 * MILLISECOND)
+    check_sound(chip)
+    fdcan = chip.peripherals["FDCAN1"]
+    before, behind = fdcan.get("NBTP", "NTSEG1") + 2, fdcan.get("NBTP", "NTSEG2") + 1
+    assert fdcan.bit_rate() == 250_000, f"{fdcan.bit_rate()} bit/s"
+    assert before / (before + behind) == 0.875, f"sample point {before / (before + behind)}"
+    assert poses(chip), "no pose"
+
+
+CHECKS = [
+    sends_nothing_stale,
+    comes_back_from_bus_off,
+    hears_only_what_is_meant_for_it,
+    tells_of_an_overrun,
+    serves_its_objects,
+    watches_a_heartbeat,
+    runs_at_the_bit_rate_that_is_set,
+]

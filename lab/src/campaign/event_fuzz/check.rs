@@ -50,9 +50,11 @@ fn pose(output: &PoseOutput, limits: &Limits) -> Option<String> {
 fn fits(mode: Mode, reason: Reason) -> bool {
     match mode {
         Mode::NotLocalised => reason == Reason::NoPose,
-        Mode::Reflectors | Mode::Features | Mode::Mixed => matches!(reason, Reason::None | Reason::OdometryDisagrees),
+        Mode::Reflectors | Mode::Features | Mode::Mixed => {
+            matches!(reason, Reason::None | Reason::OdometryDisagrees | Reason::WheelsSlip | Reason::GyroFault)
+        }
         Mode::Degraded => matches!(reason, Reason::LaserMoved | Reason::LandmarksRejected),
-        Mode::DeadReckoning => reason == Reason::NoLandmarks,
+        Mode::DeadReckoning => matches!(reason, Reason::NoLandmarks | Reason::WheelsSlip | Reason::GyroFault),
         Mode::WithoutOdometry => {
             matches!(
                 reason,
