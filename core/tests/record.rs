@@ -9,10 +9,10 @@ use agv_core::localizer::{
 };
 use agv_core::maps::{Landmark, LandmarkKind, Verdict};
 use agv_core::measurement::{
-    EncoderFault, EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan,
-    SpeedSample, Time, WheelReading, WheelSample,
+    EncoderFault, EncoderFaults, EncoderSample, GyroSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors,
+    Scan, SpeedSample, Time, WheelReading, WheelSample,
 };
-use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
+use agv_core::odometry::{Ackermann, CounterRange, GyroParameters, Tricycle, Vehicle};
 use agv_core::record::{
     DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Published, Raw, RawSource, Record,
     Reference, Scratch, Step, Truth, encode,
@@ -27,6 +27,7 @@ enum Owned {
     Encoders(EncoderSample),
     Speed(SpeedSample),
     Wheels(WheelSample),
+    Gyro(GyroSample),
     Increment(PoseIncrement),
     Reflectors(Vec<ReflectorObservation>),
     Scan(Time, [f64; 3], Vec<f32>, Vec<u16>),
@@ -53,6 +54,7 @@ impl Owned {
             Self::EncoderFaults(faults) => Record::Event(Event::EncoderFaults(*faults)),
             Self::Speed(sample) => Record::Event(Event::Speed(*sample)),
             Self::Wheels(sample) => Record::Event(Event::Wheels(*sample)),
+            Self::Gyro(sample) => Record::Event(Event::Gyro(*sample)),
             Self::Increment(increment) => Record::Event(Event::Increment(*increment)),
             Self::Reflectors(observations) => Record::Event(Event::Reflectors(Reflectors::of_first(observations))),
             Self::Scan(start, [beam_interval, first_bearing, bearing_step], ranges, intensities) => {
@@ -124,6 +126,14 @@ fn vehicle() -> impl Strategy<Value = Vehicle> {
     ]
 }
 
+fn gyro() -> impl Strategy<Value = (GyroParameters, bool)> {
+    let fitted = (prop::array::uniform7(number()), any::<bool>()).prop_map(|(numbers, is_fitted)| {
+        let [factor, latency, noise, bias, drift, scale, range] = numbers;
+        GyroParameters { is_fitted, factor, latency, noise, bias, drift, scale, range }
+    });
+    (prop_oneof![Just(GyroParameters::default()), fitted], any::<bool>())
+}
+
 fn landmark() -> impl Strategy<Value = Landmark> {
     (any::<u16>(), landmark_kind(), number(), number(), single()).prop_map(|(id, kind, x, y, deviation)| Landmark {
         id,
@@ -192,13 +202,14 @@ fn record() -> impl Strategy<Value = Owned> {
     let observation =
         (time(), single(), single()).prop_map(|(time, range, bearing)| ReflectorObservation { time, range, bearing });
     prop_oneof![
-        (".{0,40}", vehicle(), pose(), any::<[u32; 3]>()).prop_map(|(software, vehicle, laser, [a, b, c])| {
-            Owned::Header(
-                software,
-                Box::new(Parameters::new(vehicle, laser)),
-                StatedCapacities { landmarks: a, beams: b, history: c },
-            )
-        }),
+        (".{0,40}", vehicle(), pose(), any::<[u32; 4]>(), gyro()).prop_map(
+            |(software, vehicle, laser, [a, b, c, d], gyro)| {
+                let mut parameters = Parameters::new(vehicle, laser);
+                (parameters.gyro, parameters.sources.gyro) = gyro;
+                let stated = StatedCapacities { landmarks: a, beams: b, history: c, contours: d };
+                Owned::Header(software, Box::new(parameters), stated)
+            }
+        ),
         prop::collection::vec(landmark(), 0..=50).prop_map(Owned::Landmarks),
         (time(), any::<u32>(), any::<u32>()).prop_map(|(time, drive, steering)| Owned::Encoders(EncoderSample {
             time,
@@ -214,6 +225,7 @@ fn record() -> impl Strategy<Value = Owned> {
             time,
             wheels: wheels.map(|(count, steering)| WheelReading { count, steering }),
         })),
+        (time(), number()).prop_map(|(time, rate)| Owned::Gyro(GyroSample { time, rate })),
         (time(), number(), number()).prop_map(|(time, speed, steering)| Owned::Speed(SpeedSample {
             time,
             speed,
@@ -285,6 +297,25 @@ fn read_again(log: &[u8], piece: usize) -> (Vec<Vec<u8>>, Vec<agv_core::record::
         Item::Damage(damage) => damages.push(damage),
     });
     (frames, damages)
+}
+
+#[test]
+fn the_header_of_a_vehicle_without_a_gyro_is_what_it_was_before_there_were_gyros() {
+    let parameters = Parameters::new(Vehicle::Increments, Pose::new(0.5, 0.1, 0.2));
+    let capacities = StatedCapacities { landmarks: 1, beams: 2, history: 3, contours: 4 };
+    let frame = Owned::Header("agv".to_owned(), Box::new(parameters), capacities).frame(0);
+    let mut room = vec![0; MAX_FRAME];
+    let payload = postcard::to_slice(&("agv", &parameters, capacities), &mut room).unwrap();
+    assert_eq!(&frame[12..frame.len() - 4], payload);
+    let mut with = parameters;
+    with.gyro.is_fitted = true;
+    let longer = Owned::Header("agv".to_owned(), Box::new(with), capacities).frame(0);
+    // Seven numbers and two switches.
+    assert_eq!(longer.len(), frame.len() + 7 * 8 + 2);
+    read(&longer, usize::MAX >> 1, |item| {
+        let Item::Record { record: Record::Header(header), .. } = item else { panic!("{item:?}") };
+        assert_eq!(*header.parameters, with);
+    });
 }
 
 proptest! {
@@ -472,7 +503,7 @@ fn missing_and_repeated_frames_are_reported() {
 #[test]
 fn another_version_is_told_apart_from_damage() {
     let (frames, _) = small_log();
-    for (version, is_read) in [(9, false), (10, true), (11, false)] {
+    for (version, is_read) in [(10, false), (11, true), (12, false)] {
         let mut frame = frames[2].clone();
         frame[4] = version;
         let end = frame.len() - 4;
@@ -500,14 +531,14 @@ fn the_header_of_a_localiser_s_log_states_its_room() {
         panic!("no header")
     };
     // The past does not depend on the maps.
-    assert_eq!(read.capacities, StatedCapacities { landmarks: 96, beams: 360, history: 128 });
+    assert_eq!(read.capacities, StatedCapacities { landmarks: 96, beams: 360, history: 128, contours: 0 });
 }
 
 #[test]
 fn the_bytes_of_a_frame_are_as_documented() {
     let frame =
         Owned::Encoders(EncoderSample { time: Time::from_micros(300), drive: 1, steering: 0x80 }).frame(0x0102_0304);
-    let body = [0xD6, 0x41, 0x47, 0x56, 10, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
+    let body = [0xD6, 0x41, 0x47, 0x56, 11, 2, 5, 0, 4, 3, 2, 1, 0xAC, 0x02, 1, 0x80, 0x01];
     assert_eq!(frame[..17], body);
     assert_eq!(frame[17..], crc32(&body).to_le_bytes());
 }

@@ -227,7 +227,7 @@ fn a_log_states_what_its_localiser_had_room_for() {
     Writer::begin(&path, &parameters(), &[]).unwrap().finish().unwrap();
     let mut reader = Reader::open(&path).unwrap();
     let Some(Item::Record { record: Record::Header(header), .. }) = reader.next().unwrap() else { panic!("no header") };
-    assert_eq!(header.capacities, StatedCapacities { landmarks: 2000, beams: 1440, history: 128 });
+    assert_eq!(header.capacities, StatedCapacities { landmarks: 2000, beams: 1440, history: 128, contours: 6144 });
 }
 
 #[test]
@@ -314,5 +314,5 @@ fn a_log_of_another_version_is_refused() {
     let path = folder.path().join("drive.agvlog");
     std::fs::write(&path, [&body[..], &checksum.to_le_bytes()].concat()).unwrap();
     let message = log::read(&path).unwrap_err().to_string();
-    assert!(message.ends_with(": the log has format version 1, this program reads 10"), "{message}");
+    assert!(message.ends_with(": the log has format version 1, this program reads 11"), "{message}");
 }

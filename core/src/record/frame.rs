@@ -8,7 +8,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 pub const MAGIC: [u8; 4] = [0xD6, b'A', b'G', b'V'];
 
 /// Version of the kinds and payloads that this program writes, and the only one that it reads.
-pub const FORMAT_VERSION: u8 = 10;
+pub const FORMAT_VERSION: u8 = 11;
 
 /// Length of what stands before the payload, bytes.
 pub const HEADER_LENGTH: usize = 12;

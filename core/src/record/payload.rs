@@ -9,6 +9,7 @@ use super::truth::{Reference, Truth};
 use crate::localizer::{Event, LandmarkUse, Outputs, Parameters, PoseOutput, StatedCapacities};
 use crate::maps::Landmark;
 use crate::measurement::{ReflectorObservation, Reflectors, Scan, ScanHead, Time};
+use crate::odometry::GyroParameters;
 
 /// Greatest number of landmarks in one record; a map is written in pieces.
 pub const LANDMARKS_A_RECORD: usize = 50;
@@ -190,7 +191,7 @@ impl Record<'_> {
         let length = room.len().min(MAX_PAYLOAD);
         let room = room.get_mut(..length).ok_or(EncodeError::Buffer)?;
         let written = match self {
-            Self::Header(header) => put(header, room),
+            Self::Header(header) => put_header(header, room),
             Self::Landmarks(landmarks) if landmarks.len() > LANDMARKS_A_RECORD => return Err(EncodeError::TooLong),
             Self::Landmarks(landmarks) => put_all(landmarks, room),
             Self::Event(Event::Encoders(sample)) => put(sample, room),
@@ -198,6 +199,7 @@ impl Record<'_> {
             Self::Event(Event::Speed(sample)) => put(sample, room),
             Self::Event(Event::Increment(increment)) => put(increment, room),
             Self::Event(Event::Wheels(sample)) => put(sample, room),
+            Self::Event(Event::Gyro(sample)) => put(sample, room),
             Self::Event(Event::Reflectors(reflectors)) => put(reflectors, room),
             Self::Event(Event::Scan(scan)) => put_scan(scan, room),
             Self::Event(Event::SetPose(fix)) => put(fix, room),
@@ -223,7 +225,7 @@ impl Record<'_> {
     ) -> Result<Record<'a>, DecodeError> {
         let record = match kind {
             kind::HEADER => {
-                let (software, parameters, capacities) = take_all(postcard::take_from_bytes(payload))?;
+                let (software, parameters, capacities) = take_header(payload)?;
                 let parameters = scratch.parameters.insert(parameters);
                 Record::Header(Header { software, parameters, capacities })
             }
@@ -236,6 +238,7 @@ impl Record<'_> {
             kind::SPEED => Record::Event(Event::Speed(take(payload)?)),
             kind::INCREMENT => Record::Event(Event::Increment(take(payload)?)),
             kind::WHEELS => Record::Event(Event::Wheels(take(payload)?)),
+            kind::GYRO => Record::Event(Event::Gyro(take(payload)?)),
             kind::REFLECTORS => {
                 let (laser, rest) = postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
                 take_each(rest, &mut scratch.observations)?;
@@ -270,6 +273,26 @@ impl Record<'_> {
 
 fn put<T: Serialize>(value: &T, room: &mut [u8]) -> Option<usize> {
     postcard::to_slice(value, room).ok().map(|written| written.len())
+}
+
+/// A gyro stands behind the header, and only of a vehicle that has one: logs from before there were gyros are read as they are.
+fn put_header(header: &Header, room: &mut [u8]) -> Option<usize> {
+    let length = put(header, room)?;
+    let Parameters { gyro, sources, .. } = header.parameters;
+    if *gyro == GyroParameters::default() && sources.gyro {
+        return Some(length);
+    }
+    Some(length + put(&(gyro, sources.gyro), room.get_mut(length..)?)?)
+}
+
+fn take_header(payload: &[u8]) -> Result<(&str, Parameters, StatedCapacities), DecodeError> {
+    let (mut header, rest): ((&str, Parameters, StatedCapacities), _) =
+        postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+    if !rest.is_empty() {
+        let (_, parameters, _) = &mut header;
+        (parameters.gyro, parameters.sources.gyro) = take(rest)?;
+    }
+    Ok(header)
 }
 
 fn put_bytes(bytes: &[u8], room: &mut [u8]) -> Option<usize> {
