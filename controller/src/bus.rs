@@ -1,16 +1,19 @@
 //! All that the controller hears and says on the CAN bus.
 
+use agv_core::integrity::AlertLimits;
 use agv_core::localizer::OutputPredictor;
 use agv_core::measurement::{EncoderFaults, Time};
-use agv_core::state::{LaserHealth, PoseOutput, Relocalization};
+use agv_core::state::{LaserHealth, Mode, PoseOutput, Relocalization};
 use agv_settings::Settings;
-use agv_wire::can::canopen::{Message, NodeId};
-use agv_wire::can::controller::{Health, PosePublisher};
-use agv_wire::can::controller_node::ControllerNode;
-use agv_wire::can::emcy::Emergency;
-use agv_wire::can::frame::Frame;
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::controller::Health;
+use agv_wire::can::controller_node::{CONSUMERS, ControllerNode, ErrorKind, NodeSettings, Permission, ProcessData};
+use agv_wire::can::frame::{Frame, Id};
+use agv_wire::can::sdo::{AbortCode, ObjectDictionary};
+use heapless::Vec;
 
 use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
+use super::gyro::Gyro;
 use super::localization::Estimate;
 use super::progress::{Progress, SentPose, Told};
 use super::standstill::Standstill;
@@ -31,13 +34,19 @@ pub struct Troubles {
 }
 
 impl Troubles {
-    fn codes(self) -> impl Iterator<Item = u16> {
-        let hardware = self.is_board_damaged.then_some(0x5000);
-        let internal_software = self.has_panicked.then_some(0x6100);
-        let data_set = self.are_settings_lost.then_some(0x6300);
-        hardware.into_iter().chain(internal_software).chain(data_set)
+    fn kinds(self) -> impl Iterator<Item = ErrorKind> {
+        let board = self.is_board_damaged.then_some(ErrorKind::Board);
+        let panicked = self.has_panicked.then_some(ErrorKind::Panicked);
+        let settings = self.are_settings_lost.then_some(ErrorKind::SettingsLost);
+        board.into_iter().chain(panicked).chain(settings)
     }
 }
+
+/// Encoders are being set up for so long after the start, s: their faults are no errors until then.
+const SETTING_UP: f64 = 2.0;
+
+/// Most nodes whose frames mean something here.
+const NODES: usize = 3 + CONSUMERS;
 
 /// What comes of a look at the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +57,8 @@ pub enum BusOutput {
     Event(Told),
     /// A pose went out, in the frames before.
     Published(SentPose),
+    /// The settings are to be stored.
+    Save,
 }
 
 /// The encoders, the controller's own node, and the pose for now.
@@ -55,34 +66,52 @@ pub enum BusOutput {
 pub struct Bus {
     nodes: EncoderNodes,
     encoders: Encoders,
+    gyro: Gyro,
     node: ControllerNode,
-    publisher: PosePublisher,
+    limits: AlertLimits,
+    accepts_pose: bool,
+    accepts_settings: bool,
     predictor: OutputPredictor<MOTIONS>,
     progress: Progress,
     standstill: Standstill,
     faults: EncoderFaults,
+    laser: LaserHealth,
+    is_lost: bool,
     relocalization: Relocalization,
-    troubles: Troubles,
-    has_told_troubles: bool,
+    start: Time,
 }
 
 impl Bus {
-    /// A bus on which nobody was heard before `start`.
+    /// A bus on which nobody was heard before `start`; `hardware` is what the controller is called there (1009h).
     #[must_use]
-    pub fn new(settings: &Settings, troubles: Troubles, start: Time) -> Self {
+    pub fn new(settings: &Settings, hardware: &'static str, troubles: Troubles, start: Time) -> Self {
         let nodes = EncoderNodes::of(settings);
+        let node = NodeSettings {
+            vendor: settings.nodes.vendor,
+            is_master: settings.nodes.is_master,
+            starts_itself: settings.nodes.starts_itself,
+            period: settings.publishing_period,
+            hardware,
+            ..NodeSettings::new(nodes.controller)
+        };
+        let mut node = ControllerNode::new(node, start);
+        troubles.kinds().for_each(|kind| node.report(kind, start));
         Self {
             nodes,
             encoders: Encoders::new(&nodes, &settings.parameters, start),
-            node: ControllerNode::new(nodes.controller, start),
-            publisher: PosePublisher::new(nodes.controller, settings.parameters.alert_limits, start),
+            gyro: Gyro::of(settings),
+            node,
+            limits: settings.parameters.alert_limits,
+            accepts_pose: settings.nodes.accepts_pose,
+            accepts_settings: settings.nodes.accepts_settings,
             predictor: OutputPredictor::new(&settings.parameters),
             progress: Progress::default(),
             standstill: Standstill::new(),
             faults: EncoderFaults::default(),
+            laser: LaserHealth::Unknown,
+            is_lost: false,
             relocalization: Relocalization::Idle,
-            troubles,
-            has_told_troubles: false,
+            start,
         }
     }
 
@@ -91,23 +120,70 @@ impl Bus {
         // Only the search may have got further. Before the first answer a vehicle without a pose is published.
         let is_first = !self.predictor.has_output();
         if core::mem::replace(&mut self.progress.answered, estimate.answered) != estimate.answered || is_first {
+            self.predictor.update_gyro(estimate.gyro);
             self.predictor.update(&estimate.pose, &estimate.bias);
         }
+        self.is_lost = estimate.pose.mode == Mode::Lost;
         self.relocalization = estimate.relocalization;
     }
 
-    /// Takes a frame that came at `heard`: at most two events and an answer.
-    pub fn hear(&mut self, frame: &Frame, heard: Time, mut take: impl FnMut(BusOutput)) {
-        let Self { encoders, predictor, progress, standstill, .. } = self;
+    /// Takes a frame that came at `heard`: at most three events and an answer. `settings` are what it can read, and change if it is
+    /// permitted.
+    pub fn hear(
+        &mut self,
+        frame: &Frame,
+        heard: Time,
+        settings: &mut impl ObjectDictionary,
+        mut take: impl FnMut(BusOutput),
+    ) {
+        if self.node.is_operational() || !self.node.is_order(frame) {
+            self.hear_others(frame, heard, &mut take);
+        }
+        let process = if self.node.is_asked(frame) { self.process() } else { None };
+        if let Some(answer) = self.node.handle(frame, heard, process.as_ref(), settings, self.permission(heard)) {
+            take(BusOutput::Send(answer));
+        }
+        if self.node.take_save() {
+            take(BusOutput::Save);
+        }
+        if let Some(order) = self.node.take_order() {
+            self.hear_others(&order, heard, take);
+        }
+    }
+
+    /// Whether settings may be changed over the bus.
+    fn permission(&self, now: Time) -> Permission {
+        match (self.accepts_settings, self.standstill.stands(now)) {
+            (true, true) => Ok(()),
+            (true, false) => Err(AbortCode::DeviceState),
+            (false, _) => Err(AbortCode::LocalControl),
+        }
+    }
+
+    /// Takes what encoders and other controllers say.
+    fn hear_others(&mut self, frame: &Frame, heard: Time, mut take: impl FnMut(BusOutput)) {
+        let Self { encoders, predictor, progress, standstill, node, accepts_pose, .. } = self;
         encoders.hear(frame, heard, |event| {
-            if let BusEvent::Encoders(sample) = &event {
-                predictor.encoders(sample);
-                standstill.sample(sample);
+            match &event {
+                BusEvent::Encoders(sample) => {
+                    predictor.encoders(sample);
+                    standstill.sample(sample.time, [sample.drive, 0]);
+                }
+                BusEvent::Wheels(sample) => {
+                    predictor.wheels(sample);
+                    let [first, second, ..] = sample.wheels.map(|wheel| wheel.count);
+                    standstill.sample(sample.time, [first, second]);
+                }
+                BusEvent::SetPose(_) if !*accepts_pose || !standstill.stands(heard) => {
+                    return node.report(ErrorKind::PoseRefused, heard);
+                }
+                _ => {}
             }
             take(BusOutput::Event(progress.tell(event)));
         });
-        if let Some(answer) = self.node.handle(frame) {
-            take(BusOutput::Send(answer));
+        if let Some(sample) = self.gyro.hear(frame, heard) {
+            self.predictor.gyro(&sample);
+            take(BusOutput::Event(self.progress.tell(BusEvent::Gyro(sample))));
         }
     }
 
@@ -125,44 +201,69 @@ impl Bus {
                 take(BusOutput::Event(progress.tell(event)));
             }
         });
+        self.laser = laser;
+        self.report_state(now);
         while let Some(frame) = self.node.poll(now) {
             take(BusOutput::Send(frame));
         }
-        if !self.node.is_operational() {
+        if self.node.is_publishing(now) {
+            self.publish(now, take);
+        }
+    }
+
+    fn publish(&mut self, now: Time, mut take: impl FnMut(BusOutput)) {
+        let Some(process) = self.process() else { return };
+        let frames = self.node.publish(now, &process);
+        if frames.is_empty() {
             return;
         }
-        if !core::mem::replace(&mut self.has_told_troubles, true) {
-            for code in self.troubles.codes() {
-                take(BusOutput::Send(self.emergency(code)));
+        frames.iter().for_each(|frame| take(BusOutput::Send(*frame)));
+        take(BusOutput::Published(SentPose { pose: process.pose, progress: self.progress }));
+    }
+
+    /// Pose and state for now. None before the localiser has said anything.
+    fn process(&self) -> Option<ProcessData> {
+        let EncoderFaults { drive, steering, .. } = self.faults;
+        let health = Health { drive, steering, laser: self.laser, start_search: self.relocalization };
+        Some(ProcessData { pose: self.predictor.output()?, health, limits: self.limits })
+    }
+
+    /// Says what is wrong with encoders, laser and pose.
+    fn report_state(&mut self, now: Time) {
+        let are_set_up = now.since(self.start) > SETTING_UP;
+        for (kind, is_there) in [
+            (ErrorKind::Laser, matches!(self.laser, LaserHealth::Silent | LaserHealth::Faulty)),
+            (ErrorKind::DriveEncoder, are_set_up && self.faults.drive.is_some()),
+            (ErrorKind::SteeringEncoder, are_set_up && self.faults.steering.is_some()),
+            (ErrorKind::Lost, self.is_lost),
+        ] {
+            if is_there {
+                self.node.report(kind, now);
             }
         }
-        if now < self.publisher.next() {
-            return;
-        }
-        let Some(output) = self.predictor.output() else { return };
-        let EncoderFaults { drive, steering, .. } = self.faults;
-        let health = Health { drive, steering, laser, start_search: self.relocalization };
-        let mut has_published = false;
-        for frame in self.publisher.poll(now, &output, &health).iter().flatten() {
-            has_published = true;
-            take(BusOutput::Send(*frame));
-        }
-        if has_published {
-            take(BusOutput::Published(SentPose { pose: output, progress: self.progress }));
-        }
     }
 
-    /// The nodes whose frames mean something here: the controller and its encoders.
-    #[must_use]
-    pub fn nodes(&self) -> [NodeId; 3] {
-        [self.nodes.controller, self.nodes.drive, self.nodes.steering]
+    /// Something is wrong that only the board can know.
+    pub fn report(&mut self, kind: ErrorKind, now: Time) {
+        self.node.report(kind, now);
     }
 
-    /// An error or its end, in the codes of CiA 301, table 26, as the controller's frame.
+    /// Identifier of the frames that mean something here though no node of [`Self::nodes`] says them.
     #[must_use]
-    pub fn emergency(&self, code: u16) -> Frame {
-        let emergency = Emergency { code, register: 1, details: [0; 5] };
-        Message::Emergency { node: self.nodes.controller, emergency }.encode()
+    pub fn other_frames(&self) -> Option<Id> {
+        self.gyro.id()
+    }
+
+    /// The nodes whose frames mean something here: the controller, its encoders, and those whose heartbeats are watched.
+    #[must_use]
+    pub fn nodes(&self) -> Vec<NodeId, NODES> {
+        let own = [self.nodes.controller, self.nodes.drive, self.nodes.steering];
+        let mut nodes = Vec::new();
+        for node in own.iter().chain(&self.node.watched()) {
+            // There is room for all.
+            let _ = nodes.push(*node);
+        }
+        nodes
     }
 
     /// The pose for now. None before the localiser has said anything.

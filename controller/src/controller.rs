@@ -12,9 +12,13 @@ use super::bus::{Bus, BusOutput, Troubles};
 use super::encoders::BusEvent;
 use super::laser::Laser;
 use super::localization::Localization;
+use super::setting_objects::ChangeableSettings;
 
 /// Room for the longest telegram of a revolution with 1440 beams, in either dialect.
 pub const TELEGRAM: usize = 18 * 1024;
+
+/// What the controller is called on the bus.
+const HARDWARE: &str = "desktop";
 
 /// Slices of the search that there is time for in a millisecond.
 const SLICES: usize = 8;
@@ -51,6 +55,7 @@ pub struct Controller<L = Localizer> {
     revolution: Revolution,
     bus: Bus,
     localization: Localization<L>,
+    settings: Settings,
 }
 
 impl<L: Localize> Controller<L> {
@@ -60,8 +65,9 @@ impl<L: Localize> Controller<L> {
         Self {
             laser: Laser::new(Configuration::default()),
             revolution: Revolution::new(),
-            bus: Bus::new(settings, Troubles::default(), now),
+            bus: Bus::new(settings, HARDWARE, Troubles::default(), now),
             localization: Localization::new(localizer, settings),
+            settings: settings.clone(),
         }
     }
 
@@ -111,8 +117,10 @@ impl<L: Localize> Controller<L> {
 
     /// Takes a frame of the bus.
     pub fn hear_bus(&mut self, frame: &Frame, now: Time, mut send: impl FnMut(&Frame), mut log: impl FnMut(&Record)) {
-        let Self { bus, localization, .. } = self;
-        bus.hear(frame, now, |output| take(localization, output, &mut send, &mut log));
+        let Self { bus, localization, settings, .. } = self;
+        bus.hear(frame, now, &mut ChangeableSettings::new(settings), |output| {
+            take(localization, output, &mut send, &mut log)
+        });
         bus.update(&localization.estimate());
     }
 
@@ -163,5 +171,7 @@ fn take<L: Localize>(
         BusOutput::Send(frame) => send(&frame),
         BusOutput::Event(told) => localization.hear(&told, log),
         BusOutput::Published(published) => localization.published(&published, log),
+        // It has no flash.
+        BusOutput::Save => {}
     }
 }

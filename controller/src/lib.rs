@@ -4,7 +4,8 @@
 //! | part | what it does | on a vehicle |
 //! |---|---|---|
 //! | [`Encoders`] | sets the encoders up, watches them, and makes events of what they and other controllers say | in the bus's task |
-//! | [`Bus`] | all that the bus hears and says: [`Encoders`], the controller's own node, the pose for now | the bus's task |
+//! | [`Gyro`] | makes events of what a gyro says | in the bus's task |
+//! | [`Bus`] | all that the bus hears and says: [`Encoders`], [`Gyro`], the controller's own node, the pose for now | the bus's task |
 //! | [`Laser`] | the session with the laser, and whether it can be used | the network's task |
 //! | [`Localization`] | the localiser, and the search for a pose that it does not have | the main loop |
 //! | [`Controller`] | all of them as one value, one after the other | a desktop, in simulated time |
@@ -17,15 +18,19 @@
 mod bus;
 mod controller;
 mod encoders;
+mod gyro;
 mod laser;
 mod localization;
 mod progress;
+mod setting_objects;
 mod standstill;
 
 pub use bus::{Bus, BusOutput, MOTIONS, Troubles};
 pub use controller::{Controller, LaserOrder, TELEGRAM};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels};
+pub use gyro::Gyro;
 pub use laser::Laser;
 pub use localization::{Estimate, Localization};
 pub use progress::{Progress, SentPose, Told};
+pub use setting_objects::{ChangeableSettings, SettingObjects, data_type, object_of};
 pub use standstill::Standstill;

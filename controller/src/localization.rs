@@ -1,7 +1,7 @@
 //! The localiser, and the search for a pose that it does not have.
 
 use agv_core::localizer::{Event, Localize, StartSearch};
-use agv_core::odometry::OdometryBias;
+use agv_core::odometry::{GyroErrors, OdometryBias};
 use agv_core::record::{Output, Published, Record};
 use agv_core::state::{PoseOutput, Relocalization};
 use agv_settings::Settings;
@@ -18,6 +18,8 @@ pub struct Estimate {
     pub pose: PoseOutput,
     /// What it has learnt of the odometry.
     pub bias: OdometryBias,
+    /// What it has learnt of the gyro, if there is one.
+    pub gyro: Option<GyroErrors>,
     /// How far the search for a pose has come.
     pub relocalization: Relocalization,
 }
@@ -131,6 +133,7 @@ impl<L: Localize> Localization<L> {
             answered: self.answered,
             pose: self.localizer.outputs().pose,
             bias: self.localizer.odometry_bias(),
+            gyro: self.localizer.gyro_errors(),
             relocalization: self.relocalization(),
         }
     }

@@ -10,15 +10,15 @@ import canopen
 database = cantools.database.load_file(sys.argv[1])
 objects = canopen.import_od(sys.argv[2], node_id=16)
 
-# Every message must be a PDO of the object dictionary, with the same identifier.
+# Every message of the controller must be a PDO of the object dictionary, with the same identifier.
 pdos = {}
 for communication, mapping in [(0x1800, 0x1A00), (0x1400, 0x1600)]:
     for number in range(5):
         if communication + number in objects:
             entry = objects[mapping + number][1].default
             assert entry & 0xFF == 64, hex(entry)
-            pdos[objects[communication + number][1].default] = objects[entry >> 16]
-assert sorted(pdos) == sorted(message.frame_id for message in database.messages)
+            pdos[objects[communication + number][1].default & 0x7FF] = objects[entry >> 16]
+assert sorted(pdos) == sorted(message.frame_id for message in database.messages if message.name.startswith("Agv"))
 assert all(variable.pdo_mappable for variable in pdos.values())
 
 for line in sys.stdin:

@@ -105,6 +105,8 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Reason::LaserMoved,
         Reason::OdometryDisagrees,
         Reason::OdometrySilent,
+        Reason::WheelsSlip,
+        Reason::GyroFault,
     ];
     let faults = [
         None,
@@ -125,7 +127,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Relocalization::TooFew,
         Relocalization::Unknown,
     ];
-    (0..13)
+    (0..15)
         .map(|index| {
             let (mode, reason) = (modes[index % 8], reasons[index]);
             let (drive, steering, laser) = (faults[index % 9], faults[(23 - index) % 9], lasers[index % 4]);

@@ -4,6 +4,7 @@
 mod candump;
 mod description;
 mod encoders;
+mod objects;
 mod record;
 mod sdo_server;
 mod slcan;

@@ -20,7 +20,7 @@ use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::encoder::Reporting;
+use agv_wire::can::encoder::{Profile, Reporting};
 use agv_wire::can::frame::AnyFrame;
 
 fn node(number: u8) -> NodeId {
@@ -29,7 +29,14 @@ fn node(number: u8) -> NodeId {
 
 fn nodes(is_synchronous: bool) -> EncoderNodes {
     let reporting = if is_synchronous { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
-    EncoderNodes { drive: node(1), steering: node(2), controller: node(16), reporting }
+    EncoderNodes {
+        drive: node(1),
+        steering: node(2),
+        controller: node(16),
+        reporting,
+        are_managed: true,
+        profiles: [Profile::Encoder; 2],
+    }
 }
 
 fn recording() -> Recording {

@@ -4,26 +4,45 @@
 
 use agv_controller::{Bus, BusOutput, Troubles};
 use agv_settings::Settings;
+use agv_wire::can::controller_node::ErrorKind;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
+use embedded_storage::nor_flash::NorFlash;
 
 use super::can_port::{BusChange, CanPort};
 use super::exchange::{self, now};
+use super::service::SharedController;
+use super::shared_settings::SharedSettings;
 use super::supervision::{self, Task};
+use crate::board::current as board;
 
 /// How often state machines are asked what is due.
 const STEP: Duration = Duration::from_millis(1);
 
 /// Takes part in the bus for ever.
-pub async fn run(mut port: impl CanPort, settings: &Settings, troubles: Troubles) -> ! {
-    let mut bus = Bus::new(settings, troubles, now());
-    port.listen_to(&bus.nodes());
+pub async fn run<F: NorFlash>(
+    mut port: impl CanPort,
+    settings: &Settings,
+    controller: &SharedController<F>,
+    troubles: Troubles,
+) -> ! {
+    let mut bus = Bus::new(settings, board::NAME, troubles, now());
+    let mut nodes = bus.nodes();
+    port.listen_to(&nodes, bus.other_frames());
+    let mut objects = SharedSettings { controller };
+    let mut lost_events = exchange::lost_events();
     let mut ticker = Ticker::every(STEP);
     loop {
         let woken = select(port.receive(), ticker.next()).await;
         supervision::check_in(Task::Bus);
-        if let Some(code) = port.supervise(now()).and_then(code) {
-            port.send(&bus.emergency(code));
+        if let Some(kind) = port.supervise(now()).and_then(error) {
+            bus.report(kind, now());
+        }
+        if core::mem::replace(&mut lost_events, exchange::lost_events()) != lost_events {
+            bus.report(ErrorKind::Overload, now());
+        }
+        if exchange::has_saving_failed() {
+            bus.report(ErrorKind::SettingsLost, now());
         }
         if let Some(estimate) = exchange::newest_estimate() {
             bus.update(&estimate);
@@ -35,20 +54,27 @@ pub async fn run(mut port: impl CanPort, settings: &Settings, troubles: Troubles
             }
             BusOutput::Event(told) => exchange::pass_on(told),
             BusOutput::Published(published) => exchange::log_published(published),
+            BusOutput::Save => exchange::save_settings(),
         };
         if let Either::First((frame, heard)) = &woken {
-            bus.hear(frame, *heard, &mut take);
+            bus.hear(frame, *heard, &mut objects, &mut take);
         }
         bus.poll(now(), exchange::laser_health(), &mut take);
         exchange::set_standing(bus.is_standing(now()));
+        // A master may have others watched.
+        let wanted = bus.nodes();
+        if wanted != nodes {
+            port.listen_to(&wanted, bus.other_frames());
+            nodes = wanted;
+        }
     }
 }
 
-/// What is told of a change of the bus, in the codes of CiA 301, table 26.
-const fn code(change: BusChange) -> Option<u16> {
+/// What is told of a change of the bus.
+const fn error(change: BusChange) -> Option<ErrorKind> {
     match change {
-        BusChange::Overrun => Some(0x8110),
+        BusChange::Overrun => Some(ErrorKind::Overrun),
         BusChange::Off => None,
-        BusChange::BackFromOff => Some(0x8140),
+        BusChange::BackFromOff => Some(ErrorKind::BusOff),
     }
 }

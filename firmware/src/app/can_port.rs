@@ -2,7 +2,7 @@
 
 use agv_core::measurement::Time;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::frame::Frame;
+use agv_wire::can::frame::{Frame, Id};
 
 /// What has become of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,8 +17,9 @@ pub enum BusChange {
 
 /// A CAN controller with queues.
 pub trait CanPort {
-    /// Takes only the frames of these nodes and for them, and those for all nodes. Everything, if it cannot choose.
-    fn listen_to(&mut self, _nodes: &[NodeId]) {}
+    /// Takes only the frames of these nodes and for them, those for all nodes, and those of the `other` identifier. Everything, if it
+    /// cannot choose.
+    fn listen_to(&mut self, _nodes: &[NodeId], _other: Option<Id>) {}
 
     /// The next classic frame of others, and when its end was heard.
     fn receive(&mut self) -> impl Future<Output = (Frame, Time)>;

@@ -13,7 +13,7 @@ use embassy_sync::signal::Signal;
 use embassy_sync::zerocopy_channel;
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// Events that wait for the localiser: more than half a second of samples.
+/// Events that wait for the localiser: more than half a second of samples, or a third of one beside those of a gyro.
 pub const EVENTS: usize = 64;
 
 /// Events of the bus, in order.
@@ -34,6 +34,9 @@ pub type RevolutionReceiver = zerocopy_channel::Receiver<'static, CriticalSectio
 static ESTIMATE: Signal<CriticalSectionRawMutex, Estimate> = Signal::new();
 
 static LASER: Mutex<Cell<SensorWatch>> = Mutex::new(Cell::new(SensorWatch::new()));
+/// Somebody on the bus wants the settings stored.
+static SAVE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+static HAS_SAVING_FAILED: AtomicBool = AtomicBool::new(false);
 static IS_STANDING: AtomicBool = AtomicBool::new(true);
 static ARE_SETTINGS_SOUND: AtomicBool = AtomicBool::new(true);
 /// Events that the localiser was too slow for.
@@ -107,6 +110,27 @@ pub fn set_settings_sound(are_sound: bool) {
 #[must_use]
 pub fn are_settings_sound() -> bool {
     ARE_SETTINGS_SOUND.load(Ordering::Relaxed)
+}
+
+/// Leaves it to the network's executor to store the settings.
+pub fn save_settings() {
+    SAVE.signal(());
+}
+
+/// Waits until somebody on the bus wants the settings stored.
+pub async fn save_wanted() {
+    SAVE.wait().await;
+}
+
+/// The settings could not be stored.
+pub fn saving_has_failed() {
+    HAS_SAVING_FAILED.store(true, Ordering::Relaxed);
+}
+
+/// Whether the settings could not be stored, since the last call.
+#[must_use]
+pub fn has_saving_failed() -> bool {
+    HAS_SAVING_FAILED.swap(false, Ordering::Relaxed)
 }
 
 /// The time of the firmware.

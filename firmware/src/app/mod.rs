@@ -9,5 +9,6 @@ pub mod localize;
 pub mod log_stream;
 pub mod service;
 pub mod settings;
+pub mod shared_settings;
 pub mod supervision;
 pub mod throttle;

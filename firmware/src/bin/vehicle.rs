@@ -14,7 +14,7 @@ use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::supervision::Supervisor;
 use agv_firmware::app::throttle::Throttle;
-use agv_firmware::app::{bus, exchange, laser, log_stream, service, settings, supervision};
+use agv_firmware::app::{bus, exchange, laser, log_stream, service, settings, shared_settings, supervision};
 use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, Watchdog};
 use agv_firmware::board::{RestartCause, retained, stack};
 use agv_settings::Settings;
@@ -60,8 +60,18 @@ struct Shared {
 }
 
 #[embassy_executor::task]
-async fn bus_task(can: Can, settings: &'static Settings, troubles: Troubles) -> ! {
-    bus::run(can, settings, troubles).await
+async fn bus_task(
+    can: Can,
+    settings: &'static Settings,
+    controller: &'static SharedController<Flash>,
+    troubles: Troubles,
+) -> ! {
+    bus::run(can, settings, controller, troubles).await
+}
+
+#[embassy_executor::task]
+async fn save_task(controller: &'static SharedController<Flash>) -> ! {
+    shared_settings::keep(controller).await
 }
 
 #[embassy_executor::task]
@@ -106,6 +116,7 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
     let resources = RESOURCES.init_with(StackResources::new);
     let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, board::seed());
     spawner.spawn(watch_task().expect("the task runs once"));
+    spawner.spawn(save_task(shared.controller).expect("the task runs once"));
     spawner.spawn(network_task(runner).expect("the task runs once"));
     spawner.spawn(laser_task(stack, revolutions, shared.settings).expect("the task runs once"));
     spawner.spawn(log_task(stack, shared).expect("the task runs once"));
@@ -177,7 +188,8 @@ fn start() -> Vehicle {
         is_board_damaged: troubles.are_there(),
         are_settings_lost: !exchange::are_settings_sound(),
     };
-    board::bus_tasks().spawn(bus_task(can, settings, troubles).expect("the task runs once"));
+    let can = can.start(settings.bit_rate);
+    board::bus_tasks().spawn(bus_task(can, settings, controller, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
     // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for.
     let mut counted = controller.try_lock().expect("nobody else knows the controller");

@@ -6,10 +6,9 @@ use agv_wire::can::canopen::{Message, NodeId};
 use agv_wire::can::encoder::object;
 use agv_wire::can::frame::{Frame, standard_id};
 use agv_wire::can::nmt::{NmtCommand, NmtState};
-use agv_wire::can::sdo::Object;
+use agv_wire::can::sdo::{Object, SdoServer};
 
 use super::encoder_objects::{EncoderObjects, PDO_OFF};
-use super::sdo_server::SdoServer;
 
 /// One encoder.
 #[derive(Clone, Debug)]
@@ -30,7 +29,7 @@ impl EmulatedEncoder {
         Self {
             node,
             objects: EncoderObjects::new(node, range),
-            sdo: SdoServer::default(),
+            sdo: SdoServer::new(),
             state: NmtState::BootUp,
             next_heartbeat: Time::default(),
             next_pdo: Time::default(),

@@ -6,9 +6,7 @@ use std::collections::BTreeMap;
 use agv_core::odometry::CounterRange;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::object;
-use agv_wire::can::sdo::{AbortCode, Object};
-
-use super::sdo_server::Dictionary;
+use agv_wire::can::sdo::{AbortCode, Object, ObjectDictionary, ValueBytes};
 
 /// Steps of a revolution of the shaft.
 const STEPS: u32 = 4096;
@@ -184,26 +182,27 @@ const fn is_mapping(object: Object) -> bool {
     object.index == 0x1A00
 }
 
-impl Dictionary for EncoderObjects {
-    fn read(&self, asked: Object) -> Result<Vec<u8>, AbortCode> {
+impl ObjectDictionary for EncoderObjects {
+    fn read(&self, asked: Object) -> Result<ValueBytes, AbortCode> {
+        let value = |bytes: &[u8]| ValueBytes::from_slice(bytes).map_err(|_| AbortCode::OutOfMemory);
         if asked == object::POSITION {
-            return Ok(self.position().to_le_bytes().to_vec());
+            return value(&self.position().to_le_bytes());
         }
         let is_index = |&(index, _): &(u16, u8)| index == asked.index || asked.index == object::POSITION.index;
         match self.values.get(&(asked.index, asked.sub)) {
-            Some(bytes) => Ok(bytes.clone()),
+            Some(bytes) => value(bytes),
             None if self.values.keys().any(is_index) => Err(AbortCode::NoSuchSubindex),
             None => Err(AbortCode::NoSuchObject),
         }
     }
 
-    fn check_write(&self, asked: Object, length: Option<usize>) -> Result<(), AbortCode> {
+    fn writable(&self, asked: Object) -> Result<usize, AbortCode> {
         let is_new_entry = is_mapping(asked) && (1..=8).contains(&asked.sub);
         let known = if is_new_entry { 4 } else { self.read(asked)?.len() };
         if !WRITABLE.contains(&asked) && !is_mapping(asked) {
             return Err(AbortCode::ReadOnly);
         }
-        if length.is_some_and(|length| length != known) { Err(AbortCode::LengthMismatch) } else { Ok(()) }
+        Ok(known)
     }
 
     fn write(&mut self, asked: Object, bytes: &[u8]) -> Result<(), AbortCode> {

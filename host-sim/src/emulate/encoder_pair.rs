@@ -1,8 +1,8 @@
 //! The two encoders of a vehicle that drives as recorded.
 
 use agv_core::localizer::Event;
-use agv_core::measurement::{EncoderSample, Time};
-use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_core::measurement::{EncoderSample, Time, WheelSample};
+use agv_core::odometry::{CounterRange, Differential, Tricycle, Vehicle, WheelVehicle};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::frame::Frame;
 
@@ -32,8 +32,13 @@ impl EmulatedPair {
     /// # Errors
     /// If the drive has no encoders.
     pub fn new(recording: &Recording, drive: NodeId, steering: NodeId) -> Result<Self, PairError> {
+        let is_differential = matches!(recording.parameters.vehicle, Vehicle::Wheels(WheelVehicle::Differential(_)));
         let samples = recording.events.iter().filter_map(|event| match event.view() {
             Event::Encoders(sample) => Some(sample),
+            // The pair of a differential vehicle is left and right.
+            Event::Wheels(WheelSample { time, wheels: [left, right, ..] }) if is_differential => {
+                Some(EncoderSample { time, drive: left.count, steering: right.count })
+            }
             _ => None,
         });
         let samples: Vec<_> = samples.collect();
@@ -42,6 +47,9 @@ impl EmulatedPair {
         }
         let (drive_range, steering_range) = match recording.parameters.vehicle {
             Vehicle::Tricycle(Tricycle { drive_range, steering_range, .. }) => (drive_range, steering_range),
+            Vehicle::Wheels(WheelVehicle::Differential(Differential { left, right, .. })) => {
+                (left.turn.range, right.turn.range)
+            }
             _ => (CounterRange::BITS_32, CounterRange::BITS_32),
         };
         let nodes = [EmulatedEncoder::new(drive, drive_range), EmulatedEncoder::new(steering, steering_range)];

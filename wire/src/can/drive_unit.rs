@@ -14,7 +14,8 @@ pub struct FrameSignal {
 }
 
 impl FrameSignal {
-    fn value(&self, frame: &Frame) -> Option<f64> {
+    /// The number, if the frame holds it.
+    pub(super) fn value(&self, frame: &Frame) -> Option<f64> {
         if frame.id() != self.id || frame.is_remote() {
             return None;
         }

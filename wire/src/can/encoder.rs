@@ -6,6 +6,7 @@
 //! only the measuring range is indispensable.
 
 use super::canopen::{Message, NodeId, transmit_pdo_id};
+use super::drive_402;
 use super::emcy::Emergency;
 use super::frame::{Frame, Id, extended_id, standard_id};
 use super::nmt::{HeartbeatConsumer, NmtCommand, NmtState};
@@ -62,11 +63,32 @@ pub enum Reporting {
     },
 }
 
+/// What tells the position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// An encoder of CiA 406.
+    Encoder,
+    /// A drive of CiA 402, which is only listened to: see [`drive_402`].
+    Drive,
+}
+
+impl Profile {
+    /// The position, 32 bits.
+    const fn position(self) -> Object {
+        match self {
+            Self::Encoder => object::POSITION,
+            Self::Drive => drive_402::POSITION,
+        }
+    }
+}
+
 /// What the master knows of an encoder beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncoderSettings {
     /// Its node.
     pub node: NodeId,
+    /// What it is.
+    pub profile: Profile,
     /// When it shall report.
     pub reporting: Reporting,
     /// Time between heartbeats that it shall keep, ms; 0 leaves it as it is.
@@ -76,13 +98,30 @@ pub struct EncoderSettings {
     /// The range that its counter is read with, if it is known. A node that tells another one is set up nevertheless:
     /// see [`Identity::tells_other_range`].
     pub range: Option<CounterRange>,
+    /// Whether this is the node's master. If another one is, nothing is sent to it, and what it sends is taken as the profile
+    /// has it, in the PDO with the predefined identifier: of an encoder the position alone, 32 bits, in the first.
+    pub is_managed: bool,
 }
 
 impl EncoderSettings {
+    /// Whether this is the node's master: drives are only listened to.
+    #[must_use]
+    pub fn has_master(&self) -> bool {
+        self.is_managed && self.profile == Profile::Encoder
+    }
+
     /// A node that reports every 10 ms, with a heartbeat every 100 ms and 50 ms for each answer.
     #[must_use]
     pub const fn new(node: NodeId) -> Self {
-        Self { node, reporting: Reporting::Timer { period: 10 }, heartbeat: 100, answer_timeout: 0.05, range: None }
+        Self {
+            node,
+            profile: Profile::Encoder,
+            reporting: Reporting::Timer { period: 10 },
+            heartbeat: 100,
+            answer_timeout: 0.05,
+            range: None,
+            is_managed: true,
+        }
     }
 }
 
@@ -218,19 +257,29 @@ impl Encoder {
     /// An encoder that has not been heard; its reset is due at `start`.
     #[must_use]
     pub fn new(settings: EncoderSettings, start: Time) -> Self {
-        let identity = Identity {
-            range: CounterRange::BITS_32,
+        let settings = EncoderSettings { is_managed: settings.has_master(), ..settings };
+        let mut identity = Identity {
+            range: settings.range.unwrap_or(CounterRange::BITS_32),
             units_per_revolution: None,
             single_turn_resolution: None,
             pdo_id: None,
             mapping: PdoMapping::new(),
             refused_settings: 0,
-            keeps_timer: false,
+            keeps_timer: !settings.is_managed,
             tells_other_range: false,
         };
+        if !settings.is_managed {
+            let (number, mapping) = overheard(settings.profile);
+            identity.pdo_id = Some(transmit_pdo_id(settings.node, number));
+            identity.mapping = mapping;
+        }
         Self {
             settings,
-            phase: Phase::Waiting { next_reset: start },
+            phase: if settings.is_managed {
+                Phase::Waiting { next_reset: start }
+            } else {
+                Phase::Reporting { since: start, has_reported: true }
+            },
             client: SdoClient::new(settings.node, settings.answer_timeout),
             command: None,
             heartbeat: HeartbeatConsumer::new(f64::from(settings.heartbeat) * 1e-3 * HEARTBEAT_TOLERANCE),
@@ -353,7 +402,7 @@ impl Encoder {
         if Some(frame.id()) != self.identity.pdo_id || frame.is_remote() {
             return None;
         }
-        let position = self.identity.mapping.extract(object::POSITION, frame.data())? as u32;
+        let position = self.identity.mapping.extract(self.settings.profile.position(), frame.data())? as u32;
         let speed = self.identity.mapping.extract(object::SPEED, frame.data()).map(|speed| speed as i16);
         if let Phase::Reporting { has_reported, .. } = &mut self.phase {
             *has_reported = true;
@@ -374,6 +423,11 @@ impl Encoder {
             self.heartbeat.hear(time);
         }
         match (state, self.phase) {
+            (NmtState::BootUp, _) if !self.settings.is_managed => {
+                self.reports.restart();
+                Some(EncoderEvent::BootedUp)
+            }
+            (_, _) if !self.settings.is_managed => None,
             (NmtState::BootUp, _) => {
                 self.begin_setup();
                 Some(EncoderEvent::BootedUp)
@@ -564,6 +618,18 @@ impl Encoder {
             Phase::Polled { next: now }
         };
         EncoderEvent::Started
+    }
+}
+
+/// The PDO of a node that another master has set up, and what stands in it, as the profile has them.
+fn overheard(profile: Profile) -> (u8, PdoMapping) {
+    match profile {
+        Profile::Encoder => {
+            let mut mapping = PdoMapping::new();
+            mapping.push(MappingEntry { object: object::POSITION, bits: 32 });
+            (1, mapping)
+        }
+        Profile::Drive => (drive_402::POSITION_PDO, drive_402::position_mapping()),
     }
 }
 

@@ -126,11 +126,13 @@ pub struct EncoderPair {
 pub const FAULT_PERIOD: f64 = 0.010;
 
 impl EncoderPair {
-    /// Two encoders that have not been heard. If one reports at SYNC, the pair sends SYNC every `sync_period` seconds.
+    /// Two encoders that have not been heard. If one reports at SYNC, and no other master sees to it, the
+    /// pair sends SYNC every `sync_period` seconds.
     #[must_use]
     pub fn new(drive: &ChannelSettings, steering: &ChannelSettings, sync_period: f64, start: Time) -> Self {
-        let is_synchronous =
-            [drive, steering].iter().any(|channel| channel.encoder.reporting == Reporting::Synchronous);
+        let is_synchronous = [drive, steering]
+            .iter()
+            .any(|channel| channel.encoder.has_master() && channel.encoder.reporting == Reporting::Synchronous);
         Self {
             drive: Channel::new(drive, start),
             steering: Channel::new(steering, start),

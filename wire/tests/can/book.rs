@@ -1,4 +1,5 @@
-//! The table of the CAN interface in the book is made from `docs/agv.dbc`, which other tests hold against the code.
+//! The tables of the CAN interface in the book are made from `docs/agv.dbc`, which other tests hold against the code, and from
+//! the node's own table of objects.
 //!
 //! `AGV_ACCEPT=1 cargo test -p agv-wire book` writes it anew, for a change that is meant.
 
@@ -6,19 +7,22 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use agv_wire::can::controller_node::dictionary::{Access, OBJECTS};
+
 fn docs(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name)
 }
 
 const HEAD: &str = "# All CAN frames
 
-This chapter is made from `docs/agv.dbc`. Identifiers are those of node 16 (`can.controller_node`): each is its base plus the number of the
-node. 500 kbit/s, eleven-bit identifiers, data of eight bytes, least significant bit first. On the Nucleo-H743ZI the transceiver is at
+This chapter is made from `docs/agv.dbc` and from the objects of the controller's node. Identifiers are those of node 16
+(`can.controller_node`): each is its base plus the number of the node. 500 kbit/s unless `can.bit_rate` is another, eleven-bit
+identifiers, data of eight bytes, least significant bit first. On the Nucleo-H743ZI the transceiver is at
 PD0 (receive) and PD1 (transmit). The lowest value of a signed signal, and the highest of an unsigned one, mean that the value is not
-known. The frames of a cycle have the same counter.
+known. The frames of a cycle have the same counter. They are what the node's PDOs hold until a master maps something else.
 
 The encoders are nodes 1 (`can.drive_node`) and 2 (`can.steering_node`) after CiA 406: each sends its position as a process data object
-every `can.encoder_period`; the controller starts them and watches their heartbeats.
+every `can.encoder_period`; the controller starts them and watches their heartbeats, unless `can.nmt_master` is off.
 
 ";
 
@@ -73,12 +77,17 @@ fn table(dbc: &str) -> String {
             words[0].clone_into(&mut id);
             let number: u32 = words[0].parse().unwrap();
             let who = if words[3] == "AGV" { "said by the controller" } else { "heard by the controller" };
+            // A gyro is no node that the settings number.
+            let place = if words[3] == "Gyro" {
+                format!("({number:03X}h)")
+            } else {
+                format!("({number:03X}h = {:03X}h + node)", number - 16)
+            };
             let comment = comments.get(&id).map_or("", String::as_str);
             let _ = write!(
                 text,
-                "\n## {} ({number:03X}h = {:03X}h + node), {who}\n\n{comment}\n\n| signal | first bit | bits | | factor | unit | range |\n|---|---|---|---|---|---|---|\n",
+                "\n## {} {place}, {who}\n\n{comment}\n\n| signal | first bit | bits | | factor | unit | range |\n|---|---|---|---|---|---|---|\n",
                 words[1],
-                number - 16,
             );
         } else if let Some((name, row)) = signal(line) {
             let _ = writeln!(text, "{row}");
@@ -93,6 +102,45 @@ fn table(dbc: &str) -> String {
         }
     }
     finish(&mut text, &mut notes);
+    text + &objects()
+}
+
+const OBJECTS_HEAD: &str = "
+# Objects of the controller's node
+
+`docs/agv.eds` has them for other programs. Objects above 4000h are the [settings](settings.md): 4000h plus the key of the setting. Values of more than four bytes come in segments. PDO parameters (1800h to 1A04h) are written in pre-operational.
+
+| index | sub-index | object | type | access | in PDOs |
+|---|---|---|---|---|---|
+";
+
+/// The table of all objects but the settings.
+fn objects() -> String {
+    let span = |(first, last): (u16, u16), digits: usize| {
+        let one = |number: u16| if digits > 2 { format!("{number:0digits$X}h") } else { number.to_string() };
+        if first == last { one(first) } else { format!("{} to {}", one(first), one(last)) }
+    };
+    let mut text = OBJECTS_HEAD.to_owned();
+    for record in &OBJECTS {
+        for entry in record.entries {
+            let name =
+                if record.is_variable() { entry.name.to_owned() } else { format!("{}: {}", record.name, entry.name) };
+            let access = match entry.access {
+                Access::Constant => "constant",
+                Access::Read => "read",
+                Access::ReadWrite => "read, write",
+                Access::Write => "write",
+            };
+            let _ = writeln!(
+                text,
+                "| {} | {} | {name} | {:?} | {access} | {} |",
+                span(record.indices, 4),
+                span((entry.subs.0.into(), entry.subs.1.into()), 1),
+                entry.data_type,
+                if entry.is_mappable { "yes" } else { "" },
+            );
+        }
+    }
     text
 }
 

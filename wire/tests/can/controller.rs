@@ -7,9 +7,7 @@ use agv_core::measurement::EncoderFault;
 use agv_core::measurement::Time;
 use agv_core::state::{LaserHealth, Relocalization};
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::controller::{
-    Content, ControllerError, Health, OrderReceiver, PosePublisher, PoseReceiver, contents,
-};
+use agv_wire::can::controller::{Content, ControllerError, Health, OrderReceiver, contents};
 use agv_wire::can::frame::{Frame, standard_id};
 use proptest::prelude::*;
 
@@ -154,33 +152,6 @@ proptest! {
             prop_assert_eq!(Content::decode(&frame, node()), Err(ControllerError::Foreign));
         }
     }
-}
-
-#[test]
-fn poses_come_every_10_ms_and_are_put_together_again() {
-    let mut publisher = PosePublisher::new(node(), AlertLimits::default(), Time::default());
-    let mut receiver = PoseReceiver::new(node());
-    let mut counters = Vec::new();
-    for millisecond in 0..1000 {
-        let Some(frames) = publisher.poll(Time::from_micros(millisecond * 1000), &pose(), &health()) else { continue };
-        assert_eq!(millisecond % 10, 0);
-        for (index, frame) in frames.iter().enumerate() {
-            // The third pose loses a frame.
-            let received = if millisecond == 20 && index == 2 { None } else { receiver.handle(frame) };
-            assert_eq!(received.is_some(), index == 4 && millisecond != 20);
-            if let Some(received) = received {
-                counters.push(received.counter);
-                assert_eq!((received.mode, received.reason, received.health), (Mode::Mixed, Reason::None, health()));
-                assert!((received.pose.x - 12.3456).abs() < 1e-9 && (received.pose.theta + 1.234_567).abs() < 1e-9);
-                assert!((received.deviations[1] - 0.02).abs() < 1e-9 && received.time == 4587);
-                assert!(
-                    (received.resets, received.overflows) == (0xA7, 2) && (received.last_reset - 0.14).abs() < 1e-9
-                );
-            }
-        }
-    }
-    let expected: Vec<u8> = (0..100).filter(|index| *index != 2).map(|index| index % 16).collect();
-    assert_eq!(counters, expected);
 }
 
 #[test]

@@ -3,8 +3,9 @@
 use agv_core::measurement::Time;
 use agv_core::odometry::CounterRange;
 use agv_wire::can::canopen::NodeId;
+use agv_wire::can::drive_402;
 use agv_wire::can::encoder::{
-    Encoder, EncoderEvent, EncoderReading, EncoderSettings, EncoderState, Reporting, SetupError,
+    Encoder, EncoderEvent, EncoderReading, EncoderSettings, EncoderState, Profile, Reporting, SetupError,
 };
 use agv_wire::can::frame::Frame;
 use proptest::prelude::*;
@@ -314,4 +315,63 @@ proptest! {
         bench.run(end + 3000..end + 3100);
         prop_assert_eq!(bench.events.last(), Some(&EncoderEvent::Started));
     }
+}
+
+#[test]
+fn an_encoder_of_another_master_is_only_listened_to() {
+    let range = CounterRange::BITS_24;
+    let unmanaged = EncoderSettings { is_managed: false, heartbeat: 0, range: Some(range), ..settings(1) };
+    let mut bench = Bench::new(unmanaged, Node::new(1));
+    for millisecond in 0..3000 {
+        if millisecond % 10 == 0 {
+            bench.hear(&frame("181#EFCDAB00"), at(millisecond));
+        }
+        // It boots in the middle, and is in pre-operational: that is not ours.
+        let said = match millisecond {
+            1000 => Some("701#00"),
+            1001 => Some("701#7F"),
+            1002 => Some("581#8000000000000008"),
+            _ => None,
+        };
+        if let Some(said) = said {
+            bench.hear(&frame(said), at(millisecond));
+        }
+        bench.run(millisecond..millisecond + 1);
+    }
+    assert_eq!(bench.sent, []);
+    let readings = bench.readings();
+    assert_eq!(readings.len(), 300);
+    assert!(readings.iter().all(|reading| reading.position == 0x00AB_CDEF));
+    assert_eq!(bench.events.len(), 301);
+    assert_eq!((bench.master.identity().unwrap().range, bench.master.state()), (range, EncoderState::Reporting));
+    assert!(!bench.master.is_heartbeat_lost(at(9000)));
+}
+
+#[test]
+fn a_drive_of_cia_402_tells_its_position_and_is_told_nothing() {
+    let drive = EncoderSettings { profile: Profile::Drive, ..settings(9) };
+    let mut bench = Bench::new(drive, Node::new(9));
+    // Status word, position actual value -2: PDO 3 as CiA 402 has it; the others are of other things.
+    for (millisecond, text) in [
+        (0, "189#3702"),
+        (10, "389#3702FEFFFFFF"),
+        (15, "489#3702E8030000"),
+        (20, "389#370201000000"),
+        (21, "389#3702"),
+        (25, "709#05"),
+    ] {
+        bench.hear(&frame(text), at(millisecond));
+        bench.run(millisecond..millisecond + 1);
+    }
+    assert_eq!(bench.sent, []);
+    let positions: Vec<u32> = bench.readings().iter().map(|reading| reading.position).collect();
+    assert_eq!(positions, [0xFFFF_FFFE, 1]);
+    // A position of 32 bits wraps in the middle of that.
+    assert_eq!(bench.master.identity().unwrap().range.step(positions[0], positions[1]), 3);
+    // The velocity is 1000 of the drive's units, each 0.5 mm/s here.
+    let velocity = drive_402::velocity(drive.node, 0.5e-3);
+    let heard = frame("489#3702E8030000");
+    assert_eq!(heard.id(), velocity.id);
+    assert_eq!(velocity.signal.value(heard.data()), Some(0.5));
+    assert_eq!(velocity.signal.value(frame("489#370218FCFFFF").data()), Some(-0.5));
 }

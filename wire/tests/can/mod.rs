@@ -1,6 +1,7 @@
 //! The CAN bus: literal bytes, properties, and state machines against a scripted node.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "a panic is how a test fails")]
 
+mod bit_timing;
 mod book;
 mod canopen;
 mod controller;
@@ -8,6 +9,7 @@ mod controller_node;
 mod drive_unit;
 mod encoder;
 mod frames;
+mod gyro;
 mod node;
 mod pair;
 mod plausibility;

@@ -38,6 +38,8 @@ pub struct Board {
     pub troubles: Troubles,
 }
 
+/// What the board is called on the bus.
+pub const NAME: &str = "MPS2 AN500";
 /// Where the stack begins.
 pub const STACK_TOP: u32 = 0x2040_0000;
 /// Bytes at its end that nobody may touch.

@@ -1,4 +1,4 @@
-//! FDCAN1 at 500 kbit/s, with queues behind those of the controller, which hold three frames.
+//! FDCAN1, with queues behind those of the controller, which hold three frames.
 //!
 //! What is known of the released driver and kept away from here: its compensation of the transceiver's delay (needed only
 //! with bit rate switching, which is off), and its receive time, which it computes from the controller's counter in the mode
@@ -8,15 +8,18 @@
 use core::num::{NonZeroU8, NonZeroU16};
 
 use agv_core::measurement::Time;
+use agv_wire::can::bit_timing::BitTiming;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::frame::Frame;
+use agv_wire::can::frame::{Frame, Id};
 use embassy_stm32::Peri;
 use embassy_stm32::can::config::{FrameTransmissionConfig, GlobalFilter, NominalBitTiming, NonMatchingFilter};
-use embassy_stm32::can::filter::{Action, FilterType, StandardFilter, StandardFilterSlot};
-use embassy_stm32::can::{BufferedCan, BufferedCanSender, CanConfigurator, OperatingMode, RxBuf, RxPin, TxBuf, TxPin};
+use embassy_stm32::can::filter::{
+    Action, ExtendedFilter, ExtendedFilterSlot, FilterType, StandardFilter, StandardFilterSlot,
+};
+use embassy_stm32::can::{BufferedCan, BufferedCanSender, CanConfigurator, OperatingMode, RxBuf, TxBuf};
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::FDCAN1 as REGISTERS;
-use embassy_stm32::peripherals::FDCAN1;
+use embassy_stm32::peripherals::{FDCAN1, PD0, PD1};
 use portable_atomic::{AtomicU32, Ordering};
 use static_cell::ConstStaticCell;
 
@@ -30,11 +33,22 @@ const RECEIVED: usize = 40;
 /// Buffers of the controller.
 const BUFFERS: u32 = 0b111;
 
-/// 500 kbit/s from 80 MHz: sixteen quanta, of which the first, thirteen, and two; the sample point is at 87.5 %.
-const PRESCALER: u16 = 10;
-const SEGMENTS: (u8, u8) = (13, 2);
-/// Quanta by which a bit may be made longer or shorter.
-const JUMP: u8 = 2;
+/// Clock of the controller, Hz.
+const CLOCK: u32 = 80_000_000;
+/// 500 kbit/s, for a bit rate that this clock does not give.
+const USUAL: BitTiming = BitTiming { prescaler: 10, before: 13, behind: 2, jump: 2 };
+
+/// Places for what is listened to: everybody, the controller, its encoders, and nodes whose heartbeats are watched.
+const SLOTS: [StandardFilterSlot; 8] = [
+    StandardFilterSlot::_0,
+    StandardFilterSlot::_1,
+    StandardFilterSlot::_2,
+    StandardFilterSlot::_3,
+    StandardFilterSlot::_4,
+    StandardFilterSlot::_5,
+    StandardFilterSlot::_6,
+    StandardFilterSlot::_7,
+];
 
 /// While nobody acknowledges, a frame waits for so long at most, us.
 const STALE: u64 = 20_000;
@@ -47,16 +61,6 @@ const FORGOTTEN: u64 = 10_000_000;
 static SENT_FRAMES: ConstStaticCell<TxBuf<SENT>> = ConstStaticCell::new(TxBuf::new());
 static RECEIVED_FRAMES: ConstStaticCell<RxBuf<RECEIVED>> = ConstStaticCell::new(RxBuf::new());
 static LOST: AtomicU32 = AtomicU32::new(0);
-
-/// By how much the clocks of two nodes may be off, millionths, each: the smaller one of what resynchronisation makes good
-/// within ten bits, and of what is left at the end of an error frame (ISO 11898-1, 11.3.1.2).
-const fn tolerance() -> u32 {
-    let bit = 1 + SEGMENTS.0 as u32 + SEGMENTS.1 as u32;
-    let resynchronised = 1_000_000 * JUMP as u32 / (20 * bit);
-    let smaller = if SEGMENTS.0 < SEGMENTS.1 { SEGMENTS.0 } else { SEGMENTS.1 };
-    let after_error = 1_000_000 * smaller as u32 / (2 * (13 * bit - SEGMENTS.1 as u32));
-    if resynchronised < after_error { resynchronised } else { after_error }
-}
 
 /// The same frame of another library.
 fn same<From: embedded_can::Frame, To: embedded_can::Frame>(frame: &From) -> Option<To> {
@@ -85,23 +89,29 @@ pub struct FdCanPort {
     last_off: u64,
 }
 
-impl FdCanPort {
-    /// Takes part in the bus, or only listens if a clock that is off by `clock_tolerance` millionths would disturb it. Call
+/// What the bus is made of.
+pub struct CanParts {
+    /// The controller.
+    pub controller: Peri<'static, FDCAN1>,
+    /// The transceiver's pins, receiving and transmitting.
+    pub pins: (Peri<'static, PD0>, Peri<'static, PD1>),
+    /// By how much the clock may be off, millionths.
+    pub clock_tolerance: u32,
+}
+
+impl CanParts {
+    /// Takes part in the bus of that many kbit/s, or only listens if the clock is so far off that it would disturb it. Call
     /// once.
     #[must_use]
-    pub fn start(
-        instance: Peri<'static, FDCAN1>,
-        receive: Peri<'static, impl RxPin<FDCAN1>>,
-        transmit: Peri<'static, impl TxPin<FDCAN1>>,
-        interrupts: Interrupts,
-        clock_tolerance: u32,
-    ) -> Self {
-        let mut configurator = CanConfigurator::new(instance, receive, transmit, interrupts);
+    pub fn start(self, bit_rate: u16) -> FdCanPort {
+        let Self { controller, pins: (receive, transmit), clock_tolerance } = self;
+        let mut configurator = CanConfigurator::new(controller, receive, transmit, Interrupts);
+        let found = BitTiming::new(CLOCK, bit_rate).unwrap_or(USUAL);
         let timing = NominalBitTiming {
-            prescaler: NonZeroU16::new(PRESCALER).unwrap_or(NonZeroU16::MIN),
-            seg1: NonZeroU8::new(SEGMENTS.0).unwrap_or(NonZeroU8::MIN),
-            seg2: NonZeroU8::new(SEGMENTS.1).unwrap_or(NonZeroU8::MIN),
-            sync_jump_width: NonZeroU8::new(JUMP).unwrap_or(NonZeroU8::MIN),
+            prescaler: NonZeroU16::new(found.prescaler).unwrap_or(NonZeroU16::MIN),
+            seg1: NonZeroU8::new(found.before).unwrap_or(NonZeroU8::MIN),
+            seg2: NonZeroU8::new(found.behind).unwrap_or(NonZeroU8::MIN),
+            sync_jump_width: NonZeroU8::new(found.jump).unwrap_or(NonZeroU8::MIN),
         };
         // Frames that no filter takes are those of nobody that this controller listens to.
         let filter = GlobalFilter::default()
@@ -114,11 +124,11 @@ impl FdCanPort {
             .set_global_filter(filter)
             .set_automatic_bus_off_recovery(false);
         configurator.set_config(config);
-        let listens_only = clock_tolerance > tolerance();
+        let listens_only = clock_tolerance > found.tolerance();
         let mode = if listens_only { OperatingMode::BusMonitoringMode } else { OperatingMode::NormalOperationMode };
         let bus = configurator.start(mode).buffered(SENT_FRAMES.take(), RECEIVED_FRAMES.take());
         let sender = bus.writer();
-        Self {
+        FdCanPort {
             bus,
             sender,
             listens_only,
@@ -128,7 +138,9 @@ impl FdCanPort {
             last_off: 0,
         }
     }
+}
 
+impl FdCanPort {
     /// Throws away what waits to be sent: it is too old for whoever comes back.
     fn forget_waiting(&self) {
         // The driver moves one frame on from its queue each time that its interrupt comes.
@@ -175,14 +187,31 @@ impl FdCanPort {
 }
 
 impl CanPort for FdCanPort {
-    fn listen_to(&mut self, nodes: &[NodeId]) {
+    fn listen_to(&mut self, nodes: &[NodeId], other: Option<Id>) {
         // Commands to all nodes and the SYNC, which have number 0, and everything from or for the others.
         let numbers = core::iter::once(0).chain(nodes.iter().map(|node| u16::from(node.number())));
-        let slots = [StandardFilterSlot::_0, StandardFilterSlot::_1, StandardFilterSlot::_2, StandardFilterSlot::_3];
-        for (number, slot) in numbers.zip(slots) {
-            let filter = FilterType::BitMask { filter: number, mask: 0x7F };
-            let filter = StandardFilter { filter, action: Action::StoreInFifo0 };
+        let mut numbers = numbers.map(|number| FilterType::BitMask { filter: number, mask: 0x7F });
+        for slot in SLOTS {
+            // Places that are not needed any more take nothing.
+            let filter = match numbers.next() {
+                Some(filter) => StandardFilter { filter, action: Action::StoreInFifo0 },
+                None => StandardFilter::disable(),
+            };
             self.bus.properties().set_standard_filter(slot, filter);
+        }
+        let action = Action::StoreInFifo0;
+        match other {
+            Some(Id::Standard(id)) => {
+                let filter = FilterType::BitMask { filter: id.as_raw(), mask: 0x7FF };
+                let filter = StandardFilter { filter, action };
+                self.bus.properties().set_standard_filter(StandardFilterSlot::_8, filter);
+            }
+            Some(Id::Extended(id)) => {
+                let filter = FilterType::BitMask { filter: id.as_raw(), mask: 0x1FFF_FFFF };
+                let filter = ExtendedFilter { filter, action };
+                self.bus.properties().set_extended_filter(ExtendedFilterSlot::_0, filter);
+            }
+            None => {}
         }
     }
 

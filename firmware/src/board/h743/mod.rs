@@ -14,7 +14,7 @@ mod random;
 mod restart_cause;
 mod watchdog;
 
-pub use can::FdCanPort as Can;
+pub use can::{CanParts, FdCanPort as Can};
 pub use ethernet::Ethernet;
 pub use flash::SettingsFlash as Flash;
 pub use random::seed;
@@ -32,6 +32,8 @@ use super::{RestartCause, Troubles};
 use clocks::Source;
 use ethernet::{Queue, Wires};
 
+/// What the board is called on the bus.
+pub const NAME: &str = "Nucleo-H743ZI";
 /// Where the stack begins.
 pub const STACK_TOP: u32 = 0x2002_0000;
 /// Bytes at its end that nobody may touch.
@@ -66,8 +68,8 @@ unsafe fn UART8() {
 
 /// What the board has.
 pub struct Board {
-    /// FDCAN1.
-    pub can: Can,
+    /// FDCAN1, which begins when its bit rate is known.
+    pub can: CanParts,
     /// Ethernet.
     pub ethernet: Ethernet,
     /// Where settings are kept.
@@ -98,7 +100,11 @@ pub fn start(mut core: cortex_m::Peripherals) -> Board {
     interrupt::FDCAN1_IT0.set_priority(Priority::P1);
     interrupt::FDCAN1_IT1.set_priority(Priority::P1);
     interrupt::ETH.set_priority(Priority::P6);
-    let can = Can::start(peripherals.FDCAN1, peripherals.PD0, peripherals.PD1, Interrupts, source.tolerance());
+    let can = CanParts {
+        controller: peripherals.FDCAN1,
+        pins: (peripherals.PD0, peripherals.PD1),
+        clock_tolerance: source.tolerance(),
+    };
     // SAFETY: this function is called once, as it takes the peripherals, and nobody else knows the queue. All zero is
     // what `PacketQueue::init` makes of it, and a valid one.
     let queue = unsafe {

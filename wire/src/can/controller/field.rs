@@ -2,7 +2,7 @@
 
 /// A number in a frame.
 #[derive(Clone, Copy)]
-pub(super) struct Field {
+pub(in crate::can) struct Field {
     first_bit: u32,
     bits: u32,
     is_signed: bool,
@@ -10,37 +10,37 @@ pub(super) struct Field {
 }
 
 impl Field {
-    pub(super) const fn signed(first_bit: u32, bits: u32, scale: f64) -> Self {
+    pub(in crate::can) const fn signed(first_bit: u32, bits: u32, scale: f64) -> Self {
         Self { first_bit, bits, is_signed: true, scale }
     }
 
-    pub(super) const fn unsigned(first_bit: u32, bits: u32, scale: f64) -> Self {
+    pub(in crate::can) const fn unsigned(first_bit: u32, bits: u32, scale: f64) -> Self {
         Self { first_bit, bits, is_signed: false, scale }
     }
 
-    pub(super) const fn mask(self) -> u64 {
+    pub(in crate::can) const fn mask(self) -> u64 {
         u64::MAX >> (64 - self.bits)
     }
 
     /// What stands for a number that is not known.
-    pub(super) const fn unknown(self) -> u64 {
+    pub(in crate::can) const fn unknown(self) -> u64 {
         if self.is_signed { 1 << (self.bits - 1) } else { self.mask() }
     }
 
     /// The largest number that can be told, steps.
-    pub(super) const fn largest(self) -> f64 {
+    pub(in crate::can) const fn largest(self) -> f64 {
         if self.is_signed { ((1u64 << (self.bits - 1)) - 1) as f64 } else { (self.mask() - 1) as f64 }
     }
 
-    pub(super) const fn put_raw(self, payload: u64, raw: u64) -> u64 {
+    pub(in crate::can) const fn put_raw(self, payload: u64, raw: u64) -> u64 {
         payload | (raw & self.mask()) << self.first_bit
     }
 
-    pub(super) const fn take_raw(self, payload: u64) -> u64 {
+    pub(in crate::can) const fn take_raw(self, payload: u64) -> u64 {
         payload >> self.first_bit & self.mask()
     }
 
-    pub(super) fn put(self, payload: u64, value: f64) -> u64 {
+    pub(in crate::can) fn put(self, payload: u64, value: f64) -> u64 {
         let steps = libm::round(value / self.scale);
         let smallest = if self.is_signed { -self.largest() } else { 0.0 };
         let is_known = (smallest..=self.largest()).contains(&steps);
@@ -48,7 +48,7 @@ impl Field {
     }
 
     /// A deviation: never smaller than it is.
-    pub(super) fn put_deviation(self, payload: u64, value: f64) -> u64 {
+    pub(in crate::can) fn put_deviation(self, payload: u64, value: f64) -> u64 {
         // A whole number of steps is not to become one more by rounding.
         let steps = libm::ceil(value / self.scale - 1e-6);
         let steps = if steps >= 0.0 { steps.min(self.largest()) } else { self.largest() };
@@ -56,20 +56,20 @@ impl Field {
     }
 
     /// A bound: never smaller than it is, and not known if it is too large.
-    pub(super) fn put_bound(self, payload: u64, value: f64) -> u64 {
+    pub(in crate::can) fn put_bound(self, payload: u64, value: f64) -> u64 {
         let steps = libm::ceil(value / self.scale - 1e-6);
         let is_known = (0.0..=self.largest()).contains(&steps);
         self.put_raw(payload, if is_known { steps as u64 } else { self.unknown() })
     }
 
     /// The bound, or infinity if it is not known.
-    pub(super) fn take_bound(self, payload: u64) -> f64 {
+    pub(in crate::can) fn take_bound(self, payload: u64) -> f64 {
         let value = self.take(payload);
         if value.is_nan() { f64::INFINITY } else { value }
     }
 
     /// The number, or NaN if it is not known.
-    pub(super) fn take(self, payload: u64) -> f64 {
+    pub(in crate::can) fn take(self, payload: u64) -> f64 {
         let raw = self.take_raw(payload);
         if raw == self.unknown() {
             return f64::NAN;

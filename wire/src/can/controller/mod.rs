@@ -22,13 +22,14 @@
 mod content;
 mod error;
 mod field;
+pub(super) mod number;
 mod numbers;
 mod orders;
-mod publisher;
 mod receiver;
+mod telegrams;
 
 pub use content::{Content, Health};
 pub use error::ControllerError;
 pub use orders::OrderReceiver;
-pub use publisher::{PERIOD, PosePublisher, contents};
 pub use receiver::{PoseReceiver, PublishedPose};
+pub use telegrams::contents;

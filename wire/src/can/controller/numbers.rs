@@ -20,7 +20,7 @@ pub(super) const MODES: [(u64, Mode); 8] = [
 ];
 
 /// Numbers of the reasons on the bus.
-pub(super) const REASONS: [(u64, Reason); 13] = [
+pub(super) const REASONS: [(u64, Reason); 15] = [
     (0, Reason::None),
     (1, Reason::NoPose),
     (2, Reason::NoLandmarks),
@@ -34,6 +34,8 @@ pub(super) const REASONS: [(u64, Reason); 13] = [
     (10, Reason::LaserMoved),
     (11, Reason::OdometryDisagrees),
     (12, Reason::OdometrySilent),
+    (13, Reason::WheelsSlip),
+    (14, Reason::GyroFault),
 ];
 
 /// Numbers of the encoder faults on the bus; 0 is none.

@@ -2,11 +2,12 @@
 
 use core::hint::black_box;
 
-use agv_controller::{Bus as ControllerBus, Estimate, Troubles};
+use agv_controller::{Bus as ControllerBus, ChangeableSettings, Estimate, Troubles};
 use agv_core::measurement::Time;
-use agv_core::odometry::OdometryBias;
+use agv_core::odometry::{GyroErrors, OdometryBias};
 use agv_core::state::{LaserHealth, Relocalization};
 use agv_settings::Settings;
+use agv_wire::can::controller_node::ErrorKind;
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::slcan;
 
@@ -15,6 +16,7 @@ use super::any;
 /// What takes part in the bus.
 pub struct Bus {
     bus: ControllerBus,
+    settings: Settings,
     slcan: slcan::Decoder,
 }
 
@@ -23,7 +25,11 @@ impl Bus {
         let settings: Settings = any(Settings::default());
         let troubles =
             Troubles { is_board_damaged: any(false), has_panicked: any(false), are_settings_lost: any(false) };
-        Self { bus: ControllerBus::new(&settings, troubles, any(Time::default())), slcan: slcan::Decoder::new() }
+        Self {
+            bus: ControllerBus::new(&settings, "no_panic", troubles, any(Time::default())),
+            settings,
+            slcan: slcan::Decoder::new(),
+        }
     }
 
     /// A frame, a byte of a serial adapter, and what is due.
@@ -48,15 +54,17 @@ impl Bus {
             black_box(output);
         });
         black_box(self.bus.is_standing(time));
-        black_box((self.bus.nodes(), self.bus.emergency(any(0))));
+        self.bus.report(any(ErrorKind::Overload), time);
+        black_box((self.bus.nodes(), self.bus.other_frames()));
         if let Some(pose) = self.bus.output() {
             let (bias, relocalization) = (any(OdometryBias::default()), any(Relocalization::Idle));
-            self.bus.update(&Estimate { answered: any(0), pose: any(pose), bias, relocalization });
+            let gyro = any(Some(GyroErrors::default()));
+            self.bus.update(&Estimate { answered: any(0), pose: any(pose), bias, gyro, relocalization });
         }
     }
 
     fn take(&mut self, frame: &Frame, time: Time) {
-        self.bus.hear(frame, time, |output| {
+        self.bus.hear(frame, time, &mut ChangeableSettings::new(&mut self.settings), |output| {
             black_box(output);
         });
     }

@@ -7,8 +7,8 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{self, Event, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{
-    EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
-    WheelSample,
+    EncoderFaults, EncoderSample, GyroSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan,
+    SpeedSample, Time, WheelSample,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
 use agv_firmware::app::capacities::Localizer;
@@ -56,6 +56,7 @@ fn event() -> Event<'static> {
             ranges: part(&RANGES),
             intensities: part(&INTENSITIES),
         }),
+        7 => Event::Gyro(GyroSample { time, rate: any(0.0) }),
         6 => Event::Wheels(any(WheelSample { time, wheels: Default::default() })),
         _ => Event::SetPose(PoseFix { time, pose, position_deviation: any(0.0), heading_deviation: any(0.0) }),
     }

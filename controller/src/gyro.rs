@@ -1,0 +1,35 @@
+//! The gyro on the bus, of a vehicle that has one.
+
+use agv_core::measurement::{GyroSample, Time};
+use agv_settings::Settings;
+use agv_wire::can::frame::{Frame, Id};
+use agv_wire::can::gyro;
+
+/// The gyro of the settings, if there is one.
+#[derive(Clone, Copy, Debug)]
+pub struct Gyro {
+    gyro: Option<(Id, gyro::Gyro)>,
+}
+
+impl Gyro {
+    /// That of a vehicle that is set up.
+    #[must_use]
+    pub fn of(settings: &Settings) -> Self {
+        let is_there = settings.parameters.gyro.is_fitted && settings.parameters.sources.gyro;
+        let frame = &settings.gyro_frame;
+        Self { gyro: is_there.then(|| (frame.id(), gyro::Gyro::new(frame))) }
+    }
+
+    /// Identifier of its frames.
+    #[must_use]
+    pub fn id(&self) -> Option<Id> {
+        self.gyro.map(|(id, _)| id)
+    }
+
+    /// Takes a frame that came at `heard`.
+    #[must_use]
+    pub fn hear(&self, frame: &Frame, heard: Time) -> Option<GyroSample> {
+        let (_, gyro) = &self.gyro?;
+        gyro.handle(frame, heard)
+    }
+}
