@@ -16,6 +16,7 @@ mod nav350;
 mod output;
 mod replay;
 mod support;
+mod trust;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
 #[test]

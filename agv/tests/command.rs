@@ -5,7 +5,7 @@ use agv_lab::campaign::results::TABLES;
 use agv_tests::recordings;
 use std::path::{Path, PathBuf};
 
-use crate::support::{Files, agv, refusal, text};
+use crate::support::{Files, GRAPH, agv, refusal, text};
 
 /// Names of the subcommands, as the help lists them.
 fn subcommands() -> Vec<String> {
@@ -88,14 +88,6 @@ fn import_refuses_bad_input_in_one_line() {
 fn file_name(path: &str) -> String {
     PathBuf::from(path).file_name().unwrap().to_str().unwrap().to_owned()
 }
-
-/// A pose graph of two scans.
-const GRAPH: &str = "VERTEX2 0 0 0 0
-ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 10.5 host 0.5
-VERTEX2 1 1 0 0.5
-ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 11.5 host 1.5
-EDGE2 0 1 1 0 0.5 1 0 1 1 0 0
-";
 
 #[test]
 fn import_says_which_line_is_damaged() {

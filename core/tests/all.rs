@@ -2,6 +2,7 @@
 
 mod alert_limits;
 mod calibration;
+mod contour_source;
 mod contours;
 mod covariance_repair;
 mod event;
@@ -10,6 +11,7 @@ mod falko;
 mod filter;
 mod geometry;
 mod given_pose;
+mod gyro;
 mod innovation_monitor;
 mod integrity;
 mod jump_check;

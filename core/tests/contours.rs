@@ -10,8 +10,7 @@ use agv_core::geometry::{Pose, ScanPoint, difference};
 use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::PointScan;
 
-/// Walls from one point to another, m.
-type Walls = Vec<[f64; 4]>;
+use super::support::walls::{Noise, Walls, corridor, range, room};
 
 /// A laser: beams, and the angle that they span, rad.
 #[derive(Clone, Copy)]
@@ -23,44 +22,10 @@ struct Laser {
 const LASERS: [Laser; 3] =
     [Laser { beams: 180, span: PI }, Laser { beams: 361, span: PI }, Laser { beams: 1440, span: TAU }];
 
-/// Standard deviation of a range, m.
-const NOISE: f64 = 0.01;
-
-/// The reach of the laser, m.
-const REACH: f64 = 40.0;
-
-/// Numbers that look random: xorshift, J. Stat. Softw. 8 (14), 2003.
-struct Noise(u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Mean zero, standard deviation one: twelve uniform numbers.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
-
 fn ranges(walls: &Walls, pose: &Pose, laser: Laser, noise: &mut Noise) -> Vec<f32> {
     let step = laser.span / laser.beams as f64;
-    let range = |beam: usize| {
-        let angle = pose.theta - 0.5 * laser.span + step * beam as f64;
-        let (sine, cosine) = angle.sin_cos();
-        let hit = walls.iter().filter_map(|[ax, ay, bx, by]| {
-            let (dx, dy) = (bx - ax, by - ay);
-            let determinant = cosine * dy - sine * dx;
-            let along = ((ax - pose.x) * dy - (ay - pose.y) * dx) / determinant;
-            let share = ((ax - pose.x) * sine - (ay - pose.y) * cosine) / determinant;
-            (along > 0.05 && (0.0..=1.0).contains(&share)).then_some(along)
-        });
-        hit.min_by(f64::total_cmp).filter(|range| *range < REACH)
-    };
-    (0..laser.beams).map(|beam| range(beam).map_or(0.0, |range| (range + NOISE * noise.normal()) as f32)).collect()
+    let bearing = |beam: usize| pose.theta - 0.5 * laser.span + step * beam as f64;
+    (0..laser.beams).map(|beam| range(walls, &Pose { theta: bearing(beam), ..*pose }, noise)).collect()
 }
 
 /// How far off the matcher is behind a drive: along the last heading, across it (m), and of the heading (rad); and how often it
@@ -85,7 +50,7 @@ fn see(matcher: &mut ContourMatcher, walls: &Walls, pose: &Pose, laser: Laser, n
     };
     let mut points: Box<PointScan<1440>> = Box::default();
     points.set(&scan, 0.02, 80.0);
-    matcher.see(&points);
+    matcher.see(points.view());
 }
 
 /// Drives through walls. The odometry has the way 2 % too long, and turns by 0.2 deg too much for a metre.
@@ -115,24 +80,6 @@ fn straight(metres: f64) -> Vec<Pose> {
     (0..=(10.0 * metres) as usize).map(|step| Pose::new(0.1 * step as f64, 0.1, 0.02)).collect()
 }
 
-/// A corridor 2.4 m wide and so long that no end is seen, with niches 20 cm deep and 1 m wide every so many metres, if any.
-fn corridor(niches: Option<f64>) -> Walls {
-    let mut walls = Vec::new();
-    for side in [1.2, -1.2] {
-        let mut x = -60.0;
-        while let Some(every) = niches.filter(|_| x < 80.0) {
-            let (deep, end) = (side * 1.4 / 1.2, x + every);
-            walls.push([x, side, end - 1.0, side]);
-            walls.push([end - 1.0, side, end - 1.0, deep]);
-            walls.push([end - 1.0, deep, end, deep]);
-            walls.push([end, deep, end, side]);
-            x = end;
-        }
-        walls.push([x, side, 90.0, side]);
-    }
-    walls
-}
-
 #[test]
 fn a_plain_corridor_does_not_hold_the_vehicle_back() {
     for laser in LASERS {
@@ -158,21 +105,6 @@ fn niches_of_a_corridor_say_how_far_the_vehicle_has_come() {
             assert!(drift.across.abs() < 0.03, "{what}: {} m across", drift.across);
         }
     }
-}
-
-/// A room of 12 m x 9 m with a nook and a cupboard.
-fn room() -> Walls {
-    vec![
-        [-2.0, -3.0, 10.0, -3.0],
-        [10.0, -3.0, 10.0, 6.0],
-        [10.0, 6.0, 3.0, 6.0],
-        [3.0, 6.0, 3.0, 5.0],
-        [3.0, 5.0, -2.0, 5.0],
-        [-2.0, 5.0, -2.0, -3.0],
-        [7.0, -3.0, 7.0, -2.2],
-        [7.0, -2.2, 8.2, -2.2],
-        [8.2, -2.2, 8.2, -3.0],
-    ]
 }
 
 #[test]

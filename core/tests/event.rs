@@ -3,8 +3,8 @@
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, PoseFix};
 use agv_core::measurement::{
-    EncoderFaults, EncoderSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
-    WheelSample,
+    EncoderFaults, EncoderSample, GyroSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan,
+    SpeedSample, Time, WheelSample,
 };
 
 const TIME: Time = Time::from_micros(2_000_000);
@@ -13,6 +13,7 @@ const TIME: Time = Time::from_micros(2_000_000);
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Odometry,
+    Turn,
     Fault,
     Laser,
     Told,
@@ -36,6 +37,7 @@ fn an_event_tells_either_how_the_vehicle_moves_or_what_a_laser_sees_or_where_it_
         (Event::Encoders(EncoderSample { time: TIME, drive: 1, steering: 2 }), Kind::Odometry),
         (Event::Speed(SpeedSample { time: TIME, speed: 1.0, steering: 0.1 }), Kind::Odometry),
         (Event::Increment(PoseIncrement { time: TIME, displacement: pose }), Kind::Odometry),
+        (Event::Gyro(GyroSample { time: TIME, rate: 0.0 }), Kind::Turn),
         (Event::Wheels(WheelSample { time: TIME, wheels: Default::default() }), Kind::Odometry),
         (Event::EncoderFaults(EncoderFaults { time: TIME, ..EncoderFaults::default() }), Kind::Fault),
         (Event::Reflectors(Reflectors::of_first(&observations)), Kind::Laser),

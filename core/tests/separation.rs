@@ -408,12 +408,22 @@ impl Drive {
     fn begin_doubting(&mut self) {
         self.published = self.truth.compose(&self.true_mount).compose(&self.mount.inverse());
         self.monitor.begin(self.time, &self.published, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &self.odometry);
-        self.monitor.doubt_mounting(self.time);
+        self.monitor.doubt_mounting();
     }
 
     fn error(&self) -> (f64, f64) {
         let off = self.truth.between(&self.published);
         (off.x.hypot(off.y), off.theta.abs())
+    }
+
+    fn is_held(&self) -> bool {
+        let ((position, heading), level) = (self.error(), self.monitor.level());
+        position <= level.position && heading <= level.heading
+    }
+
+    #[track_caller]
+    fn assert_held(&self, case: std::fmt::Arguments) {
+        assert!(self.is_held(), "{case}: {:?}, {:?} at {:?}", self.error(), self.monitor.level(), self.time);
     }
 }
 
@@ -436,13 +446,7 @@ fn a_knock_of_any_size_is_held_at_once_and_after_a_turn() {
             for (count, step) in parts {
                 for _ in 0..count {
                     drive.revolve(&step);
-                    let (position, heading) = drive.error();
-                    let level = drive.monitor.level();
-                    assert!(
-                        position <= level.position && heading <= level.heading,
-                        "{size} m to {direction}: {position} m, {heading} rad, {level:?} at {:?}",
-                        drive.time
-                    );
+                    drive.assert_held(format_args!("{size} m to {direction}"));
                 }
             }
         }
@@ -469,12 +473,9 @@ fn a_mounting_that_was_changed_while_the_vehicle_was_off_is_held_once_it_can_be_
         let steps = parts.iter().flat_map(|(count, step)| std::iter::repeat_n(step, *count));
         for (number, step) in steps.enumerate() {
             drive.revolve(step);
-            let (position, heading) = drive.error();
-            let level = drive.monitor.level();
-            assert!(
-                number < hidden || position <= level.position && heading <= level.heading,
-                "{off:?}, revolution {number}: {position} m, {heading} rad, {level:?}"
-            );
+            if number >= hidden {
+                drive.assert_held(format_args!("{off:?}, revolution {number}"));
+            }
         }
     }
 }
@@ -493,12 +494,7 @@ fn a_mounting_that_makes_the_vehicle_lost_in_bends_is_held_when_it_has_found_its
             drive.begin_doubting();
             for number in 0..60 {
                 drive.revolve(&straight);
-                let (position, heading) = drive.error();
-                let level = drive.monitor.level();
-                assert!(
-                    position <= level.position && heading <= level.heading,
-                    "{off:?}, lost for {lost}, revolution {number}: {position} m, {heading} rad, {level:?}"
-                );
+                drive.assert_held(format_args!("{off:?}, lost for {lost}, revolution {number}"));
             }
         }
     }
@@ -521,13 +517,7 @@ fn a_laser_that_was_moved_while_the_vehicle_was_lost_is_held() {
         for (count, step) in [(40, straight), (60, bend), (40, straight)] {
             for _ in 0..count {
                 drive.revolve(&step);
-                let (position, heading) = drive.error();
-                let level = drive.monitor.level();
-                assert!(
-                    position <= level.position && heading <= level.heading,
-                    "{shift} m: {position} m, {heading} rad, {level:?} at {:?}",
-                    drive.time
-                );
+                drive.assert_held(format_args!("{shift} m"));
             }
         }
     }
@@ -543,12 +533,9 @@ fn a_sheared_map_is_held() {
             let (straight, bend) = (Pose::new(0.125, 0.0, 0.0), Pose::new(0.1, 0.002, 0.04));
             for number in 0..120 {
                 drive.revolve(if number % 60 < 30 { &straight } else { &bend });
-                let (position, heading) = drive.error();
-                let level = drive.monitor.level();
-                assert!(
-                    number < 8 || position <= level.position && heading <= level.heading,
-                    "{shear}, seed {seed}, revolution {number}: {position} m, {heading} rad, {level:?}"
-                );
+                if number >= 8 {
+                    drive.assert_held(format_args!("{shear}, seed {seed}, revolution {number}"));
+                }
             }
         }
     }

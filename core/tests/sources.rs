@@ -8,7 +8,7 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{MapUse, Mode, Parameters};
 use agv_core::maps::Verdict;
 use agv_core::measurement::Time;
-use agv_core::sources::{Aid, ContourFix, Source, Switches};
+use agv_core::sources::{Aid, Source, Switches, pose_by_contours};
 use nalgebra::{Matrix1, Matrix3, Vector1, Vector3};
 
 use super::support::stage::{Stage, parameters};
@@ -35,8 +35,10 @@ fn without(source: Source) -> Switches {
         Source::Corners => switches.corners = false,
         Source::EndPoints => switches.end_points = false,
         Source::KeyScans => switches.key_scans = false,
+        Source::Contours => switches.contours = false,
         Source::GivenPose => switches.given_pose = false,
         Source::Aids => switches.aids = false,
+        Source::Gyro => switches.gyro = false,
     }
     switches
 }
@@ -175,13 +177,13 @@ fn a_match_of_contours_says_how_far_it_is_from_the_pose() {
     // A laser half a metre in front and turned by a quarter, seen at (2, 3) looking back along x, belongs to a vehicle that
     // looks down along y from (2, 3.5).
     let mount = Pose::new(0.5, 0.0, -FRAC_PI_2);
-    let fix = ContourFix::new(Time::default(), &found(Pose::new(2.0, 3.0, -PI)), &mount).unwrap();
+    let seen = pose_by_contours(&found(Pose::new(2.0, 3.0, -PI)), &mount).unwrap();
     for (pose, expected) in [
         (Pose::new(2.0, 3.5, -FRAC_PI_2), [0.0, 0.0, 0.0]),
         (Pose::new(1.9, 3.3, -FRAC_PI_2 - 0.1), [0.1, 0.2, 0.1]),
         (Pose::new(-5.0, 8.0, FRAC_PI_2 + 0.2), [7.0, -4.5, PI - 0.2]),
     ] {
-        let residual = fix.linearise(&Ekf::new(pose, 0.1, 0.1)).unwrap().residual;
+        let residual = seen.linearise(&Ekf::new(pose, 0.1, 0.1)).residual;
         assert!((residual - Vector3::from(expected)).norm() < 1e-9, "{pose:?}: {residual}");
     }
 }

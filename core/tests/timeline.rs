@@ -1,6 +1,7 @@
 //! The filter's past, against a filter that keeps everything and computes it anew.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use agv_core::filter::{Cartesian, Correction, Ekf, Observation, Timeline, TimelineError};
+use agv_core::filter::{Cartesian, Correction, Ekf, Observation, PoseObservation, Timeline, TimelineError};
 use agv_core::geometry::{Point, Pose};
 use agv_core::measurement::Time;
 use agv_core::odometry::Motion;
@@ -318,4 +319,66 @@ fn a_vehicle_whose_pose_is_given_behind_the_last_sample_keeps_the_velocity_of_th
     timeline.begin(time(11, 0), start().1);
     assert_eq!(timeline.now(), time(13, 0));
     assert_eq!(timeline.recent_motion(0.05), motion(9));
+}
+
+#[test]
+fn what_comes_late_counts_though_a_pose_was_told_for_a_later_time() {
+    let correction = correction(&mut Random::new(11));
+    let seen = PoseObservation {
+        pose: Pose::new(2.1, -0.95, 0.42),
+        covariance: [4e-4, 1e-4, 5e-4, 0.0, 1e-5, 1e-5],
+        shared: [1e-4, 1e-4, 1e-6],
+        widening: 1.5,
+    };
+    let (first, second) = (motion(8).end, motion(14).end);
+    let mut timeline: Timeline<64> = Timeline::new(0.1);
+    let (begin, mut expected) = start();
+    timeline.begin(begin, expected);
+    for step in 0..20 {
+        timeline.advance(&motion(step));
+        expected.predict(&motion(step));
+        match step {
+            8 => apply(&mut expected, &correction),
+            14 => assert!(seen.apply(&mut expected)),
+            _ => {}
+        }
+    }
+    assert_eq!(timeline.fuse_pose(second, &seen), Ok(true));
+    assert_eq!(timeline.fuse(first, |state| correction.apply(state).then_some(correction)), Ok(true));
+    assert_same(&timeline.state(), &expected);
+}
+
+/// What a pose shares with others does not become smaller by seeing it often, and what was known better stays so.
+#[test]
+fn errors_that_poses_share_remain() {
+    let seen = PoseObservation {
+        pose: Pose::default(),
+        covariance: [1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5],
+        shared: [2.5e-5, 2.5e-5, 1e-6],
+        widening: 1.0,
+    };
+    let mut state = Ekf::with_covariance(Pose::default(), &Matrix3::from_diagonal(&[1e-2, 1e-6, 1e-3].into()));
+    for _ in 0..1000 {
+        assert!(seen.apply(&mut state));
+    }
+    let covariance = state.covariance();
+    for (found, expected) in [(covariance.m11, 2.5e-5), (covariance.m22, 1e-6), (covariance.m33, 1e-6)] {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} instead of {expected}");
+    }
+}
+
+/// A pose that is widened by a factor is corrected as one whose covariance was so much larger: by the scalar gain.
+#[test]
+fn a_surprise_is_taken_nearly_whole() {
+    let seen = PoseObservation {
+        pose: Pose::new(0.3, 0.0, 0.0),
+        covariance: [1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5],
+        shared: [0.0; 3],
+        widening: 25.0,
+    };
+    let mut state = Ekf::with_covariance(Pose::default(), &Matrix3::from_diagonal(&[1e-4, 1e-4, 1e-5].into()));
+    assert!((seen.normalised_square(&state).unwrap() - 0.09 / 2e-4).abs() < 1e-6);
+    assert!(seen.apply(&mut state));
+    assert!((state.pose.x - 0.3 * 25.0 / 26.0).abs() < 1e-12, "{:?}", state.pose);
+    assert!((state.covariance().m11 - 1e-4 * 25.0 / 26.0).abs() < 1e-15, "{}", state.covariance());
 }

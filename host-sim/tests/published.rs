@@ -10,6 +10,7 @@ use agv_core::measurement::Time;
 use agv_core::record::Record;
 use agv_core::state::LaserHealth;
 use agv_host_sim::emulate::encoder_pair::EmulatedPair;
+use agv_host_sim::emulate::gyro::EmulatedGyro;
 use agv_host_sim::log::{self, Writer};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::replay::{compare, compare_published, replay};
@@ -17,6 +18,7 @@ use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{START, simulate};
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
+use agv_wire::can::controller_node::WithoutSettings;
 use agv_wire::can::frame::Frame;
 
 /// When the vehicle drives off, ms.
@@ -44,7 +46,7 @@ impl Board {
         let mut localizer = <Localizer>::new(settings.parameters);
         localizer.add_landmarks(&recording.landmarks).unwrap();
         Self {
-            bus: Bus::new(&settings, Troubles::default(), Time::default()),
+            bus: Bus::new(&settings, "test", Troubles::default(), Time::default()),
             localization: Localization::new(localizer, &settings),
             told: VecDeque::new(),
             published: VecDeque::new(),
@@ -55,7 +57,7 @@ impl Board {
     }
 
     /// What the bus does in a millisecond, whatever the localiser does.
-    fn step_bus(&mut self, now: Time, pair: &mut EmulatedPair) {
+    fn step_bus(&mut self, now: Time, pair: &mut EmulatedPair, gyro: &mut Option<EmulatedGyro>) {
         if std::mem::take(&mut self.is_answered) {
             self.bus.update(&self.localization.estimate());
         }
@@ -65,10 +67,12 @@ impl Board {
             BusOutput::Send(frame) => answers.push(frame),
             BusOutput::Event(event) => told.push_back(event),
             BusOutput::Published(pose) => published.push_back(pose),
+            BusOutput::Save => panic!("nobody wants that"),
         };
         frames.extend(pair.poll(now));
+        frames.extend(gyro.iter_mut().flat_map(|gyro| gyro.poll(now)));
         for frame in frames.drain(..) {
-            bus.hear(&frame, now, &mut take);
+            bus.hear(&frame, now, &mut WithoutSettings, &mut take);
         }
         bus.poll(now, LaserHealth::Unknown, &mut take);
         for frame in answers {
@@ -105,6 +109,7 @@ fn drive(recording: &Recording, path: &Path) {
     let node = |number| NodeId::new(number).unwrap();
     let nodes = Settings::of(recording.parameters).nodes;
     let mut pair = EmulatedPair::new(recording, node(nodes.drive), node(nodes.steering)).unwrap().standing();
+    let mut gyro = EmulatedGyro::of(recording, &Settings::of(recording.parameters).gyro_frame);
     let mut board = Board::new(recording, path);
     let begin = Time::from_micros(1_000 * BEGIN);
     let mut seen = recording.events.iter().filter(|event| matches!(event, RecordedEvent::Reflectors(_))).peekable();
@@ -113,6 +118,9 @@ fn drive(recording: &Recording, path: &Path) {
         let now = Time::from_micros(1_000 * millisecond);
         if now == begin {
             pair.begin(now);
+            if let Some(gyro) = &mut gyro {
+                gyro.begin(now);
+            }
             let pose = recording.truth.first().unwrap().pose;
             board.handle(&Event::SetPose(PoseFix {
                 time: now,
@@ -121,7 +129,7 @@ fn drive(recording: &Recording, path: &Path) {
                 heading_deviation: 0.01,
             }));
         }
-        board.step_bus(now, &mut pair);
+        board.step_bus(now, &mut pair, &mut gyro);
         if millisecond < busy_until {
             continue;
         }
@@ -148,9 +156,19 @@ fn drive(recording: &Recording, path: &Path) {
 
 #[test]
 fn what_was_published_is_published_again() {
+    assert_published_again(false);
+}
+
+#[test]
+fn what_was_published_with_a_gyro_is_published_again() {
+    assert_published_again(true);
+}
+
+fn assert_published_again(has_gyro: bool) {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/warehouse_hall.toml");
     let mut scenario = Scenario::read(&scenario).unwrap();
     scenario.laser.scans = false;
+    scenario.gyro.fitted = has_gyro;
     let recording = simulate(&scenario).unwrap().recording;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");
@@ -162,6 +180,9 @@ fn what_was_published_is_published_again() {
     let late = publishing.poses.iter().filter(|pose| pose.published.behind > 1).count();
     let samples = contents.recording.events.iter().filter(|event| matches!(event, RecordedEvent::Encoders(_))).count();
     assert!(samples > 900, "{samples} samples");
+    let rates = contents.recording.events.iter().filter(|event| matches!(event, RecordedEvent::Gyro(_))).count();
+    assert_eq!(rates > 900, has_gyro, "{rates} rates");
+    assert_eq!(contents.recording.parameters.gyro.is_fitted, has_gyro);
     println!("{} poses were published, {late} of them while the localiser was busy", publishing.poses.len());
     assert!(publishing.poses.len() > 900 && late > 100 && publishing.behind.len() > 100);
     let comparison = compare_published(&contents.recording, publishing, &again);

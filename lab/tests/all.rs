@@ -5,6 +5,7 @@ mod faults;
 mod features;
 mod tape;
 mod trust;
+mod whole_drive;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
 #[test]

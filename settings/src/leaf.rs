@@ -5,6 +5,7 @@ use agv_core::odometry::{Tricycle, Vehicle};
 use serde::{Deserialize, Serialize};
 
 use crate::Settings;
+use crate::contradiction::Cause;
 
 /// What a leaf holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +43,8 @@ pub enum LeafError {
     Kind,
     /// The value is not within the bounds of the leaf, or does not go with the other settings.
     Bounds,
+    /// The CAN bus would be loaded by more than 60 % of its bit rate: [`crate::bus_load`].
+    BusLoad,
 }
 
 impl Leaf {
@@ -78,11 +81,14 @@ impl Leaf {
     pub fn change(&self, settings: &mut Settings, value: Value) -> Result<(), LeafError> {
         let before = self.get(settings);
         self.set(settings, value)?;
-        if settings.parameters.check().is_err() {
+        if let Err(contradiction) = settings.check() {
             if let Some(before) = before {
                 (self.set)(settings, before);
             }
-            return Err(LeafError::Bounds);
+            return Err(match contradiction.cause {
+                Cause::Bounds => LeafError::Bounds,
+                Cause::BusLoad => LeafError::BusLoad,
+            });
         }
         Ok(())
     }

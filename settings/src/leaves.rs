@@ -111,6 +111,24 @@ macro_rules! whole {
     };
 }
 
+/// A measure that the core does not know.
+macro_rules! measure {
+    ($key:literal, $name:literal, $unit:literal, $least:expr, $most:expr, $($field:ident).+) => {
+        Leaf {
+            key: $key,
+            name: $name,
+            unit: $unit,
+            bounds: ($least, $most),
+            get: |settings| Some(Value::Number(settings.$($field).+)),
+            set: |settings, value| {
+                let Value::Number(number) = value else { return false };
+                settings.$($field).+ = number;
+                true
+            },
+        }
+    };
+}
+
 macro_rules! switch {
     ($key:literal, $name:literal, $($field:ident).+) => {
         Leaf {
@@ -146,7 +164,7 @@ macro_rules! address {
 }
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 78] = [
+pub static LEAVES: [Leaf; 103] = [
     tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
     tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
     tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
@@ -171,6 +189,16 @@ pub static LEAVES: [Leaf; 78] = [
     switch!(153, "sources.key_scans", parameters.sources.key_scans),
     switch!(154, "sources.given_pose", parameters.sources.given_pose),
     switch!(155, "sources.aids", parameters.sources.aids),
+    switch!(156, "sources.gyro", parameters.sources.gyro),
+    switch!(157, "sources.contours", parameters.sources.contours),
+    switch!(330, "gyro.fitted", parameters.gyro.is_fitted),
+    number!(331, "gyro.factor", "", parameters.gyro.factor),
+    number!(332, "gyro.latency", "s", parameters.gyro.latency),
+    number!(333, "gyro.noise", "rad/s/sqrt(Hz)", parameters.gyro.noise),
+    number!(334, "gyro.bias", "rad/s", parameters.gyro.bias),
+    number!(335, "gyro.drift", "rad/s/sqrt(s)", parameters.gyro.drift),
+    number!(336, "gyro.scale", "", parameters.gyro.scale),
+    number!(337, "gyro.range", "rad/s", parameters.gyro.range),
     switch!(160, "maps.reflectors", parameters.maps.reflectors),
     switch!(161, "maps.features", parameters.maps.features),
     switch!(162, "maps.dynamic", parameters.maps.dynamic),
@@ -218,6 +246,21 @@ pub static LEAVES: [Leaf; 78] = [
     whole!(301, "can.drive_node", "", 1.0, 127.0, nodes.drive),
     whole!(302, "can.steering_node", "", 1.0, 127.0, nodes.steering),
     whole!(303, "can.encoder_period", "ms", 1.0, 50.0, encoder_period),
+    whole!(304, "can.vendor", "", 0.0, 4_294_967_295.0, nodes.vendor),
+    switch!(305, "can.nmt_master", nodes.is_master),
+    switch!(306, "can.self_start", nodes.starts_itself),
+    switch!(307, "can.accept_pose", nodes.accepts_pose),
+    whole!(308, "can.bit_rate", "kbit/s", 125.0, 1000.0, bit_rate),
+    whole!(309, "can.publishing_period", "ms", 5.0, 1000.0, publishing_period),
+    whole!(310, "can.drive_profile", "", 402.0, 406.0, nodes.drive_profile),
+    whole!(311, "can.steering_profile", "", 402.0, 406.0, nodes.steering_profile),
+    switch!(312, "can.accept_settings", nodes.accepts_settings),
+    whole!(313, "can.gyro_identifier", "", 0.0, 536_870_911.0, gyro_frame.identifier),
+    switch!(314, "can.gyro_extended", gyro_frame.is_extended),
+    whole!(315, "can.gyro_first_byte", "", 0.0, 7.0, gyro_frame.first_byte),
+    whole!(316, "can.gyro_length", "", 2.0, 4.0, gyro_frame.length),
+    whole!(317, "can.gyro_axis", "", 1.0, 3.0, gyro_frame.axis),
+    measure!(318, "can.gyro_unit", "rad/s", -1.0, 1.0, gyro_frame.unit),
     address!(320, "network.address", network.address),
     whole!(321, "network.prefix", "", 0.0, 32.0, network.prefix),
     address!(322, "network.gateway", network.gateway),

@@ -5,11 +5,15 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod bus_load;
+mod contradiction;
 pub mod leaf;
 mod leaves;
 pub mod service;
 mod settings;
 pub mod store;
 
+pub use bus_load::bus_load;
+pub use contradiction::{Cause, Contradiction};
 pub use leaves::LEAVES;
 pub use settings::{Network, Nodes, Settings};

@@ -3,6 +3,7 @@
 use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_wire::can::gyro::GyroFrame;
 
 /// Everything that is set on commissioning, but for the map.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,13 +14,19 @@ pub struct Settings {
     pub nodes: Nodes,
     /// Time between positions of the encoders, ms.
     pub encoder_period: u16,
+    /// Time between poses on the CAN bus, ms.
+    pub publishing_period: u16,
+    /// Bit rate of the CAN bus, kbit/s.
+    pub bit_rate: u16,
+    /// Where the rates of the gyro are on the CAN bus, if there is a gyro.
+    pub gyro_frame: GyroFrame,
     /// Who is who on the network.
     pub network: Network,
     /// Whether a vehicle that does not know where it is searches its pose among the reflectors of its map.
     pub start_search: bool,
 }
 
-/// Numbers of the nodes on the CAN bus, 1 to 127.
+/// Numbers of the nodes on the CAN bus, 1 to 127, and who is in charge there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nodes {
     /// This controller.
@@ -28,6 +35,20 @@ pub struct Nodes {
     pub drive: u8,
     /// The steering's encoder.
     pub steering: u8,
+    /// Profile of the driving wheel's encoder: 406, or 402 for the drive itself.
+    pub drive_profile: u16,
+    /// The same of the steering's encoder.
+    pub steering_profile: u16,
+    /// Who has made the vehicle's controller, as CAN in Automation numbers makers; 0 for nobody.
+    pub vendor: u32,
+    /// Whether this controller is the NMT master; else it starts no nodes, and only listens to the encoders.
+    pub is_master: bool,
+    /// Whether this controller becomes operational without being told to.
+    pub starts_itself: bool,
+    /// Whether settings can be changed over the bus while the vehicle stands.
+    pub accepts_settings: bool,
+    /// Whether a pose that comes over the bus is believed while the vehicle stands.
+    pub accepts_pose: bool,
 }
 
 /// Addresses on the network, IPv4.
@@ -72,8 +93,22 @@ impl Settings {
     pub fn of(parameters: Parameters) -> Self {
         Self {
             parameters,
-            nodes: Nodes { controller: 16, drive: 1, steering: 2 },
+            nodes: Nodes {
+                controller: 16,
+                drive: 1,
+                steering: 2,
+                drive_profile: 406,
+                steering_profile: 406,
+                vendor: 0,
+                is_master: true,
+                starts_itself: true,
+                accepts_pose: false,
+                accepts_settings: false,
+            },
             encoder_period: 10,
+            publishing_period: 10,
+            bit_rate: 500,
+            gyro_frame: GyroFrame::USUAL,
             network: Network {
                 address: [192, 168, 1, 20],
                 prefix: 24,

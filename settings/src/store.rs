@@ -151,7 +151,7 @@ impl<F: NorFlash> embedded_storage_async::nor_flash::NorFlash for Immediate<F> {
 
 /// Where the items of that many keys are, those of all leaves among them: a page that is full is moved in one pass over its
 /// items, not in one for each of them.
-const KNOWN_KEYS: usize = 88;
+const KNOWN_KEYS: usize = 112;
 const _: () = assert!(KNOWN_KEYS >= LEAVES.len() + 3, "all leaves are known, and the key, the starts and the map");
 
 type KnownKeys = Cache<Uncached, Uncached, ArrayKeyPointers<u16, KNOWN_KEYS>, u16>;
@@ -159,7 +159,7 @@ type KnownKeys = Cache<Uncached, Uncached, ArrayKeyPointers<u16, KNOWN_KEYS>, u1
 /// Takes the former value of a setting that does not go with the others, and of all that the localiser believes if that is
 /// not enough. Gives the first such setting.
 fn make_sound(settings: &mut Settings, former: &Settings) -> Option<&'static str> {
-    let error = settings.parameters.check().err()?;
+    let error = settings.check().err()?;
     if let Some(leaf) = Leaf::named(error.leaf)
         && let Some(value) = leaf.get(former)
     {
@@ -167,6 +167,12 @@ fn make_sound(settings: &mut Settings, former: &Settings) -> Option<&'static str
     }
     if settings.parameters.check().is_err() {
         settings.parameters = former.parameters;
+    }
+    if settings.check().is_err() {
+        (settings.bit_rate, settings.publishing_period) = (former.bit_rate, former.publishing_period);
+        settings.encoder_period = former.encoder_period;
+        (settings.nodes.drive_profile, settings.nodes.steering_profile) =
+            (former.nodes.drive_profile, former.nodes.steering_profile);
     }
     Some(error.leaf)
 }

@@ -4,13 +4,13 @@ mod support;
 
 use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
-use agv_settings::leaf::Value;
+use agv_settings::leaf::{Leaf, LeafError, Value};
 use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{
     Action, Change, Controller, Frames, LONGEST_MESSAGE, MessageError, Refusal, Request, Response, Session, encode,
 };
 use agv_settings::store::{PIECE, Store};
-use agv_settings::{LEAVES, Settings};
+use agv_settings::{LEAVES, Settings, bus_load};
 use proptest::prelude::*;
 use support::{Flash, load, map};
 
@@ -174,6 +174,26 @@ fn wrong_values_change_nothing() {
         assert_eq!((response, action), (Response::Refused(refusal), Action::None), "{change:?}");
     }
     assert_eq!(talk.controller.settings, Settings::default());
+}
+
+#[test]
+fn a_bus_is_not_loaded_by_more_than_three_fifths() {
+    // Frames of 135, 95 and 65 bits: five poses and two encoders in 10 ms, three heartbeats and a report in 100 ms.
+    let bits = (5.0 * 135.0 + 2.0 * 95.0) / 0.01 + (3.0 * 65.0 + 135.0) / 0.1;
+    assert!((bus_load(&Settings::default()) - bits / 500_000.0).abs() < 1e-12);
+    assert!(bits / 125_000.0 > 0.6 && bits / 250_000.0 < 0.6);
+    let mut settings = Settings::default();
+    let leaf = |name| Leaf::named(name).unwrap();
+    let change = |settings: &mut Settings, name, value| leaf(name).change(settings, Value::Whole(value));
+    assert_eq!(change(&mut settings, "can.bit_rate", 125), Err(LeafError::BusLoad));
+    assert_eq!(change(&mut settings, "can.bit_rate", 300), Err(LeafError::Bounds));
+    assert_eq!(change(&mut settings, "can.bit_rate", 100), Err(LeafError::Bounds));
+    assert_eq!(settings, Settings::default());
+    assert_eq!(change(&mut settings, "can.publishing_period", 20), Ok(()));
+    assert_eq!(change(&mut settings, "can.bit_rate", 125), Ok(()));
+    assert_eq!(change(&mut settings, "can.publishing_period", 10), Err(LeafError::BusLoad));
+    assert_eq!(change(&mut settings, "can.encoder_period", 2), Err(LeafError::BusLoad));
+    assert_eq!((settings.publishing_period, settings.bit_rate, settings.encoder_period), (20, 125, 10));
 }
 
 #[test]

@@ -80,6 +80,17 @@ fn a_stored_setting_that_does_not_go_with_the_others_is_named_and_not_taken() {
 }
 
 #[test]
+fn a_stored_bus_that_is_loaded_too_much_is_named_and_not_taken() {
+    let mut settings = Settings::default();
+    // 71.8 % of 125 kbit/s, by hand: see `service.rs`.
+    Leaf::named("can.bit_rate").unwrap().set(&mut settings, Value::Whole(125)).unwrap();
+    let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
+    store.store_leaves(&settings).unwrap();
+    let (found, _, loaded) = load(&mut store);
+    assert_eq!((loaded.contradiction, found), (Some("can.publishing_period"), Settings::default()));
+}
+
+#[test]
 fn the_largest_map_can_be_replaced_for_ever() {
     let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
     for turn in 0..6 {

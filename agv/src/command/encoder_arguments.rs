@@ -2,7 +2,7 @@
 
 use agv_controller::EncoderNodes;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::encoder::Reporting;
+use agv_wire::can::encoder::{Profile, Reporting};
 
 /// Time between positions, ms.
 const PERIOD: u16 = 10;
@@ -32,6 +32,8 @@ impl EncoderArguments {
             steering: self.steering,
             controller: self.controller,
             reporting: if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: PERIOD } },
+            are_managed: true,
+            profiles: [Profile::Encoder; 2],
         }
     }
 }

@@ -73,6 +73,9 @@ pub struct Import {
     /// Topic of the odometry in a recording of ROS 2 that has several.
     #[arg(long, value_name = "TOPIC")]
     odometry_topic: Option<String>,
+    /// Topic of the gyro (sensor_msgs/Imu) in a recording of ROS 2 that has several.
+    #[arg(long, value_name = "TOPIC")]
+    imu_topic: Option<String>,
     /// Where the laser is on the vehicle, m, m and deg, for recordings of ROS 2; as their transforms say if absent.
     #[arg(long, value_name = "X,Y,HEADING", value_parser = pose_argument::pose, allow_hyphen_values = true)]
     laser: Option<Pose>,
@@ -99,9 +102,9 @@ enum Format {
     Candump,
     /// Network capture, pcap or pcapng: what a NAV350 and its host said over TCP.
     Capture,
-    /// MCAP file with messages of ROS 2: LaserScan and Odometry.
+    /// MCAP file with messages of ROS 2: LaserScan and Odometry, and Imu if there is a gyro.
     Mcap,
-    /// Recording of rosbag2, folder or file, stored as MCAP or SQLite: LaserScan and Odometry.
+    /// Recording of rosbag2, folder or file, stored as MCAP or SQLite: LaserScan and Odometry, and Imu if there is a gyro.
     Rosbag2,
     /// Log of this program: its events are made anew of the raw bytes in it.
     Raw,
@@ -162,8 +165,9 @@ impl Import {
 
     #[cfg(feature = "bags")]
     fn ros_drive(&self) -> anyhow::Result<Recording> {
-        let Self { scan_topic, odometry_topic, laser, .. } = self;
-        let choice = ros::Choice { scan: scan_topic.clone(), odometry: odometry_topic.clone(), laser: *laser };
+        let Self { scan_topic, odometry_topic, imu_topic, laser, .. } = self;
+        let (scan, odometry, imu) = (scan_topic.clone(), odometry_topic.clone(), imu_topic.clone());
+        let choice = ros::Choice { scan, odometry, imu, laser: *laser };
         Ok(ros::read(&self.input, &choice)?)
     }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{MapUse, PoseFix};
 use agv_core::maps::{Landmark, LandmarkKind};
+use agv_core::odometry::Vehicle;
 use agv_core::record::Damage;
 use agv_core::state::Mode;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
@@ -12,9 +13,10 @@ use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::drive_check::{POOR, poor_share};
 use agv_host_sim::log::{self, Contents};
 use agv_host_sim::mapping::contour_map::ContourMap;
-use agv_host_sim::mapping::{contour_file, contour_replay, map_file};
+use agv_host_sim::mapping::odometry_noise::odometry_noise;
+use agv_host_sim::mapping::{contour_file, map_file};
 use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording, Truth};
-use agv_host_sim::replay::{Comparisons, Replay as Replayed, replay};
+use agv_host_sim::replay::{Comparisons, Replay as Replayed, replay_in};
 use agv_host_sim::report::Page;
 use agv_host_sim::setting_doubts::doubt;
 use anyhow::{Context, ensure};
@@ -60,7 +62,7 @@ pub struct Replay {
     #[arg(long, value_name = "LOG2")]
     output: Option<PathBuf>,
     /// Map to use; its reflectors replace those of the log, its features the log's features. A map of contours is used
-    /// beside them, with the noise of the odometry that the scans of the log say.
+    /// beside them; the noise of an odometry that was imported is then found from its scans.
     #[arg(long, value_name = "MAP")]
     map: Vec<PathBuf>,
     /// Log whose vehicle and map are those of this one, if this one is a part that has lost its beginning.
@@ -208,8 +210,9 @@ impl Replay {
         if !self.landmarks.is_empty() {
             recording.parameters.maps = self.maps()?;
         }
-        if contours.is_some() {
-            contour_replay::prepare(recording).with_context(of_log)?;
+        // Of an odometry that others have recorded nobody has stated the noise.
+        if contours.is_some() && recording.parameters.vehicle == Vehicle::Increments {
+            recording.parameters.odometry_noise = odometry_noise(recording).with_context(of_log)?;
         }
         Ok(contours)
     }
@@ -217,11 +220,9 @@ impl Replay {
     fn replay(&self, recording: &Recording, contours: Option<&ContourMap>) -> anyhow::Result<Replayed> {
         let running = progress::bar("replaying", recording.events.len() as u64);
         let done = |events: usize| running.set_position(events as u64);
-        let replay = match contours {
-            Some(map) => contour_replay::replay_in(recording, map, done).map_err(anyhow::Error::from),
-            None => replay(recording, done).map_err(anyhow::Error::from),
-        }
-        .with_context(|| self.log.display().to_string())?;
+        // A map that was read here is in order.
+        let contours = contours.and_then(|map| map.view().ok());
+        let replay = replay_in(recording, contours, done).with_context(|| self.log.display().to_string())?;
         running.finish_and_clear();
         Ok(replay)
     }

@@ -2,8 +2,9 @@
 
 use agv_core::localizer::Parameters;
 use agv_host_sim::setting_doubts::doubt;
-use agv_settings::Settings;
 use agv_settings::leaf::{Leaf, LeafError, Value};
+use agv_settings::{Cause, Contradiction, Settings, bus_load};
+use agv_wire::can::bit_timing::BIT_RATES;
 use anyhow::{Context, bail};
 
 use super::output::note;
@@ -30,7 +31,19 @@ impl SettingArguments {
 
     /// Changes settings.
     pub fn change(&self, settings: &mut Settings) -> anyhow::Result<()> {
-        self.set.iter().try_for_each(|text| change(settings, text))
+        self.set.iter().try_for_each(|text| change(settings, text))?;
+        match settings.check() {
+            Err(Contradiction { cause: Cause::BusLoad, .. }) => bail!(
+                "the CAN bus would be loaded by {:.0} % of its bit rate, more than 60 %; it needs a longer \
+                 can.publishing_period or can.encoder_period, or a higher can.bit_rate",
+                100.0 * bus_load(settings)
+            ),
+            Err(Contradiction { leaf: leaf @ "can.bit_rate", .. }) => {
+                bail!("{leaf} must be one of {BIT_RATES:?} kbit/s, not {}", settings.bit_rate)
+            }
+            // What the localiser believes is looked at where it is used.
+            _ => Ok(()),
+        }
     }
 
     /// Changes what the localiser believes, and asks about values that hardly a vehicle has.
@@ -61,6 +74,6 @@ fn change(settings: &mut Settings, text: &str) -> anyhow::Result<()> {
             let [least, most] = [leaf.bounds.0, leaf.bounds.1].map(show_number);
             bail!("{name} must be from {least} to {most} {}, not {value}", leaf.unit)
         }
-        Err(LeafError::Kind) => bail!("{value} is no value of {name}"),
+        Err(LeafError::Kind | LeafError::BusLoad) => bail!("{value} is no value of {name}"),
     }
 }

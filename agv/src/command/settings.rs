@@ -2,7 +2,7 @@
 
 use agv_host_sim::setting_meanings::meaning;
 use agv_settings::leaf::{Leaf, Value};
-use agv_settings::{LEAVES, Settings as Defaults};
+use agv_settings::{LEAVES, Settings as Defaults, bus_load};
 use serde_json::json;
 
 use super::setting_text::{named, show_number, show_readable as show};
@@ -43,6 +43,10 @@ impl Settings {
             let value = leaf.get(&defaults).map_or_else(String::new, show);
             println!("{:<38} {:<10} {value:>14} {least:>12} {most:>12}  {}", leaf.name, leaf.unit, meaning(leaf.name));
         }
+        println!(
+            "The CAN bus is loaded by {:.1} % of its bit rate with the defaults; more than 60 % is refused.",
+            100.0 * bus_load(&defaults)
+        );
         Ok(())
     }
 

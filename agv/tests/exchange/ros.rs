@@ -4,6 +4,7 @@ use std::path::Path;
 
 use agv_core::geometry::{Pose, difference};
 use agv_core::localizer::Mode;
+use agv_core::measurement::GyroSample;
 use agv_host_sim::log;
 use agv_host_sim::recording::RecordedEvent;
 use agv_host_sim::replay::replay;
@@ -132,6 +133,44 @@ fn what_was_exported_is_imported() {
         let truth = recording.truth[0].pose.between(&recording.truth.last().unwrap().pose);
         assert!((way.position() - truth.position()).norm() < 0.1, "{way:?} {truth:?}");
         assert!(truth.position().norm() > 1.0);
+    }
+}
+
+#[test]
+fn the_rates_of_a_gyro_come_back_as_they_were_told() {
+    let files = Files::new();
+    let mut recording = hall(4.0);
+    recording.parameters.gyro.is_fitted = true;
+    let (first, last) = (recording.truth[0].time, recording.truth.last().unwrap().time);
+    // Beside each sample of the encoders one of a gyro that turns ever faster.
+    let rates: Vec<GyroSample> = recording
+        .events
+        .iter()
+        .filter_map(|event| event.is_odometry().then(|| event.time()).flatten())
+        .filter(|time| (first..=last).contains(time))
+        .map(|time| GyroSample { time, rate: 1e-3 * time.since(first) - 0.002 })
+        .collect();
+    recording.events.extend(rates.iter().copied().map(RecordedEvent::Gyro));
+    recording.events.sort_by_key(RecordedEvent::time);
+    let [log_path, mcap, bag, back] = ["a.agvlog", "a.mcap", "bag", "b.agvlog"].map(|name| files.path(name));
+    log::write(Path::new(&log_path), &recording).unwrap();
+    run(&["export", "mcap", &log_path, "-o", &mcap, "--json"]);
+    run(&["export", "rosbag2", &log_path, "-o", &bag, "--json"]);
+    for (format, input) in [("mcap", &mcap), ("rosbag2", &bag)] {
+        run(&["import", format, input, "-o", &back, "--json"]);
+        let (imported, _) = log::read(Path::new(&back)).unwrap();
+        let gyro = imported.parameters.gyro;
+        assert!(gyro.is_fitted && (gyro.factor - 1.0).abs() < 1e-15);
+        let again: Vec<f64> = imported
+            .events
+            .iter()
+            .filter_map(|event| match event {
+                RecordedEvent::Gyro(sample) => Some(sample.rate),
+                _ => None,
+            })
+            .collect();
+        assert!(again.len() > 300);
+        assert_eq!(again, rates.iter().map(|sample| sample.rate).collect::<Vec<_>>());
     }
 }
 

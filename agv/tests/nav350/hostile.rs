@@ -131,6 +131,8 @@ fn scans_and_frames_that_never_come_are_waited_for_only_so_long() {
         steering: agv_wire::can::canopen::NodeId::new(2).unwrap(),
         controller: agv_wire::can::canopen::NodeId::new(16).unwrap(),
         reporting: agv_wire::can::encoder::Reporting::Timer { period: 10 },
+        are_managed: true,
+        profiles: [agv_wire::can::encoder::Profile::Encoder; 2],
     };
     let parameters = Parameters::new(Vehicle::Increments, Pose::default());
     let open = || Ok(Box::new(bus.join()) as Box<dyn agv_host_sim::bus::Bus>);

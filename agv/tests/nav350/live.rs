@@ -23,14 +23,19 @@ use agv_host_sim::simulate::block_storage::{BlockStorage, ReflectorPlacement};
 use agv_host_sim::simulate::scenario::{Scenario, WorldOptions};
 use agv_host_sim::simulate::simulate;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::encoder::Reporting;
+use agv_wire::can::encoder::{Profile, Reporting};
 use agv_wire::cola::{Deframed, Deframer, Dialect};
 use agv_wire::nav350::{Answer, Configuration, MethodResult, NavigationData, SensorFrame};
 
 const NODES: EncoderNodes = match (NodeId::new(1), NodeId::new(2), NodeId::new(16)) {
-    (Some(drive), Some(steering), Some(controller)) => {
-        EncoderNodes { drive, steering, controller, reporting: Reporting::Timer { period: 10 } }
-    }
+    (Some(drive), Some(steering), Some(controller)) => EncoderNodes {
+        drive,
+        steering,
+        controller,
+        reporting: Reporting::Timer { period: 10 },
+        are_managed: true,
+        profiles: [Profile::Encoder; 2],
+    },
     _ => panic!(),
 };
 

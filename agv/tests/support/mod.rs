@@ -3,6 +3,14 @@
 
 use std::process::{Command, Output};
 
+/// A pose graph of two scans.
+pub const GRAPH: &str = "VERTEX2 0 0 0 0
+ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 10.5 host 0.5
+VERTEX2 1 1 0 0.5
+ROBOTLASER1 0 -1.57 3.14 1.57 50 0.1 0 3 1.5 2.5 3.5 0 0 0 0 0 0 0 0 0 0 0 0 11.5 host 1.5
+EDGE2 0 1 1 0 0.5 1 0 1 1 0 0
+";
+
 pub fn agv(arguments: &[&str]) -> Output {
     // A backtrace would be more than one line.
     Command::new(env!("CARGO_BIN_EXE_agv")).args(arguments).env("RUST_BACKTRACE", "1").output().unwrap()

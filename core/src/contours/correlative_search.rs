@@ -8,7 +8,7 @@ use heapless::Vec;
 
 use super::likelihood_grid::CELL;
 use super::{LikelihoodGrid, SurfacePoint};
-use crate::geometry::{Pose, Transform, wrap};
+use crate::geometry::{Pose, ScanPoint, Transform, wrap};
 use crate::order::Evenly;
 
 /// Points that are looked up.
@@ -70,9 +70,14 @@ pub struct SearchResult {
 /// Looks around `predicted`, a pose in the frame of the grid. Without points the prediction is the answer.
 #[must_use]
 pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, window: &SearchWindow) -> SearchResult {
-    let room = (LOOK_UPS / window.poses()).clamp(FEWEST_POINTS, POINTS);
+    let room = LOOK_UPS.checked_div(window.poses()).unwrap_or(POINTS).clamp(FEWEST_POINTS, POINTS);
     let mut evenly = Evenly::new(room, points.len());
-    let chosen: Vec<&SurfacePoint, POINTS> = points.iter().filter(|_| evenly.takes()).take(room).collect();
+    let mut chosen: Vec<ScanPoint, POINTS> = Vec::new();
+    for point in points.iter().filter(|_| evenly.takes()).take(room) {
+        // There is room.
+        let _ = chosen.push(point.position);
+    }
+    let mut cells: Vec<(i32, i32), POINTS> = Vec::new();
     let mut best = SearchResult { pose: *predicted, score: 0.0 };
     let mut best_weighted = 0.0;
     let step = i32::from(window.shift);
@@ -83,8 +88,10 @@ pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, 
         let by_turn = (1.0 - 0.2 * turn * turn / (HEADING * HEADING)).max(0.8);
         let turned = Pose { theta: wrap(predicted.theta + f64::from(turn)), ..*predicted };
         let transform = Transform::of(&turned);
-        let cells: Vec<(i32, i32), POINTS> =
-            chosen.iter().map(|point| LikelihoodGrid::cell(&transform.apply(&point.position))).collect();
+        cells.clear();
+        for point in &chosen {
+            let _ = cells.push(LikelihoodGrid::cell(&transform.apply(point)));
+        }
         for row in shifts.clone() {
             for column in shifts.clone() {
                 let sum: u32 =

@@ -153,6 +153,12 @@ impl<const ROOM: usize> Surroundings<ROOM> {
         self.place = None;
     }
 
+    /// The surfaces that were loaded last.
+    #[must_use]
+    pub const fn loaded(&self) -> &Submap<ROOM> {
+        &self.submap
+    }
+
     /// The surfaces of the map around a pose.
     pub fn around(&mut self, map: &KeptMap, pose: &Pose) -> &Submap<ROOM> {
         let from = self.submap.origin();

@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 
 use super::{KeyRing, Prediction, Refinement, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
 use crate::geometry::{Pose, ScanPoint};
-use crate::sensing::PointScan;
+use crate::sensing::PointView;
 
 /// If the surfaces say less than this share along one axis of what they say across it, that axis is free.
 const LEAST_SHARE: f32 = 0.03;
@@ -64,7 +64,7 @@ impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> ContourMatcher<P
     }
 
     /// Takes the points of a scan.
-    pub fn see<const BEAMS: usize>(&mut self, scan: &PointScan<BEAMS>) {
+    pub fn see(&mut self, scan: PointView<'_>) {
         find_surface_points(scan, &mut self.points);
     }
 
@@ -102,17 +102,44 @@ pub fn align<const ROOM: usize>(
     predicted: &Prediction,
 ) -> Option<ContourMatch> {
     let inside = map.origin().between(&predicted.pose);
-    let share = |inliers: u32| inliers as f32 / points.len().max(1) as f32;
     let look = |window: &SearchWindow| {
         let start = search(points, map.grid(), &inside, window).pose;
         refine(points, map, &start)
     };
     let usual = look(&predicted.window());
-    let is_poor = usual.is_none_or(|found| share(found.inliers) < POOR_SHARE);
+    let is_poor = usual.is_none_or(|found| share(points, &found) < POOR_SHARE);
     let wide = if is_poor { look(&SearchWindow::WIDE) } else { None };
     let nearby = usual.map_or(0, |found| found.inliers);
-    let is_sure = |far: &Refinement| share(far.inliers) > SURE_SHARE && far.inliers > 2 * nearby;
+    let is_sure = |far: &Refinement| share(points, far) > SURE_SHARE && far.inliers > 2 * nearby;
     let found = wide.filter(is_sure).or(usual)?;
+    Some(in_map(points, map, &inside, &found))
+}
+
+/// The same without a search: the pose nearest to the prediction.
+#[must_use]
+pub fn align_nearby<const ROOM: usize>(
+    points: &[SurfacePoint],
+    map: &Submap<ROOM>,
+    predicted: &Pose,
+) -> Option<ContourMatch> {
+    let inside = map.origin().between(predicted);
+    let found = refine(points, map, &inside)?;
+    Some(in_map(points, map, &inside, &found))
+}
+
+/// Share of the points that lie on surfaces.
+fn share(points: &[SurfacePoint], found: &Refinement) -> f32 {
+    found.inliers as f32 / points.len().max(1) as f32
+}
+
+/// What was found in the frame of a submap, in that of the map. Along an axis of which the surfaces say nothing it is where it was
+/// predicted, `inside` the submap.
+fn in_map<const ROOM: usize>(
+    points: &[SurfacePoint],
+    map: &Submap<ROOM>,
+    inside: &Pose,
+    found: &Refinement,
+) -> ContourMatch {
     let free_axis = weak_axis(found.directions);
     let mut pose = found.pose;
     let mut information = found.information;
@@ -122,7 +149,7 @@ pub fn align<const ROOM: usize>(
         pose.y += f64::from(axis.y) * along;
         information = without(information, axis);
     }
-    Some(ContourMatch { pose: map.origin().compose(&pose), information, free_axis, share: share(found.inliers) })
+    ContourMatch { pose: map.origin().compose(&pose), information, free_axis, share: share(points, found) }
 }
 
 /// The axis along which the normals say least, if that is too little.

@@ -18,7 +18,7 @@ pub use correlative_search::{SearchResult, SearchWindow, search};
 pub use kept_map::{KeptMap, KeptMapError, KeptPoint, Surroundings, TILE, Tile};
 pub use key_ring::{KeyRing, KeyScan};
 pub use likelihood_grid::LikelihoodGrid;
-pub use matcher::{ContourMatch, ContourMatcher, align};
+pub use matcher::{ContourMatch, ContourMatcher, align, align_nearby};
 pub use prediction::Prediction;
 pub use refinement::{Refinement, refine};
 pub use submap::{LARGEST_REACH, Submap};

@@ -35,6 +35,17 @@ impl Prediction {
         }
     }
 
+    /// The same for a pose that is known as well as a filter says, a `step` of the odometry behind the scan before.
+    #[must_use]
+    pub fn of_filter(pose: Pose, position_deviation: f64, heading_deviation: f64, step: &Pose) -> Self {
+        let by_step = Self::by_odometry(&Pose::default(), step);
+        Self {
+            pose,
+            position_deviation: position_deviation.max(by_step.position_deviation),
+            heading_deviation: heading_deviation.max(by_step.heading_deviation),
+        }
+    }
+
     /// What must be searched for it: three deviations, but no less than usual and no more than there is time for.
     #[must_use]
     pub fn window(&self) -> SearchWindow {

@@ -117,7 +117,7 @@ pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, st
         let prior = Vector3::new(position, position, heading);
         let moved = Vector3::new(pose.x - start.x, pose.y - start.y, difference(pose.theta, start.theta));
         let gradient = Vector3::from(sums.gradient.map(f64::from)) + prior.component_mul(&moved);
-        let step = (information + Matrix3::from_diagonal(&prior)).cholesky()?.solve(&gradient);
+        let step = (information + Matrix3::from_diagonal(&prior)).try_inverse()? * gradient;
         pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
         outcome = Some(Refinement { pose, information, directions: sums.directions, inliers: sums.inliers });
         if iteration >= FAR_ITERATIONS && step.amax() < SMALL {

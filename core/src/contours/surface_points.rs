@@ -9,7 +9,7 @@ use heapless::Vec;
 use super::SurfacePoint;
 use crate::geometry::ScanPoint;
 use crate::order::Evenly;
-use crate::sensing::{Moments, PointScan};
+use crate::sensing::{Moments, PointView};
 
 /// Returns further away are not used, m.
 const FARTHEST: f32 = 30.0;
@@ -43,10 +43,7 @@ const ALONE: f32 = 0.1;
 
 /// Replaces `found` by the points of surfaces of a scan, in the frame of the scan's points. If there are more than there is room for, they are
 /// further apart.
-pub fn find_surface_points<const BEAMS: usize, const POINTS: usize>(
-    scan: &PointScan<BEAMS>,
-    found: &mut Vec<SurfacePoint, POINTS>,
-) {
+pub fn find_surface_points<const POINTS: usize>(scan: PointView<'_>, found: &mut Vec<SurfacePoint, POINTS>) {
     found.clear();
     let beams = Beams(scan);
     let mut evenly = Evenly::new(POINTS, Walk::new(beams).count());
@@ -61,19 +58,19 @@ pub fn find_surface_points<const BEAMS: usize, const POINTS: usize>(
 }
 
 /// The beams that are looked at, in order.
-struct Walk<'a, const BEAMS: usize> {
-    beams: Beams<'a, BEAMS>,
+struct Walk<'a> {
+    beams: Beams<'a>,
     next: usize,
     last: Option<ScanPoint>,
 }
 
-impl<'a, const BEAMS: usize> Walk<'a, BEAMS> {
-    const fn new(beams: Beams<'a, BEAMS>) -> Self {
+impl<'a> Walk<'a> {
+    const fn new(beams: Beams<'a>) -> Self {
         Self { beams, next: 0, last: None }
     }
 }
 
-impl<const BEAMS: usize> Iterator for Walk<'_, BEAMS> {
+impl Iterator for Walk<'_> {
     type Item = usize;
 
     fn next(&mut self) -> Option<usize> {
@@ -91,15 +88,8 @@ impl<const BEAMS: usize> Iterator for Walk<'_, BEAMS> {
 }
 
 /// The returns of a scan by beam.
-struct Beams<'a, const BEAMS: usize>(&'a PointScan<BEAMS>);
-
-impl<const BEAMS: usize> Clone for Beams<'_, BEAMS> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<const BEAMS: usize> Copy for Beams<'_, BEAMS> {}
+#[derive(Clone, Copy)]
+struct Beams<'a>(PointView<'a>);
 
 /// The returns near another one.
 struct Piece {
@@ -108,7 +98,7 @@ struct Piece {
     after: usize,
 }
 
-impl<const BEAMS: usize> Beams<'_, BEAMS> {
+impl Beams<'_> {
     /// A return that is used, and its range.
     fn at(&self, index: usize) -> Option<(ScanPoint, f32)> {
         let range = *self.0.ranges.get(index)?;
@@ -159,7 +149,7 @@ impl<const BEAMS: usize> Beams<'_, BEAMS> {
     /// The returns near one, so many beams apart that those looked at reach as far as the piece does.
     fn piece(&self, index: usize, centre: ScanPoint, range: f32) -> Piece {
         let reach = range * self.0.bearing_step * BESIDE as f32;
-        let stride = if reach > 0.0 { ((RADIUS / reach) as usize).clamp(1, BEAMS.max(1)) } else { 1 };
+        let stride = if reach > 0.0 { ((RADIUS / reach) as usize).clamp(1, self.0.ranges.len().max(1)) } else { 1 };
         let mut moments = Moments::default();
         moments.add(ScanPoint::zeros());
         let mut side = |is_before: bool| {

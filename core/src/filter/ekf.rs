@@ -169,6 +169,34 @@ impl<S: Slots> Ekf<S> {
         self.biases.as_ref().get(YAW - SCALE).copied().unwrap_or(0.0)
     }
 
+    /// Variances of x, y and heading.
+    pub(super) fn pose_variances(&self) -> [f64; 3] {
+        [0, 1, 2].map(|state| self.covariance.get(state, state))
+    }
+
+    /// Makes the pose less sure: its covariance grows by a factor, and with it what it has in common with all other states.
+    pub(super) fn widen_pose(&mut self, factor: f64) {
+        if factor <= 1.0 {
+            return;
+        }
+        let root = libm::sqrt(factor);
+        for state in 0..3 {
+            for other in 0..S::STATES {
+                let by = if other < 3 { if other <= state { factor } else { continue } } else { root };
+                self.covariance.set(state, other, by * self.covariance.get(state, other));
+            }
+        }
+    }
+
+    /// Makes the variances of x, y and heading no less than these.
+    pub(super) fn raise_pose_variances(&mut self, least: [f64; 3]) {
+        for (state, least) in least.into_iter().enumerate() {
+            if self.covariance.get(state, state) < least {
+                self.covariance.set(state, state, least);
+            }
+        }
+    }
+
     pub(super) fn set_pose_covariance(&mut self, covariance: &Matrix3<f64>) {
         let entries = [
             (0, 0, covariance.m11),

@@ -12,7 +12,7 @@
 
 use heapless::Deque;
 
-use super::{Ekf, Landmark, Observation};
+use super::{Ekf, Landmark, Observation, PoseObservation};
 use crate::geometry::{Point, Pose};
 use crate::measurement::{LaserId, Time};
 use crate::odometry::Motion;
@@ -54,6 +54,8 @@ struct Entry {
 enum Fusion {
     Nothing,
     Correction(Correction),
+    /// The pose was told.
+    Pose(PoseObservation),
     /// The state was given by a filter that knows more.
     Given,
 }
@@ -74,6 +76,10 @@ impl Entry {
             Fusion::Correction(correction) => {
                 running.predict(&self.motion);
                 correction.apply(running);
+            }
+            Fusion::Pose(seen) => {
+                running.predict(&self.motion);
+                seen.apply(running);
             }
         }
         self.state = *running;
@@ -284,15 +290,27 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         time: Time,
         correct: impl FnOnce(&mut Ekf) -> Option<Correction>,
     ) -> Result<bool, TimelineError> {
+        self.fuse_as(time, |state| correct(state).map(Fusion::Correction))
+    }
+
+    /// Fuses a pose that was true at `time`. False, and nothing changed, if the filter refuses it as singular.
+    ///
+    /// # Errors
+    /// See [`TimelineError`].
+    pub fn fuse_pose(&mut self, time: Time, seen: &PoseObservation) -> Result<bool, TimelineError> {
+        self.fuse_as(time, |state| seen.apply(state).then_some(Fusion::Pose(*seen)))
+    }
+
+    fn fuse_as(&mut self, time: Time, correct: impl FnOnce(&mut Ekf) -> Option<Fusion>) -> Result<bool, TimelineError> {
         let position = self.position(time).ok_or(TimelineError::TooLate)?;
         self.repropagate(position + 1);
         let mut state = self.entries.get(position).ok_or(TimelineError::TooLate)?.state;
         let parts = self.motion_to(position, time)?;
         state.predict(&parts.0);
-        let Some(correction) = correct(&mut state) else {
+        let Some(fusion) = correct(&mut state) else {
             return Ok(false);
         };
-        self.divide(position, &parts, Fusion::Correction(correction), &state);
+        self.divide(position, &parts, fusion, &state);
         Ok(true)
     }
 

@@ -6,6 +6,7 @@
 //! | [`InnovationMonitor`] | how many observations fit, and how well | a wrong pose, or a map that looks alike |
 //! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
+//! | [`TurnCheck`] | turns by wheels and by a gyro | a wheel that slips, a gyro that is wrong |
 //! | [`MountingCheck`] | corrections with the motion since the last one | a laser mounted elsewhere, an odometry of another scale |
 //!
 //! [`separation`] finds no fault but bounds the error that one can make: the [`ProtectionLevel`].
@@ -16,12 +17,14 @@ mod jump_check;
 mod mounting_check;
 pub mod separation;
 mod slip_check;
+mod turn_check;
 
 pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
 pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
 pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
 pub use mounting_check::{MountingCheck, Suspect};
 pub use slip_check::SlipCheck;
+pub use turn_check::{GyroFault, LastingErrors, TurnCheck};
 
 use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
@@ -38,6 +41,8 @@ pub struct Integrity {
     slip: [SlipCheck; LASERS],
     jumps: JumpCheck,
     mounting: MountingCheck,
+    /// Of a vehicle with a gyro.
+    pub turns: TurnCheck,
 }
 
 /// A pose that replaces one which was contradicted.
@@ -60,6 +65,7 @@ impl Integrity {
             slip: [const { SlipCheck::new() }; LASERS],
             jumps: JumpCheck::new(),
             mounting: MountingCheck::new(),
+            turns: TurnCheck::new(),
         }
     }
 

@@ -46,7 +46,7 @@ const fn wheelbase(parameters: &Parameters) -> Option<f64> {
     }
 }
 
-const BOUNDS: [Bound; 52] = [
+const BOUNDS: [Bound; 59] = [
     Bound { leaf: "vehicle.wheelbase", least: 0.05, most: 50.0, get: wheelbase },
     Bound {
         leaf: "vehicle.drive_scale",
@@ -108,6 +108,13 @@ const BOUNDS: [Bound; 52] = [
         most: 100.0,
         get: |parameters| Some(parameters.odometry_noise.unknown_turn),
     },
+    Bound { leaf: "gyro.factor", least: -10.0, most: 10.0, get: |parameters| Some(parameters.gyro.factor) },
+    Bound { leaf: "gyro.latency", least: 0.0, most: 0.2, get: |parameters| Some(parameters.gyro.latency) },
+    Bound { leaf: "gyro.noise", least: SMALL, most: 0.1, get: |parameters| Some(parameters.gyro.noise) },
+    Bound { leaf: "gyro.bias", least: SMALL, most: 1.0, get: |parameters| Some(parameters.gyro.bias) },
+    Bound { leaf: "gyro.drift", least: 0.0, most: 0.1, get: |parameters| Some(parameters.gyro.drift) },
+    Bound { leaf: "gyro.scale", least: SMALL, most: 0.5, get: |parameters| Some(parameters.gyro.scale) },
+    Bound { leaf: "gyro.range", least: 0.01, most: 1000.0, get: |parameters| Some(parameters.gyro.range) },
     Bound {
         leaf: "reflectors.range_deviation",
         least: SMALL,
@@ -342,6 +349,9 @@ impl Parameters {
         });
         if let Some((leaf, _)) = scales.into_iter().flatten().find(|(_, scale)| *scale == 0.0) {
             return Err(ParameterError { leaf });
+        }
+        if self.gyro.is_fitted && self.gyro.factor == 0.0 {
+            return Err(ParameterError { leaf: "gyro.factor" });
         }
         if matches!(&self.vehicle, Vehicle::Wheels(vehicle) if !vehicle.is_sound()) {
             return Err(ParameterError { leaf: "vehicle" });

@@ -5,7 +5,7 @@ use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use crate::filter::{PoseAndSlots, Slots, packed_entries, slot_states};
-use crate::sources::{FeatureFinder, FindFeatures, LandmarkMaps, Maps};
+use crate::sources::{Contours, FeatureFinder, FindContours, FindFeatures, LandmarkMaps, Maps, NoContours};
 
 /// The memory of a localiser. [`CapacitiesOf`] makes it of numbers.
 pub trait Capacities: Clone + Debug {
@@ -15,10 +15,12 @@ pub trait Capacities: Clone + Debug {
     type Maps: LandmarkMaps;
     /// Points of a scan, and what finds features in them.
     type Features: FindFeatures;
+    /// Surroundings by a kept map of contours, and what finds a scan in them.
+    type Contours: FindContours;
 }
 
 /// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, `DYNAMIC` landmarks that are
-/// found while driving, and in the filter's state for `S`.
+/// found while driving, in the filter's state for `S`, and for contours as `K` says.
 #[derive(Clone, Copy, Debug)]
 pub struct CapacitiesOf<
     const BEAMS: usize,
@@ -26,14 +28,19 @@ pub struct CapacitiesOf<
     const FEATURES: usize,
     const DYNAMIC: usize,
     S = SlamSlots,
->(core::marker::PhantomData<S>);
+    K = NoContours,
+>(core::marker::PhantomData<(S, K)>);
 
-impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, S: Slots> Capacities
-    for CapacitiesOf<BEAMS, REFLECTORS, FEATURES, DYNAMIC, S>
+impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, S, K> Capacities
+    for CapacitiesOf<BEAMS, REFLECTORS, FEATURES, DYNAMIC, S, K>
+where
+    S: Slots,
+    K: FindContours,
 {
     type Slots = S;
     type Maps = Maps<REFLECTORS, FEATURES, DYNAMIC>;
     type Features = FeatureFinder<BEAMS>;
+    type Contours = K;
 }
 
 const SLAM_STATES: usize = slot_states(4, 64);
@@ -44,12 +51,18 @@ pub type SlamSlots = PoseAndSlots<4, 64, SLAM_STATES, { packed_entries(SLAM_STAT
 /// The state of a filter with biases only.
 pub type NoSlots = PoseAndSlots<0, 0, { slot_states(0, 0) }, { packed_entries(slot_states(0, 0)) }>;
 
-/// The usual room: 1440 beams, 1000 reflectors and 1000 features of fixed maps, 256 landmarks found while driving, and the
-/// map in the state.
+/// The room for everything: 1440 beams, 1000 reflectors and 1000 features of fixed maps, 256 landmarks found while driving, the
+/// map in the state, and contours of a map that is lent for `'m`.
+pub type ContourCapacities<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, Contours<'m>>;
+
+/// The same without contours.
 pub type SlamCapacities = CapacitiesOf<1440, 1000, 1000, 256>;
 
-/// The same without a map in the state: [`super::Parameters::maps`] must not ask for one.
+/// The same without contours and without a map in the state: [`super::Parameters::maps`] must not ask for one.
 pub type VehicleCapacities = CapacitiesOf<1440, 1000, 1000, 256, NoSlots>;
+
+/// The same with contours.
+pub type VehicleWithContours<'m> = CapacitiesOf<1440, 1000, 1000, 256, NoSlots, Contours<'m>>;
 
 /// How much a localiser has room for, as the log of its vehicle states it. One of another size may answer differently.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,4 +73,6 @@ pub struct StatedCapacities {
     pub beams: u32,
     /// Motions and corrections of the filter's past.
     pub history: u32,
+    /// Points of the surroundings by a map of contours; none if it is 0.
+    pub contours: u32,
 }

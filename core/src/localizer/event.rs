@@ -1,7 +1,8 @@
 //! What the localiser is told: the one table of events.
 
 use crate::measurement::{
-    EncoderFaults, EncoderSample, LaserId, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample, Time, WheelSample,
+    EncoderFaults, EncoderSample, GyroSample, LaserId, PoseFix, PoseIncrement, Reflectors, Scan, SpeedSample, Time,
+    WheelSample,
 };
 
 /// Reflectors, whoever keeps them.
@@ -78,6 +79,8 @@ events! {
     4 INCREMENT Increment(PoseIncrement), |increment| Some((increment.time, increment.time));
     /// Counters of several wheels.
     17 WHEELS Wheels(WheelSample), |sample| Some((sample.time, sample.time));
+    /// Rate of a gyro.
+    18 GYRO Gyro(GyroSample), |sample| Some((sample.time, sample.time));
     /// Reflectors that a laser has found.
     5 REFLECTORS Reflectors(R), |reflectors| {
         let seen = reflectors.as_reflectors().observations;
@@ -149,6 +152,7 @@ impl<R, S> AnyEvent<R, S> {
             Self::Speed(sample) => AnyEvent::Speed(*sample),
             Self::Increment(increment) => AnyEvent::Increment(*increment),
             Self::Wheels(sample) => AnyEvent::Wheels(*sample),
+            Self::Gyro(sample) => AnyEvent::Gyro(*sample),
             Self::Reflectors(seen) => AnyEvent::Reflectors(reflectors(seen)),
             Self::Scan(seen) => AnyEvent::Scan(scan(seen)),
             Self::SetPose(fix) => AnyEvent::SetPose(*fix),

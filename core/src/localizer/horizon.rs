@@ -39,6 +39,9 @@ impl<C: Capacities> Localizer<C> {
             return;
         }
         let place = self.workspace.path.place(self.slam.time().since(scan.start));
+        if self.uses_contours() {
+            self.fuse_contours_by_slam(mount, &place, scan.laser);
+        }
         // Key scans are those of the first laser.
         let is_aligned = scan.laser == LaserId::FIRST && self.parameters.sources.key_scans;
         if is_aligned {

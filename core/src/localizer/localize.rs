@@ -2,7 +2,7 @@
 
 use super::{Event, Outputs};
 use crate::maps::MapView;
-use crate::odometry::OdometryBias;
+use crate::odometry::{GyroErrors, OdometryBias};
 
 /// What a controller wants of its localiser, whatever the localiser has room for.
 pub trait Localize {
@@ -14,6 +14,9 @@ pub trait Localize {
 
     /// See [`super::Localizer::odometry_bias`].
     fn odometry_bias(&self) -> OdometryBias;
+
+    /// See [`super::Localizer::gyro_errors`].
+    fn gyro_errors(&self) -> Option<GyroErrors>;
 
     /// See [`super::Localizer::reflectors`].
     fn reflectors(&self) -> MapView<'_>;
@@ -30,6 +33,10 @@ impl<L: Localize> Localize for &mut L {
 
     fn odometry_bias(&self) -> OdometryBias {
         (**self).odometry_bias()
+    }
+
+    fn gyro_errors(&self) -> Option<GyroErrors> {
+        (**self).gyro_errors()
     }
 
     fn reflectors(&self) -> MapView<'_> {

@@ -2,11 +2,12 @@
 
 use heapless::Vec;
 
+use super::contours::ToldByContours;
 use super::evidence::DistanceSince;
 use super::slam::Slam;
-use super::supervisor::{Support, supervise};
+use super::supervisor::{Support, remark_on_turns, supervise};
 use super::{
-    Capacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason, SlamCapacities,
+    Capacities, ContourCapacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason,
     StatedCapacities,
 };
 use crate::filter::{Ekf, Timeline};
@@ -15,10 +16,11 @@ use crate::integrity::separation::SolutionSeparation;
 use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, is_sure};
 use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
-use crate::odometry::{Coasting, Motion, OdometryBias, OdometryError, VehicleOdometer};
+use crate::odometry::{Coasting, GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::sensing::detect_reflectors;
 use crate::sources::{
-    Aid, AidOutcome, FindFeatures, LandmarkMaps, Source, Statuses, Workspace, correct_by_aid, see_reflectors,
+    Aid, AidOutcome, FindContours, FindFeatures, GyroSource, LandmarkMaps, Source, Statuses, Workspace, correct_by_aid,
+    see_reflectors,
 };
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
@@ -28,7 +30,7 @@ const PAST: usize = 128;
 ///
 /// `C` says how much it has room for.
 #[derive(Clone, Debug)]
-pub struct Localizer<C: Capacities = SlamCapacities> {
+pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) parameters: Parameters,
     pub(super) odometer: VehicleOdometer,
     pub(super) maps: C::Maps,
@@ -36,12 +38,16 @@ pub struct Localizer<C: Capacities = SlamCapacities> {
     pub(super) slam: Slam<C::Slots>,
     pub(super) integrity: Integrity,
     pub(super) separation: SolutionSeparation,
+    /// Of a vehicle with a gyro.
+    pub(super) gyro: Option<GyroSource>,
     pub(super) lost: Option<Reason>,
     outage: Option<Outage>,
     /// Samples of the odometry in a row that were not later than the one before.
     repeated: u8,
     pub(super) distance: DistanceSince,
     pub(super) features: C::Features,
+    pub(super) contours: C::Contours,
+    pub(super) told_by_contours: Option<ToldByContours>,
     pub(super) workspace: Workspace,
     pub(super) outputs: Outputs,
 }
@@ -69,8 +75,12 @@ const LONGEST_BRIDGE: f64 = 1.0;
 
 impl<C: Capacities> Localizer<C> {
     /// How much it has room for.
-    pub const CAPACITIES: StatedCapacities =
-        StatedCapacities { landmarks: C::Maps::FIXED as u32, beams: C::Features::BEAMS as u32, history: PAST as u32 };
+    pub const CAPACITIES: StatedCapacities = StatedCapacities {
+        landmarks: C::Maps::FIXED as u32,
+        beams: C::Features::BEAMS as u32,
+        history: PAST as u32,
+        contours: C::Contours::POINTS as u32,
+    };
 
     /// A localiser with empty maps that does not know where it is.
     #[must_use]
@@ -98,16 +108,24 @@ impl<C: Capacities> Localizer<C> {
             timeline: Timeline::new(parameters.limits.longest_extrapolation),
             slam: Slam::new(),
             integrity: Integrity::new(parameters.consistency),
-            separation: SolutionSeparation::new(parameters.assumed, parameters.vehicle.steering_lever()),
+            separation: Self::separation(&parameters),
+            gyro: parameters.uses_gyro().then(|| GyroSource::new(&parameters.gyro)),
             lost: None,
             outage: None,
             repeated: 0,
             distance: DistanceSince::NEVER,
             features: C::Features::new(parameters.features.detector),
+            contours: C::Contours::new(),
+            told_by_contours: None,
             workspace: Workspace::default(),
             outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
         }
+    }
+
+    fn separation(parameters: &Parameters) -> SolutionSeparation {
+        let gyro = parameters.uses_gyro().then_some(&parameters.gyro);
+        SolutionSeparation::with_gyro(parameters.assumed, parameters.vehicle.steering_lever(), gyro)
     }
 
     /// Adds landmarks to the fixed maps, each to the one of its kind.
@@ -158,6 +176,12 @@ impl<C: Capacities> Localizer<C> {
         if self.parameters.maps.slam { self.slam.bias() } else { OdometryBias::default() }
     }
 
+    /// What has been learnt of the errors of the gyro that tells the turns; none if none does.
+    #[must_use]
+    pub fn gyro_errors(&self) -> Option<GyroErrors> {
+        Some(*self.gyro.as_ref()?.state().errors())
+    }
+
     /// What the last event gave.
     #[must_use]
     pub fn outputs(&self) -> &Outputs {
@@ -174,6 +198,7 @@ impl<C: Capacities> Localizer<C> {
         }
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
+        let known = if sees && self.gyro.is_some() { self.known_pose() } else { None };
         let revolution_of = event.laser().filter(|_| self.tells_reflectors(event));
         // Samples of the odometry come ten times as often as all else: what they do not need is never inlined here.
         match event {
@@ -194,9 +219,14 @@ impl<C: Capacities> Localizer<C> {
                 let motion = self.odometer.wheels(sample);
                 self.move_by(sample.time, motion);
             }
+            Event::Gyro(sample) => self.turn_rate(sample),
             Event::Reflectors(seen) => self.reflectors_of(seen),
             Event::Scan(scan) => self.scan(scan),
             Event::SetPose(fix) => self.set_pose(fix),
+        }
+        if let Some(known) = known {
+            let is_corrected = self.outputs.uses.iter().any(|seen| seen.verdict == Verdict::Accepted);
+            self.teach_gyro(&known, is_corrected);
         }
         if let Some(before) = before {
             self.check(&before, revolution_of);
@@ -219,6 +249,7 @@ impl<C: Capacities> Localizer<C> {
     /// be out of time then.
     pub fn aid<const SIZE: usize>(&mut self, aid: &impl Aid<SIZE>) -> AidOutcome {
         let time = aid.time();
+        let known = if self.gyro.is_some() { self.known_pose() } else { None };
         self.begin_event();
         let is_taken = self.parameters.sources.aids && !self.parameters.maps.slam && self.lost.is_none();
         let Some(timeline) = self.timeline.begun_mut().filter(|_| is_taken) else { return AidOutcome::OUT_OF_TIME };
@@ -234,6 +265,9 @@ impl<C: Capacities> Localizer<C> {
         let status = &mut self.outputs.sources.aids;
         status.begin(time);
         status.add(time, outcome.verdict, outcome.verdict == Verdict::Accepted, outcome.test_ratio);
+        if let Some(known) = known {
+            self.teach_gyro(&known, outcome.verdict == Verdict::Accepted);
+        }
         self.separate(None);
         self.publish(true);
         outcome
@@ -243,6 +277,7 @@ impl<C: Capacities> Localizer<C> {
         self.outputs.uses.clear();
         self.outputs.has_cut = false;
         self.outputs.misuse = None;
+        self.told_by_contours = None;
     }
 
     /// The pose for now, and that by odometry alone.
@@ -267,8 +302,11 @@ impl<C: Capacities> Localizer<C> {
                 self.lost = Some(Reason::MotionDisagrees);
             }
         }
-        let is_right = self.lost.is_none() && self.outage.is_none();
-        self.integrity.correct(before, &after, uses, is_right);
+        // What contours have moved is no correction by landmarks.
+        if self.told_by_contours.is_none() {
+            let is_right = self.lost.is_none() && self.outage.is_none();
+            self.integrity.correct(before, &after, uses, is_right);
+        }
     }
 
     /// What a given pose replaces, if it was contradicted.
@@ -323,10 +361,13 @@ impl<C: Capacities> Localizer<C> {
             let (now, state) = (self.timeline.now(), self.timeline.state());
             self.separation.begin(now, &state.pose, &state.covariance_entries(), self.timeline.odometry_pose());
             if matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge)) {
-                self.separation.doubt_mounting(now);
+                self.separation.doubt_mounting();
             }
         }
         self.slam.begin(fix.time, &state, &self.parameters.slam);
+        if let Some(gyro) = &mut self.gyro {
+            gyro.begin_pose();
+        }
         self.lost = None;
         self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
         if !is_past {
@@ -370,6 +411,8 @@ impl<C: Capacities> Localizer<C> {
                 if self.parameters.maps.slam {
                     let lever = self.parameters.vehicle.steering_lever();
                     self.go_on(&motion.corrected(&self.slam.bias(), lever));
+                } else if self.gyro.is_some() {
+                    self.go_on_by_gyro(motion);
                 } else {
                     self.go_on(motion);
                 }
@@ -435,7 +478,7 @@ impl<C: Capacities> Localizer<C> {
         coasting
     }
 
-    fn go_on(&mut self, motion: &Motion) {
+    pub(super) fn go_on(&mut self, motion: &Motion) {
         self.distance.advance(motion.distance);
         self.keep_up();
         self.timeline.advance(motion);
@@ -445,7 +488,7 @@ impl<C: Capacities> Localizer<C> {
     }
 
     /// Before a motion is forgotten that the filter with landmarks has not seen, as the laser is silent.
-    fn keep_up(&mut self) {
+    pub(super) fn keep_up(&mut self) {
         if self.parameters.maps.slam
             && self.lost.is_none()
             && let Some(time) = self.timeline.oldest_after_next()
@@ -475,6 +518,9 @@ impl<C: Capacities> Localizer<C> {
         }
         let mut coasting = self.doubt_odometry(reason, Time::default());
         if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
+            if let Some(gyro) = &mut self.gyro {
+                gyro.forget_rest();
+            }
             self.go_on(&motion);
         }
         self.outage = Some(Outage { reason, coasting, since: Time::default() });
@@ -513,7 +559,9 @@ impl<C: Capacities> Localizer<C> {
         };
         let workspace = &mut self.workspace;
         let maps = self.parameters.maps;
-        if maps.features || maps.dynamic || maps.slam {
+        let is_whole =
+            maps.features || maps.dynamic || maps.slam || (self.parameters.sources.contours && self.contours.has_map());
+        if is_whole {
             workspace.path.set(scan.start, &mount, timeline.relative_path(scan.start, scan.end()));
         }
         if let Some(detection) = self.parameters.detection_in(scan) {
@@ -533,9 +581,16 @@ impl<C: Capacities> Localizer<C> {
                 self.outputs.sources.of_mut(source).begin(scan.start);
             }
         }
+        if is_whole {
+            self.outputs.has_cut |= self.features.take(&self.workspace.path, &self.parameters.features, scan);
+        }
         if maps.slam {
-            self.fuse_scan_by_slam(&mount, scan);
-        } else if maps.features || maps.dynamic {
+            return self.fuse_scan_by_slam(&mount, scan);
+        }
+        if self.uses_contours() {
+            self.fuse_contours(&mount, scan);
+        }
+        if maps.features || maps.dynamic {
             self.find_features(&mount, scan);
             self.fuse(scan.start);
             self.update_dynamic_map();
@@ -565,7 +620,8 @@ impl<C: Capacities> Localizer<C> {
             by_features: distance.feature <= limits.dead_reckoning_from,
         };
         let outage = self.outage.map(|outage| outage.reason);
-        let (mode, reason) = supervise(self.lost, outage, support, &self.integrity);
+        let turns = if self.gyro.is_some() { remark_on_turns(&self.integrity, timeline.now()) } else { None };
+        let (mode, reason) = supervise(self.lost, outage, turns, support, &self.integrity);
         self.outputs.pose = PoseOutput {
             time: timeline.now(),
             pose: state.pose,
@@ -598,6 +654,10 @@ impl<C: Capacities> Localize for Localizer<C> {
 
     fn odometry_bias(&self) -> OdometryBias {
         self.odometry_bias()
+    }
+
+    fn gyro_errors(&self) -> Option<GyroErrors> {
+        self.gyro_errors()
     }
 
     fn reflectors(&self) -> MapView<'_> {

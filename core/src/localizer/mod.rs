@@ -2,9 +2,11 @@
 
 mod bounds;
 mod capacities;
+mod contours;
 mod event;
 mod evidence;
 mod fusion;
+mod gyro;
 mod horizon;
 mod lasers;
 mod localize;
@@ -21,7 +23,10 @@ mod start_search;
 mod supervisor;
 
 pub use bounds::{ParameterError, bounds};
-pub use capacities::{Capacities, CapacitiesOf, SlamCapacities, StatedCapacities, VehicleCapacities};
+pub use capacities::{
+    Capacities, CapacitiesOf, ContourCapacities, SlamCapacities, SlamSlots, StatedCapacities, VehicleCapacities,
+    VehicleWithContours,
+};
 pub use event::{AnyEvent, AsReflectors, AsScan, Event, kind};
 pub use lasers::Lasers;
 pub use localize::Localize;

@@ -10,8 +10,8 @@ use nalgebra::Matrix3;
 use super::Parameters;
 use crate::filter::Ekf;
 use crate::integrity::separation::fault_free;
-use crate::measurement::{EncoderFaults, EncoderSample, Time};
-use crate::odometry::{Motion, OdometryBias, VehicleOdometer};
+use crate::measurement::{EncoderFaults, EncoderSample, GyroSample, Time, WheelSample};
+use crate::odometry::{GyroErrors, GyroTurns, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::state::{Mode, PoseOutput, ProtectionLevel, Reason};
 
 /// Longest time, s, for which a localiser that says nothing is merely busy: the longest scan, twice.
@@ -29,6 +29,9 @@ pub struct OutputPredictor<const MOTIONS: usize = 40> {
     base: Option<PoseOutput>,
     state: Ekf,
     bias: OdometryBias,
+    /// Of a vehicle with a gyro.
+    gyro: Option<GyroTurns>,
+    gyro_errors: Option<GyroErrors>,
     faults: EncoderFaults,
 }
 
@@ -44,6 +47,8 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             base: None,
             state: Ekf::new(crate::geometry::Pose::default(), 0.0, 0.0),
             bias: OdometryBias::default(),
+            gyro: parameters.uses_gyro().then(|| GyroTurns::new(&parameters.gyro)),
+            gyro_errors: None,
             faults: EncoderFaults::default(),
         }
     }
@@ -61,12 +66,44 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         }
     }
 
+    /// Takes what the localiser has learnt of its gyro.
+    pub fn update_gyro(&mut self, errors: Option<GyroErrors>) {
+        self.gyro_errors = errors;
+    }
+
+    /// Takes a reading of the gyro, at once when it is heard.
+    pub fn gyro(&mut self, sample: &GyroSample) {
+        if let Some(gyro) = &mut self.gyro {
+            // What tells no turn is left to the wheels.
+            let _ = gyro.sample(sample);
+        }
+    }
+
+    /// The motion with the turn of the gyro, if there is one.
+    fn by_gyro(&mut self, motion: &Motion) -> Motion {
+        let Some((gyro, errors)) = self.gyro.as_mut().zip(self.gyro_errors) else { return *motion };
+        match gyro.turn(motion.start, motion.end).filter(|_| motion.distance > 0.0) {
+            Some(turn) => motion.with_turn(turn.corrected(&errors), turn.variance),
+            None => *motion,
+        }
+    }
+
     /// Takes a sample of the encoders, at once when it is heard.
     pub fn encoders(&mut self, sample: &EncoderSample) {
+        let motion = self.odometer.encoders(sample);
+        self.travel(motion);
+    }
+
+    /// The same of the encoders of several wheels.
+    pub fn wheels(&mut self, sample: &WheelSample) {
+        let motion = self.odometer.wheels(sample);
+        self.travel(motion);
+    }
+
+    fn travel(&mut self, motion: Result<Motion, OdometryError>) {
         self.faults = EncoderFaults::default();
-        let Ok(motion) = self.odometer.encoders(sample) else {
-            return;
-        };
+        let Ok(motion) = motion else { return };
+        let motion = if self.gyro.is_some() { self.by_gyro(&motion) } else { motion };
         if self.motions.is_full() {
             self.join_shortest();
         }

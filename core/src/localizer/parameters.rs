@@ -8,7 +8,7 @@ use crate::integrity::separation::AssumedDeviations;
 use crate::integrity::{AlertLimits, InnovationMonitorParameters};
 use crate::maps::DynamicMapParameters;
 use crate::measurement::Scan;
-use crate::odometry::{Integration, OdometerParameters, OdometryNoise, Vehicle};
+use crate::odometry::{GyroParameters, Integration, OdometerParameters, OdometryNoise, Vehicle};
 use crate::sensing::ReflectorDetection;
 use crate::sources::{
     AssociationParameters, Believed, FeatureParameters, MapUse, ReflectorParameters, SlamParameters, Switches,
@@ -25,6 +25,9 @@ pub struct Parameters {
     pub integration: Integration,
     /// How wrong odometry may be.
     pub odometry_noise: OdometryNoise,
+    /// The gyro, if there is one. In a log it stands behind the header.
+    #[serde(skip)]
+    pub gyro: GyroParameters,
     /// Which sources correct the pose.
     pub sources: Switches,
     /// Which maps are used.
@@ -60,6 +63,7 @@ impl Parameters {
             lasers: Lasers::one(laser),
             integration: Integration::default(),
             odometry_noise: OdometryNoise::default(),
+            gyro: GyroParameters::default(),
             sources: Switches::default(),
             maps: MapUse::default(),
             reflectors: ReflectorParameters::default(),
@@ -83,6 +87,12 @@ impl Parameters {
     /// Whether reflectors correct the pose.
     pub(super) const fn uses_reflectors(&self) -> bool {
         self.maps.reflectors && self.sources.reflectors
+    }
+
+    /// Whether a gyro tells the turn of each motion. A map in the state has its own biases of the odometry, and no place for
+    /// those of a gyro yet.
+    pub(super) const fn uses_gyro(&self) -> bool {
+        self.gyro.is_fitted && self.sources.gyro && !self.maps.slam
     }
 
     /// What an odometer of the vehicle believes.

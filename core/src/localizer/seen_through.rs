@@ -42,7 +42,8 @@ impl SeenThrough {
         self.places.clear();
     }
 
-    /// Takes a scan whose laser is at `sensor` in W. What exceeds the room is left out.
+    /// Takes a scan whose laser is at `sensor` in W. A reflector that stands at its place stops the beams, so it takes no room; what
+    /// exceeds the room is left out, since as many missing ones tell enough.
     pub(super) fn look(&mut self, scan: &Scan, sensor: &Pose, reflectors: MapView) {
         for (number, landmark) in (0..u16::MAX).zip(reflectors.landmarks()) {
             let place = landmark.position();

@@ -2,11 +2,12 @@
 
 use nalgebra::Matrix2;
 
+use super::contours::ToldByContours;
 use super::{Capacities, Localizer};
 use crate::filter::RangeBearing;
-use crate::geometry::Point;
+use crate::geometry::{Point, Pose};
 use crate::integrity::Suspect;
-use crate::integrity::separation::{LandmarkKey, Laser, Seen};
+use crate::integrity::separation::{LandmarkKey, Laser, Seen, SensorInformation};
 use crate::maps::{Landmark, LandmarkKind, Verdict};
 use crate::measurement::{LaserId, Time};
 use crate::sources::LandmarkMaps;
@@ -34,9 +35,21 @@ impl<C: Capacities> Localizer<C> {
                 self.tell(&seen, first, &from);
             }
         }
+        self.tell_contours_pose(&mount, &from);
         self.separation.doubt_laser(self.integrity.suspect() == Some(Suspect::Laser));
         let square = self.integrity.innovations.mean_normalised_square();
         self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));
+    }
+
+    /// Tells where contours have the laser, moved to now by the odometry.
+    fn tell_contours_pose(&mut self, mount: &Pose, from: &Laser) {
+        let Some(ToldByContours { time, seen }) = self.told_by_contours.filter(|_| self.lost.is_none()) else { return };
+        let motions = self.timeline.motions(time, self.timeline.now());
+        let since = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement)).compose(mount);
+        let jacobian = seen.pose.compose_jacobian_first(&since);
+        let covariance = jacobian * seen.covariance_matrix() * jacobian.transpose();
+        let told = SensorInformation::of_pose(&seen.pose.compose(&since), &covariance, &seen.shared, &from.sensor);
+        self.separation.take(LandmarkKey::Contours, told);
     }
 
     fn tell(&mut self, seen: &LandmarkUse, first: Time, from: &Laser) {

@@ -113,6 +113,8 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 let motion = self.odometer.wheels(sample);
                 self.travel(sample.time, motion);
             }
+            // What was seen is carried for ten metres at most.
+            Event::Gyro(_) => {}
             Event::Reflectors(seen) => self.revolution(seen.laser, seen.observations, reflectors),
             Event::Scan(scan) => {
                 if let Some(detection) = self.parameters.reflectors.detection

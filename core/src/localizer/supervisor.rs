@@ -1,6 +1,7 @@
 //! What the vehicle says of its pose: verdicts become a mode and a reason here and nowhere else.
 
 use crate::integrity::{Integrity, Suspect};
+use crate::measurement::Time;
 use crate::state::{Mode, Reason};
 
 /// What the pose rests on.
@@ -12,10 +13,19 @@ pub(super) struct Support {
     pub by_features: bool,
 }
 
-/// The mode, and why it is so. `lost` and `outage` say why there is no pose, and why there is no odometry.
+/// What a gyro and the wheels say of each other, of a vehicle with a gyro.
+pub(super) fn remark_on_turns(integrity: &Integrity, now: Time) -> Option<Reason> {
+    let turns = &integrity.turns;
+    let fault = turns.fault(now).map(|_| Reason::GyroFault);
+    fault.or_else(|| turns.slips(now).then_some(Reason::WheelsSlip))
+}
+
+/// The mode, and why it is so. `lost` and `outage` say why there is no pose, and why there is no odometry; `turns` is what gyro and
+/// wheels say of each other.
 pub(super) fn supervise(
     lost: Option<Reason>,
     outage: Option<Reason>,
+    turns: Option<Reason>,
     support: Support,
     integrity: &Integrity,
 ) -> (Mode, Reason) {
@@ -27,8 +37,9 @@ pub(super) fn supervise(
     }
     let suspect = integrity.suspect();
     let remark = if suspect == Some(Suspect::Odometry) { Reason::OdometryDisagrees } else { Reason::None };
+    let remark = turns.unwrap_or(remark);
     match (support.by_reflectors, support.by_features) {
-        (false, false) => (Mode::DeadReckoning, Reason::NoLandmarks),
+        (false, false) => (Mode::DeadReckoning, turns.unwrap_or(Reason::NoLandmarks)),
         _ if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
         _ if integrity.innovations.is_doubtful() => (Mode::Degraded, Reason::LandmarksRejected),
         (true, true) => (Mode::Mixed, remark),

@@ -2,6 +2,7 @@
 
 mod encoder;
 mod encoder_fault;
+mod gyro;
 mod laser_id;
 mod pose_fix;
 mod reflectors;
@@ -11,6 +12,7 @@ mod wheels;
 
 pub use encoder::{EncoderSample, PoseIncrement, SpeedSample};
 pub use encoder_fault::{EncoderFault, EncoderFaults};
+pub use gyro::GyroSample;
 pub use laser_id::{LASERS, LaserId, LaserIdError};
 pub use pose_fix::PoseFix;
 pub use reflectors::{ReflectorObservation, Reflectors};

@@ -29,6 +29,8 @@ pub struct PointView<'a> {
     pub points: &'a [ScanPoint],
     /// See [`PointScan::ranges`].
     pub ranges: &'a [f32],
+    /// See [`PointScan::bearing_step`].
+    pub bearing_step: f32,
     /// See [`PointScan::is_full_circle`].
     pub is_full_circle: bool,
 }
@@ -51,7 +53,12 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
     #[must_use]
     #[inline]
     pub fn view(&self) -> PointView<'_> {
-        PointView { points: &self.points, ranges: &self.ranges, is_full_circle: self.is_full_circle }
+        PointView {
+            points: &self.points,
+            ranges: &self.ranges,
+            bearing_step: self.bearing_step,
+            is_full_circle: self.is_full_circle,
+        }
     }
 
     /// How many beams of the scan there are for each one that is kept: 1 if there is room for all of them.

@@ -1,84 +1,228 @@
-//! A pose by the surfaces of a kept map, as an aid of the filter.
+//! Contours: the pose under which the surfaces of a scan lie on those of a kept map.
 
+use core::fmt::Debug;
+
+use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
-use super::Aid;
-use crate::contours::ContourMatch;
-use crate::filter::{Ekf, Linearisation, Slots};
-use crate::geometry::{Pose, difference};
-use crate::measurement::Time;
+use crate::contours::{
+    ContourMatch, KeptMap, Prediction, SurfacePoint, Surroundings, align, align_nearby, find_surface_points,
+};
+use crate::filter::{Ekf, PoseObservation};
+use crate::geometry::Pose;
+use crate::maps::Verdict;
+use crate::sensing::PointView;
 
 /// By what the covariance of a match is multiplied that takes points as independent.
 const INFLATION: f64 = 3.0;
 
-/// Standard deviation that is added along each axis for what all scans of a map have in common, m.
-const POSITION_FLOOR: f64 = 0.005;
+/// Standard deviation along each axis of what all scans of a map have in common, m.
+const SHARED_POSITION: f64 = 0.005;
 
 /// The same for the heading, rad.
-const HEADING_FLOOR: f64 = 1e-3;
+const SHARED_HEADING: f64 = 1e-3;
 
 /// Standard deviation along a free axis, m: as good as nothing.
 const FREE: f64 = 100.0;
 
-/// Chi-square with three degrees of freedom, 99.9 per cent.
+/// Chi-square with three degrees of freedom, 99.9 per cent: what is further from the pose surprises.
 const GATE: f64 = 16.3;
 
-/// If this share of a scan's points lies on surfaces, it is believed however surprising it is: the search has looked no further
-/// than the odometry may be wrong.
-const SURE_SHARE: f32 = 0.5;
+/// If fewer of a scan's points lie on surfaces, the map does not say where it was taken.
+const LEAST_SHARE: f32 = 0.3;
 
-/// Where R is by a match of a scan.
+/// A place is as good as another one if its share of points on surfaces is no less than this much of the other's.
+const AS_GOOD: f32 = 0.9;
+
+/// Places of the laser that are further apart than this, m and rad, are two.
+const APART: (f64, f64) = (0.1, 0.05);
+
+/// What finds a scan in a kept map, with room for `ROOM` points of the surroundings and `POINTS` of a scan; the map is lent for
+/// `'m`.
+#[derive(Clone, Debug)]
+pub struct Contours<'m, const POINTS: usize = 400, const ROOM: usize = 6144> {
+    map: Option<KeptMap<'m>>,
+    points: Vec<SurfacePoint, POINTS>,
+    surroundings: Surroundings<ROOM>,
+}
+
+/// A vehicle that has no room for contours.
+#[derive(Clone, Copy, Debug)]
+pub struct NoContours;
+
+/// [`Contours`] of any capacity, or none.
+pub trait FindContours: Clone + Debug {
+    /// A map as it is lent.
+    type Map: Copy + Debug;
+
+    /// Points of the surroundings, at the most.
+    const POINTS: usize;
+
+    /// One without a map.
+    fn new() -> Self;
+
+    /// Takes another map, or none.
+    fn set_map(&mut self, map: Option<Self::Map>);
+
+    /// Whether there is a map.
+    fn has_map(&self) -> bool;
+
+    /// Takes the points of a scan and finds where it was taken. None if the map says nothing of it.
+    fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch>;
+
+    /// Where the scan taken last fits nearest to a pose, without a search.
+    fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch>;
+
+    /// Whether there was no room for all of the surroundings.
+    fn has_cut(&self) -> bool;
+}
+
+impl<'m, const POINTS: usize, const ROOM: usize> FindContours for Contours<'m, POINTS, ROOM> {
+    type Map = KeptMap<'m>;
+
+    const POINTS: usize = ROOM;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self { map: None, points: Vec::new(), surroundings: Surroundings::new() }
+    }
+
+    fn set_map(&mut self, map: Option<KeptMap<'m>>) {
+        self.map = map;
+        self.surroundings.forget();
+    }
+
+    fn has_map(&self) -> bool {
+        self.map.is_some()
+    }
+
+    #[inline(never)]
+    fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch> {
+        find_surface_points(scan, &mut self.points);
+        align(&self.points, self.surroundings.around(&self.map?, &predicted.pose), predicted)
+    }
+
+    fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch> {
+        align_nearby(&self.points, self.surroundings.loaded(), predicted)
+    }
+
+    fn has_cut(&self) -> bool {
+        self.surroundings.loaded().has_cut()
+    }
+}
+
+impl FindContours for NoContours {
+    type Map = core::convert::Infallible;
+
+    const POINTS: usize = 0;
+
+    fn new() -> Self {
+        Self
+    }
+
+    fn set_map(&mut self, _: Option<Self::Map>) {}
+
+    fn has_map(&self) -> bool {
+        false
+    }
+
+    fn locate(&mut self, _: PointView<'_>, _: &Prediction) -> Option<ContourMatch> {
+        None
+    }
+
+    fn locate_nearby(&self, _: &Pose) -> Option<ContourMatch> {
+        None
+    }
+
+    fn has_cut(&self) -> bool {
+        false
+    }
+}
+
+/// Where R is by a match of a scan whose points are in the frame of a laser mounted at `mount` in R. None if its information is no
+/// matrix of one.
+#[must_use]
+pub fn pose_by_contours(found: &ContourMatch, mount: &Pose) -> Option<PoseObservation> {
+    let free = Matrix3::from_diagonal_element(1.0 / (FREE * FREE));
+    let shared =
+        [SHARED_POSITION * SHARED_POSITION, SHARED_POSITION * SHARED_POSITION, SHARED_HEADING * SHARED_HEADING];
+    let own = (found.information / INFLATION + free).try_inverse()?;
+    let back = mount.inverse();
+    // Position and heading of the laser are those of R with the lever between them.
+    let jacobian = found.pose.compose_jacobian_first(&back);
+    let of = jacobian * (own + Matrix3::from_diagonal(&Vector3::from(shared))) * jacobian.transpose();
+    let covariance = [of.m11, of.m12, of.m22, of.m13, of.m23, of.m33];
+    Some(PoseObservation { pose: found.pose.compose(&back), covariance, shared, widening: 1.0 })
+}
+
+/// What became of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourFix {
-    time: Time,
-    pose: Pose,
-    covariance: Matrix3<f64>,
-    is_sure: bool,
+pub(crate) struct ContourOutcome {
+    pub verdict: Verdict,
+    /// Squared Mahalanobis distance from the pose over the gate; none if nothing was compared.
+    pub test_ratio: Option<f64>,
+    /// Where R is by the scan.
+    pub seen: Option<PoseObservation>,
 }
 
-impl ContourFix {
-    /// What a match says that was true at `time`, of a laser mounted at `mount` in R. None if its information is no matrix of one.
-    #[must_use]
-    pub fn new(time: Time, found: &ContourMatch, mount: &Pose) -> Option<Self> {
-        let free = Matrix3::from_diagonal_element(1.0 / (FREE * FREE));
-        let floor = Vector3::new(
-            POSITION_FLOOR * POSITION_FLOOR,
-            POSITION_FLOOR * POSITION_FLOOR,
-            HEADING_FLOOR * HEADING_FLOOR,
-        );
-        let covariance = (found.information / INFLATION + free).try_inverse()? + Matrix3::from_diagonal(&floor);
-        let back = mount.inverse();
-        // Position and heading of the laser are those of R with the lever between them.
-        let jacobian = found.pose.compose_jacobian_first(&back);
-        Some(Self {
-            time,
-            pose: found.pose.compose(&back),
-            covariance: jacobian * covariance * jacobian.transpose(),
-            is_sure: found.share >= SURE_SHARE,
-        })
+impl ContourOutcome {
+    /// It says nothing.
+    const NOTHING: Self = Self { verdict: Verdict::Unknown, test_ratio: None, seen: None };
+
+    /// A pose that is compared with a state. One that surprises makes what was known before count for little: steps of an odometry are
+    /// now and then wrong by far more than their deviation says.
+    fn new(seen: PoseObservation, state: &Ekf) -> Self {
+        let Some(square) = seen.normalised_square(state) else { return Self::NOTHING };
+        let widening = if square > GATE { 1.0 + 0.25 * square } else { 1.0 };
+        let seen = PoseObservation { widening, ..seen };
+        Self { verdict: Verdict::Accepted, test_ratio: Some(square / GATE), seen: Some(seen) }
+    }
+
+    fn is_expected(&self) -> bool {
+        self.test_ratio.is_none_or(|ratio| ratio <= 1.0)
+    }
+
+    /// The pose that is to correct the filter, if one is.
+    pub(crate) fn wanted(&self) -> Option<PoseObservation> {
+        self.seen.filter(|_| self.verdict == Verdict::Accepted)
     }
 }
 
-impl Aid<3> for ContourFix {
-    fn time(&self) -> Time {
-        self.time
+/// Finds where R was, which was about at the pose of `state`; the frame of the scan's points is at `mount` in R, and `step` is the
+/// motion since the scan before. Where something better `leads`, it is compared and not used.
+pub(crate) fn see_contours(
+    contours: &mut impl FindContours,
+    scan: PointView<'_>,
+    mount: &Pose,
+    (state, step): (&Ekf, &Pose),
+    leads: bool,
+) -> ContourOutcome {
+    let pose = state.pose.compose(mount);
+    let predicted = Prediction::of_filter(pose, state.position_deviation(), state.heading_deviation(), step);
+    let Some(found) = contours.locate(scan, &predicted).filter(|found| found.share >= LEAST_SHARE) else {
+        return ContourOutcome::NOTHING;
+    };
+    let compared = |found: &ContourMatch| {
+        pose_by_contours(found, mount).map_or(ContourOutcome::NOTHING, |seen| ContourOutcome::new(seen, state))
+    };
+    let usual = compared(&found);
+    if leads {
+        let verdict = if usual.is_expected() { Verdict::Unknown } else { Verdict::Gated };
+        return ContourOutcome { verdict, ..usual };
     }
+    if usual.is_expected() {
+        return usual;
+    }
+    // Surfaces that repeat fit in two places. The one where the vehicle should be is right if it is as good.
+    let as_good = contours.locate_nearby(&predicted.pose).filter(|near| near.share >= AS_GOOD * found.share);
+    let Some(near) = as_good.filter(|near| is_elsewhere(&near.pose, &found.pose)) else { return usual };
+    let near = compared(&near);
+    let verdict = if near.is_expected() { near.verdict } else { Verdict::Ambiguous };
+    ContourOutcome { verdict, ..near }
+}
 
-    fn linearise<S: Slots>(&self, state: &Ekf<S>) -> Option<Linearisation<3>> {
-        let residual = Vector3::new(
-            self.pose.x - state.pose.x,
-            self.pose.y - state.pose.y,
-            difference(self.pose.theta, state.pose.theta),
-        );
-        Some(
-            Linearisation::new(residual, self.covariance)
-                .with(0, Vector3::x())
-                .with(1, Vector3::y())
-                .with(2, Vector3::z()),
-        )
-    }
-
-    fn gate(&self) -> f64 {
-        if self.is_sure { f64::MAX } else { GATE }
-    }
+/// Whether two poses are not the same place.
+fn is_elsewhere(one: &Pose, other: &Pose) -> bool {
+    let apart = one.between(other);
+    libm::hypot(apart.x, apart.y) > APART.0 || libm::fabs(apart.theta) > APART.1
 }

@@ -13,7 +13,7 @@ use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::Scan;
 use crate::order::insertion_sort_by;
-use crate::sensing::{Keypoint, KeypointKind, PointScan, PointView, falko};
+use crate::sensing::{Keypoint, KeypointKind, PointScan, PointView, SensorPath, falko};
 
 /// How natural features are seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,9 +62,12 @@ pub trait FindFeatures: Clone + Debug {
     /// The points of the last scan.
     fn points(&self) -> PointView<'_>;
 
-    /// Finds the natural features of a scan. They are found in the scan as it would look from the first beam's place,
+    /// Takes the points of a scan, as they would be seen from the first beam's place. True if there was not room for all beams.
+    fn take(&mut self, path: &SensorPath, features: &FeatureParameters, scan: &Scan) -> bool;
+
+    /// Finds the natural features of the scan that was taken. They are found in the scan as it would look from the first beam's place,
     /// and observed from where the sensor was at their own beam. Their covariance is not turned between the two. True if there
-    /// was not room for all beams and features.
+    /// was not room for all.
     fn find(
         &mut self,
         workspace: &mut Workspace,
@@ -88,6 +91,14 @@ impl<const BEAMS: usize> FindFeatures for FeatureFinder<BEAMS> {
         self.points.view()
     }
 
+    fn take(&mut self, path: &SensorPath, features: &FeatureParameters, scan: &Scan) -> bool {
+        self.points.set(scan, features.nearest, features.farthest);
+        if features.motion_correction {
+            path.correct(scan, &mut self.points);
+        }
+        PointScan::<BEAMS>::stride(scan) > 1
+    }
+
     fn find(
         &mut self,
         workspace: &mut Workspace,
@@ -96,10 +107,6 @@ impl<const BEAMS: usize> FindFeatures for FeatureFinder<BEAMS> {
         mount: &Pose,
         scan: &Scan,
     ) -> bool {
-        self.points.set(scan, features.nearest, features.farthest);
-        if features.motion_correction {
-            workspace.path.correct(scan, &mut self.points);
-        }
         let stride = PointScan::<BEAMS>::stride(scan);
         self.keypoints.clear();
         let is_wanted = switches.corners || switches.end_points;
@@ -137,6 +144,6 @@ impl<const BEAMS: usize> FindFeatures for FeatureFinder<BEAMS> {
                 verdict: Verdict::Unknown,
             });
         }
-        stride > 1 || left_out > 0
+        left_out > 0
     }
 }

@@ -9,6 +9,7 @@ mod association;
 mod contours;
 mod correction;
 mod features;
+mod gyro;
 mod key_scans;
 mod landmark_maps;
 mod landmark_slots;
@@ -19,8 +20,9 @@ mod status;
 
 pub use aid::{Aid, AidOutcome};
 pub use association::{AssociationParameters, MapUse};
-pub use contours::ContourFix;
+pub use contours::{Contours, FindContours, NoContours, pose_by_contours};
 pub use features::FeatureParameters;
+pub use gyro::{AtRest, GyroMotion, GyroSource, RestSum};
 pub use key_scans::KeyScanParameters;
 pub use reflectors::ReflectorParameters;
 pub use slot_parameters::SlamParameters;
@@ -28,6 +30,7 @@ pub use status::SourceStatus;
 
 pub(crate) use aid::correct as correct_by_aid;
 pub(crate) use association::{Believed, Comparison};
+pub(crate) use contours::{ContourOutcome, see_contours};
 pub(crate) use correction::{Outcome, correct};
 pub(crate) use features::{FeatureFinder, FindFeatures};
 pub(crate) use key_scans::KeyScans;
@@ -42,17 +45,20 @@ use serde::{Deserialize, Serialize};
 use crate::maps::LandmarkKind;
 
 /// Makes the list of sources, a switch for each, and what became of each.
+///
+/// The last of them has come after the format of logs: its switch stands behind the header ([`crate::record`]).
 macro_rules! sources {
-    ($($(#[$doc:meta])* $source:ident $field:ident;)+) => {
+    ($($(#[$doc:meta])* $source:ident $field:ident;)+ [late] $(#[$late_doc:meta])* $late_source:ident $late:ident;) => {
         /// What can correct the pose.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Source {
             $($(#[$doc])* $source,)+
+            $(#[$late_doc])* $late_source,
         }
 
         impl Source {
             /// All sources.
-            pub const ALL: &[Self] = &[$(Self::$source),+];
+            pub const ALL: &[Self] = &[$(Self::$source),+, Self::$late_source];
         }
 
         /// Which sources may correct the pose.
@@ -60,6 +66,7 @@ macro_rules! sources {
         #[serde(default, deny_unknown_fields)]
         pub struct Switches {
             $($(#[$doc])* pub $field: bool,)+
+            $(#[$late_doc])* #[serde(skip)] pub $late: bool,
         }
 
         impl Default for Switches {
@@ -70,13 +77,14 @@ macro_rules! sources {
 
         impl Switches {
             /// All of them.
-            pub const ALL: Self = Self { $($field: true,)+ };
+            pub const ALL: Self = Self { $($field: true,)+ $late: true };
 
             /// Whether a source may correct the pose.
             #[must_use]
             pub const fn of(&self, source: Source) -> bool {
                 match source {
                     $(Source::$source => self.$field,)+
+                    Source::$late_source => self.$late,
                 }
             }
         }
@@ -85,6 +93,7 @@ macro_rules! sources {
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         pub struct Statuses {
             $($(#[$doc])* pub $field: SourceStatus,)+
+            $(#[$late_doc])* pub $late: SourceStatus,
         }
 
         impl Statuses {
@@ -93,12 +102,14 @@ macro_rules! sources {
             pub const fn of(&self, source: Source) -> &SourceStatus {
                 match source {
                     $(Source::$source => &self.$field,)+
+                    Source::$late_source => &self.$late,
                 }
             }
 
             pub(crate) const fn of_mut(&mut self, source: Source) -> &mut SourceStatus {
                 match source {
                     $(Source::$source => &mut self.$field,)+
+                    Source::$late_source => &mut self.$late,
                 }
             }
         }
@@ -114,10 +125,15 @@ sources! {
     EndPoints end_points;
     /// Scans of the distance behind: `key_scans.rs`.
     KeyScans key_scans;
+    /// Surfaces of a kept map: `contours.rs`.
+    Contours contours;
     /// Poses from outside: the pose begins anew at each.
     GivenPose given_pose;
     /// Models from outside: `aid.rs`.
     Aids aids;
+    [late]
+    /// The turn of each motion by a gyro: `gyro.rs`.
+    Gyro gyro;
 }
 
 impl Source {

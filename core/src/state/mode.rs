@@ -56,4 +56,8 @@ pub enum Reason {
     OdometryDisagrees,
     /// The odometry says nothing, or nothing that the vehicle as it is described can say.
     OdometrySilent,
+    /// Gyro and wheels tell different turns: a wheel slips, or the vehicle is turned while its wheels stand. The gyro is believed.
+    WheelsSlip,
+    /// The gyro is silent, frozen, at the end of its range, or tells another bias than before.
+    GyroFault,
 }

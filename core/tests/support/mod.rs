@@ -4,3 +4,4 @@ pub mod hall;
 pub mod reference_drive;
 pub mod stage;
 pub mod view;
+pub mod walls;

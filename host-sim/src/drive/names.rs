@@ -35,6 +35,8 @@ pub fn reason_name(reason: Reason) -> &'static str {
         Reason::LaserMoved => "the laser has moved on the vehicle",
         Reason::OdometryDisagrees => "odometry is not as believed",
         Reason::OdometrySilent => "no odometry",
+        Reason::WheelsSlip => "gyro and wheels turn differently",
+        Reason::GyroFault => "the gyro has a fault",
     }
 }
 

@@ -127,7 +127,10 @@ fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
                 odometer.restart();
                 return 0.0;
             }
-            RecordedEvent::Reflectors(_) | RecordedEvent::Scan(_) | RecordedEvent::SetPose(_) => return 0.0,
+            RecordedEvent::Gyro(_)
+            | RecordedEvent::Reflectors(_)
+            | RecordedEvent::Scan(_)
+            | RecordedEvent::SetPose(_) => return 0.0,
         };
         // The chord: the motion's own distance is that of the driving wheel.
         motion.map_or(0.0, |motion| motion.displacement.position().norm())

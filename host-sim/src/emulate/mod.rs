@@ -5,5 +5,5 @@ pub mod encoder;
 mod encoder_objects;
 pub mod encoder_pair;
 pub mod foreign_traffic;
-mod sdo_server;
+pub mod gyro;
 pub mod vehicle;

@@ -9,7 +9,7 @@ use agv_core::geometry::Pose;
 use agv_core::integrity::{Alarm, AlertLimits};
 use agv_core::localizer::{LandmarkUse, Mode, PoseOutput, Reason};
 use agv_core::maps::{LandmarkKind, Verdict};
-use agv_core::measurement::{EncoderFault, EncoderFaults, PoseFix, Time};
+use agv_core::measurement::{EncoderFault, EncoderFaults, GyroSample, PoseFix, Time};
 use agv_core::odometry::{Motion, VehicleOdometer};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
@@ -21,9 +21,9 @@ use crate::output_file::OutputFile;
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::replay::Replay;
 use crate::ros::messages::{
-    Colour, DiagnosticStatus, Diagnostics, Header, KeyValue, LaserScan, Level, Marker, MarkerShape, Markers, Odometry,
-    Pose as RosPose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, TransformStamped, Transforms, Twist,
-    TwistWithCovariance, Vector, covariance,
+    Colour, DiagnosticStatus, Diagnostics, Header, Imu, KeyValue, LaserScan, Level, Marker, MarkerShape, Markers,
+    Odometry, Pose as RosPose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, TransformStamped,
+    Transforms, Twist, TwistWithCovariance, Vector, covariance,
 };
 use crate::ros::{Kind, MessageError, definition, encode};
 
@@ -58,6 +58,7 @@ enum Topic {
     Transforms,
     Landmarks,
     Scan,
+    Imu,
     Odometry,
     Pose,
     InitialPose,
@@ -68,11 +69,12 @@ enum Topic {
 }
 
 impl Topic {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::StaticTransforms,
         Self::Transforms,
         Self::Landmarks,
         Self::Scan,
+        Self::Imu,
         Self::Odometry,
         Self::Pose,
         Self::InitialPose,
@@ -88,6 +90,7 @@ impl Topic {
             Self::Transforms => "/tf",
             Self::Landmarks => "/landmarks",
             Self::Scan => "/scan",
+            Self::Imu => "/imu",
             Self::Odometry => "/odom",
             Self::Pose => "/pose",
             Self::InitialPose => "/initialpose",
@@ -103,6 +106,7 @@ impl Topic {
             Self::StaticTransforms | Self::Transforms => Kind::Transforms,
             Self::Landmarks | Self::Observations => Kind::Markers,
             Self::Scan => Kind::LaserScan,
+            Self::Imu => Kind::Imu,
             Self::Odometry => Kind::Odometry,
             Self::Pose | Self::InitialPose => Kind::PoseWithCovarianceStamped,
             Self::Diagnostics => Kind::Diagnostics,
@@ -315,6 +319,7 @@ impl Exporter {
             }
             RecordedEvent::Scan(scan) => return self.write_scan(writer, scan),
             RecordedEvent::SetPose(fix) => return writer.write(Topic::InitialPose, self.now, &initial_pose(fix)),
+            RecordedEvent::Gyro(sample) => return writer.write(Topic::Imu, self.now, &imu(sample)),
             RecordedEvent::Reflectors(_) => None,
         };
         match motion {
@@ -390,6 +395,19 @@ impl Exporter {
 
 fn transform(time: Time, above: &str, below: &str, pose: Pose) -> TransformStamped {
     TransformStamped { header: Header::new(time, above), child_frame_id: below.to_owned(), transform: pose.into() }
+}
+
+/// A rate as it was told; what a gyro of one axis does not measure is marked as ROS does it.
+fn imu(sample: &GyroSample) -> Imu {
+    let mut unknown = [0.0; 9];
+    unknown[0] = -1.0;
+    Imu {
+        header: Header::new(sample.time, BASE),
+        orientation_covariance: unknown,
+        angular_velocity: Vector { x: 0.0, y: 0.0, z: sample.rate },
+        linear_acceleration_covariance: unknown,
+        ..Imu::default()
+    }
 }
 
 fn initial_pose(fix: &PoseFix) -> PoseWithCovarianceStamped {

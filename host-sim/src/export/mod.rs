@@ -3,6 +3,7 @@
 pub mod answered;
 pub mod candump;
 pub mod csv;
+pub mod eds;
 pub mod keypoints;
 #[cfg(feature = "bags")]
 pub mod mcap;

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
-use agv_core::measurement::{LaserId, PoseFix, PoseIncrement, Time};
-use agv_core::odometry::Vehicle;
+use agv_core::measurement::{GyroSample, LaserId, PoseFix, PoseIncrement, Time};
+use agv_core::odometry::{GyroParameters, Vehicle};
 
 use super::mounting::{self, Mounting, MountingError, plain};
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
-use crate::ros::messages::{LaserScan, Odometry, PoseWithCovarianceStamped, Stamp, Transforms};
+use crate::ros::messages::{Imu, LaserScan, Odometry, PoseWithCovarianceStamped, Stamp, Transforms};
 use crate::ros::{Bag, BagError, BagMessage, Kind, MessageError, decode};
 
 /// What is taken from a recording that holds more.
@@ -20,6 +20,8 @@ pub struct Choice {
     pub scan: Option<String>,
     /// Topic of the odometry; the only one of its kind if None.
     pub odometry: Option<String>,
+    /// Topic of the gyro; the only one of its kind, if there is one, if None.
+    pub imu: Option<String>,
     /// Pose of the laser on the vehicle; what the recording states if None. Whether it hangs upside down, the recording says.
     pub laser: Option<Pose>,
 }
@@ -88,6 +90,16 @@ pub enum RosImportError {
         /// Angle between its plane and the ground.
         degrees: f64,
     },
+    /// The gyro has no axis that points up or down.
+    #[error("{}: no axis z of the gyro {gyro} points up or down, it is off by {degrees:.0} deg", path.display())]
+    TiltedGyro {
+        /// The recording.
+        path: PathBuf,
+        /// Frame of the gyro.
+        gyro: String,
+        /// Angle between its third axis and the vertical.
+        degrees: f64,
+    },
     /// Nobody says where the laser is.
     #[error("{}: no transform leads from {base} to {laser}; state where the laser is with --laser X,Y,HEADING", path.display())]
     NoLaserPose {
@@ -108,6 +120,7 @@ fn listed(topics: &[String]) -> String {
 enum Heard {
     Scan(LaserScan),
     Odometry(Box<Odometry>),
+    Imu(Box<Imu>),
     InitialPose(Box<PoseWithCovarianceStamped>),
 }
 
@@ -116,6 +129,7 @@ impl Heard {
         match self {
             Self::Scan(message) => message.header.stamp,
             Self::Odometry(message) => message.header.stamp,
+            Self::Imu(message) => message.header.stamp,
             Self::InitialPose(message) => message.header.stamp,
         }
     }
@@ -130,13 +144,14 @@ const INITIAL_POSE: &str = "/initialpose";
 /// If the recording cannot be read, or does not hold one laser and one odometry.
 pub fn read(path: &Path, choice: &Choice) -> Result<Recording, RosImportError> {
     let bag = Bag::open(path)?;
-    let (scan_topic, odometry_topic) = topics(path, &bag, choice)?;
-    let (mut heard, transforms) = messages(path, &bag, &scan_topic, &odometry_topic)?;
+    let wanted = topics(path, &bag, choice)?;
+    let (mut heard, transforms) = messages(path, &bag, &wanted)?;
     // Recorders store messages as they come, but not always one topic in the order of the other.
     heard.sort_by_key(|(time, _)| *time);
     let first = heard.iter().map(|(_, message)| message.stamp().nanoseconds()).min().unwrap_or_default();
     let clock = |stamp: Stamp| Time::from_micros(((stamp.nanoseconds() - first).max(0).unsigned_abs() + 500) / 1000);
     let laser = mounting(path, &heard, &transforms, choice.laser)?;
+    let sign = gyro_sign(path, &heard, &transforms)?;
     let mut before: Option<Pose> = None;
     let events = heard.iter().map(|(_, message)| match message {
         Heard::Scan(message) => RecordedEvent::Scan(scan(clock(message.header.stamp), message, laser.is_upside_down)),
@@ -145,19 +160,32 @@ pub fn read(path: &Path, choice: &Choice) -> Result<Recording, RosImportError> {
             let displacement = before.replace(pose).map_or(Pose::default(), |before| before.between(&pose));
             RecordedEvent::Increment(PoseIncrement { time: clock(message.header.stamp), displacement })
         }
+        Heard::Imu(message) => {
+            RecordedEvent::Gyro(GyroSample { time: clock(message.header.stamp), rate: message.angular_velocity.z })
+        }
         Heard::InitialPose(message) => RecordedEvent::SetPose(fix(clock(message.header.stamp), message)),
     });
+    let mut parameters = Parameters::new(Vehicle::Increments, laser.pose);
+    if let Some(factor) = sign {
+        parameters.gyro = GyroParameters { is_fitted: true, factor, ..GyroParameters::default() };
+    }
     Ok(Recording {
         events: events.collect(),
-        parameters: Parameters::new(Vehicle::Increments, laser.pose),
+        parameters,
         landmarks: Vec::new(),
         truth: Vec::new(),
         references: Vec::new(),
     })
 }
 
-/// The topics of the laser and of the odometry.
-fn topics(path: &Path, bag: &Bag, choice: &Choice) -> Result<(String, String), RosImportError> {
+/// Topics of the laser, of the odometry, and of the gyro if there is one.
+struct Topics {
+    scan: String,
+    odometry: String,
+    imu: Option<String>,
+}
+
+fn topics(path: &Path, bag: &Bag, choice: &Choice) -> Result<Topics, RosImportError> {
     let mut all: BTreeMap<String, String> = BTreeMap::new();
     bag.read(|message| {
         if !all.contains_key(message.topic) {
@@ -186,25 +214,29 @@ fn topics(path: &Path, bag: &Bag, choice: &Choice) -> Result<(String, String), R
             _ => Err(RosImportError::SeveralTopics { path: path.to_owned(), kind, found: of_kind, option }),
         }
     };
-    Ok((
-        one_of(Kind::LaserScan, &choice.scan, "--scan-topic")?,
-        one_of(Kind::Odometry, &choice.odometry, "--odometry-topic")?,
-    ))
+    let has_gyro = choice.imu.is_some() || all.values().any(|kind| kind == Kind::Imu.name());
+    Ok(Topics {
+        scan: one_of(Kind::LaserScan, &choice.scan, "--scan-topic")?,
+        odometry: one_of(Kind::Odometry, &choice.odometry, "--odometry-topic")?,
+        imu: if has_gyro { Some(one_of(Kind::Imu, &choice.imu, "--imu-topic")?) } else { None },
+    })
 }
 
 /// Messages with the times of their arrival, ns.
 type Messages = Vec<(u64, Heard)>;
 
-fn messages(path: &Path, bag: &Bag, scan: &str, odometry: &str) -> Result<(Messages, Transforms), RosImportError> {
+fn messages(path: &Path, bag: &Bag, wanted: &Topics) -> Result<(Messages, Transforms), RosImportError> {
     let (mut heard, mut transforms) = (Messages::new(), Transforms::default());
     let mut problem = None;
     let mut number = 0;
     bag.read(|message| {
         number += 1;
         let BagMessage { topic, kind, time, data } = *message;
-        let taken = if topic == scan {
+        let taken = if topic == wanted.scan {
             decode(data).map(|message| heard.push((time, Heard::Scan(message))))
-        } else if topic == odometry {
+        } else if wanted.imu.as_deref() == Some(topic) {
+            decode(data).map(|message| heard.push((time, Heard::Imu(Box::new(message)))))
+        } else if topic == wanted.odometry {
             decode(data).map(|message| heard.push((time, Heard::Odometry(Box::new(message)))))
         } else if topic == INITIAL_POSE && kind == Kind::PoseWithCovarianceStamped.name() {
             decode(data).map(|message| heard.push((time, Heard::InitialPose(Box::new(message)))))
@@ -219,6 +251,27 @@ fn messages(path: &Path, bag: &Bag, scan: &str, odometry: &str) -> Result<(Messa
         }
     })?;
     problem.map_or(Ok((heard, transforms)), Err)
+}
+
+/// True rate over that about the gyro's third axis: negative if it hangs upside down. None without a gyro. A gyro of which no
+/// transform tells is upright.
+fn gyro_sign(path: &Path, heard: &Messages, transforms: &Transforms) -> Result<Option<f64>, RosImportError> {
+    let gyro = heard.iter().find_map(|(_, message)| match message {
+        Heard::Imu(imu) => Some(plain(&imu.header.frame_id).to_owned()),
+        _ => None,
+    });
+    let base = heard.iter().find_map(|(_, message)| match message {
+        Heard::Odometry(odometry) => Some(plain(&odometry.child_frame_id)),
+        _ => None,
+    });
+    let Some(gyro) = gyro else { return Ok(None) };
+    match mounting::find(transforms, base.unwrap_or_default(), &gyro) {
+        Ok(found) => Ok(Some(if found.is_upside_down { -1.0 } else { 1.0 })),
+        Err(MountingError::Unknown) => Ok(Some(1.0)),
+        Err(MountingError::Tilted(tilt)) => {
+            Err(RosImportError::TiltedGyro { path: path.to_owned(), gyro, degrees: tilt.to_degrees() })
+        }
+    }
 }
 
 /// Where the laser is on the vehicle: as stated, and turned over if the transforms that never change say so.

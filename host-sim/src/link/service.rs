@@ -68,6 +68,10 @@ fn explain(refusal: Refusal) -> &'static str {
         Refusal::Moving => "the vehicle moves; it must stand for a second before it is changed",
         Refusal::Tag => "the key is not that of the controller",
         Refusal::NoKey => "no key was provisioned on the controller, so nobody may change it",
+        Refusal::BusLoad => {
+            "the CAN bus would be loaded by more than 60 % of its bit rate; it needs a longer can.publishing_period or \
+             can.encoder_period, or a higher can.bit_rate"
+        }
         Refusal::Pose => "the pose or its deviations are no sensible numbers",
         Refusal::Store(agv_settings::store::StoreError::Full) => "the flash is full",
         Refusal::Store(agv_settings::store::StoreError::Map) => "the map is too large, or was not sent as a whole",

@@ -130,7 +130,7 @@ impl ContourMapper {
         if let Some(path) = path {
             path.correct(&scan.view(), &mut self.scan);
         }
-        find_surface_points(&self.scan, &mut self.points);
+        find_surface_points(self.scan.view(), &mut self.points);
         for point in &self.points {
             let normal = laser.transform(&point.normal.cast()) - laser.position();
             let position = laser.transform(&point.position.cast());

@@ -3,9 +3,9 @@
 mod clustering;
 pub mod contour_file;
 pub mod contour_map;
-pub mod contour_replay;
 mod known_poses;
 pub mod map_file;
+pub mod odometry_noise;
 pub mod pose_graph;
 mod simultaneous_scan;
 pub mod slam;

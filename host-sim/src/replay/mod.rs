@@ -10,13 +10,14 @@ pub use start_search::{StartSearchError, find_start};
 
 use std::time::{Duration, Instant};
 
-use agv_core::localizer::{LandmarkUse, Localizer, PoseOutput};
+use agv_core::contours::KeptMap;
+use agv_core::localizer::{ContourCapacities, LandmarkUse, Localizer, PoseOutput};
 use agv_core::maps::MapError;
-use agv_core::odometry::OdometryBias;
+use agv_core::odometry::{GyroErrors, OdometryBias};
 use agv_core::record::Output;
 use thiserror::Error;
 
-use crate::recording::{RecordedEvent, Recording};
+use crate::recording::Recording;
 
 /// What the localiser said of a whole recording.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +28,8 @@ pub struct Replay {
     pub poses: Vec<PoseOutput>,
     /// What had been learnt of the odometry after each event.
     pub biases: Vec<OdometryBias>,
+    /// What had been learnt of the gyro after each event; nothing of a vehicle without one.
+    pub gyro: Vec<GyroErrors>,
     /// What became of each observation, event by event.
     pub uses: Vec<LandmarkUse>,
     /// For each event, how many observations there were up to and including it.
@@ -63,20 +66,20 @@ pub enum ReplayError {
 /// # Errors
 /// [`ReplayError`] if the recording's map cannot be used.
 pub fn replay(recording: &Recording, progress: impl FnMut(usize)) -> Result<Replay, ReplayError> {
-    replay_aided(recording, progress, |_, _, _| {})
+    replay_in(recording, None, progress)
 }
 
-/// The same, with aids that are given to the localiser behind each event. `aid` gets the localiser, the event, and the poses
-/// after those before.
+/// The same with a map of contours beside the landmarks, if there is one.
 ///
 /// # Errors
-/// [`ReplayError`] if the recording's map cannot be used.
-pub fn replay_aided(
+/// [`ReplayError`] if a map cannot be used.
+pub fn replay_in(
     recording: &Recording,
+    contours: Option<KeptMap<'_>>,
     mut progress: impl FnMut(usize),
-    mut aid: impl FnMut(&mut Localizer, &RecordedEvent, &[PoseOutput]),
 ) -> Result<Replay, ReplayError> {
-    let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
+    let mut localizer: Box<Localizer<ContourCapacities>> = Box::new(Localizer::new(recording.parameters));
+    localizer.set_contours(contours);
     localizer.add_landmarks(&recording.landmarks).map_err(|error| match error {
         MapError::Full => ReplayError::MapTooLarge,
         MapError::NotFinite => ReplayError::MapNotFinite,
@@ -88,9 +91,9 @@ pub fn replay_aided(
         let outputs = localizer.handle(&event.view());
         replay.uses.extend_from_slice(&outputs.uses);
         replay.use_ends.push(replay.uses.len());
-        aid(&mut localizer, event, &replay.poses);
-        replay.poses.push(localizer.outputs().pose);
+        replay.poses.push(outputs.pose);
         replay.biases.push(localizer.odometry_bias());
+        replay.gyro.extend(localizer.gyro_errors());
         if index % 1024 == 0 {
             progress(index);
         }

@@ -2,6 +2,7 @@
 
 use agv_controller::MOTIONS;
 use agv_core::localizer::{Event, OutputPredictor};
+use agv_core::odometry::GyroErrors;
 use agv_core::record::{MAX_FRAME, Published, Record, encode};
 
 use super::{Comparison, Replay};
@@ -53,6 +54,14 @@ impl<'a> Publisher<'a> {
                 self.take_answer(event, behind);
                 self.predictor.encoders(&sample);
             }
+            Event::Wheels(sample) => {
+                self.take_answer(event, behind);
+                self.predictor.wheels(&sample);
+            }
+            Event::Gyro(sample) => {
+                self.take_answer(event, behind);
+                self.predictor.gyro(&sample);
+            }
             Event::EncoderFaults(faults) => {
                 self.take_answer(event, behind);
                 self.predictor.doubt_encoders(&faults);
@@ -74,8 +83,11 @@ impl<'a> Publisher<'a> {
         }
         self.answered = answered;
         if let Some(answer) = answered.checked_sub(1) {
+            self.predictor.update_gyro(self.replay.gyro.get(answer).copied());
             self.predictor.update(&self.replay.poses[answer], &self.replay.biases[answer]);
         } else if let Some((pose, bias)) = &self.replay.start {
+            let has_gyro = !self.replay.gyro.is_empty();
+            self.predictor.update_gyro(has_gyro.then(GyroErrors::default));
             self.predictor.update(pose, bias);
         }
     }

@@ -36,6 +36,12 @@ impl Figure {
     pub fn svg(&self) -> &str {
         &self.svg
     }
+
+    /// The picture as SVG on one line, for a file of its own.
+    #[must_use]
+    pub fn one_line(&self) -> String {
+        self.svg.lines().collect::<String>() + "\n"
+    }
 }
 
 impl FigureError {

@@ -205,6 +205,25 @@ pub struct LaserScan {
     pub intensities: Vec<f32>,
 }
 
+/// `sensor_msgs/Imu`. The first entry of a covariance is -1 if what it is of is not measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Imu {
+    /// When it was measured, and in which frame.
+    pub header: Header,
+    /// Orientation.
+    pub orientation: Quaternion,
+    /// Its covariance, rad^2.
+    pub orientation_covariance: [f64; 9],
+    /// Rates about the axes, rad/s.
+    pub angular_velocity: Vector,
+    /// Their covariance, rad^2/s^2.
+    pub angular_velocity_covariance: [f64; 9],
+    /// Acceleration, m/s^2.
+    pub linear_acceleration: Vector,
+    /// Its covariance, m^2/s^4.
+    pub linear_acceleration_covariance: [f64; 9],
+}
+
 /// `geometry_msgs/TransformStamped`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TransformStamped {

@@ -7,6 +7,8 @@ use std::fmt::Write;
 pub enum Kind {
     /// A revolution of a laser.
     LaserScan,
+    /// Rates and accelerations.
+    Imu,
     /// Integrated odometry.
     Odometry,
     /// A pose with its covariance.
@@ -27,6 +29,7 @@ impl Kind {
     pub fn name(self) -> &'static str {
         match self {
             Self::LaserScan => "sensor_msgs/msg/LaserScan",
+            Self::Imu => "sensor_msgs/msg/Imu",
             Self::Odometry => "nav_msgs/msg/Odometry",
             Self::PoseWithCovarianceStamped => "geometry_msgs/msg/PoseWithCovarianceStamped",
             Self::PoseStamped => "geometry_msgs/msg/PoseStamped",
@@ -38,7 +41,7 @@ impl Kind {
 }
 
 /// Each type with its fields, separated by semicolons.
-const TYPES: [(&str, &str); 26] = [
+const TYPES: [(&str, &str); 27] = [
     ("builtin_interfaces/Time", "int32 sec;uint32 nanosec"),
     ("builtin_interfaces/Duration", "int32 sec;uint32 nanosec"),
     ("std_msgs/Header", "builtin_interfaces/Time stamp;string frame_id"),
@@ -67,6 +70,12 @@ const TYPES: [(&str, &str); 26] = [
         "sensor_msgs/LaserScan",
         "std_msgs/Header header;float32 angle_min;float32 angle_max;float32 angle_increment;float32 time_increment;\
          float32 scan_time;float32 range_min;float32 range_max;float32[] ranges;float32[] intensities",
+    ),
+    (
+        "sensor_msgs/Imu",
+        "std_msgs/Header header;geometry_msgs/Quaternion orientation;float64[9] orientation_covariance;\
+         geometry_msgs/Vector3 angular_velocity;float64[9] angular_velocity_covariance;\
+         geometry_msgs/Vector3 linear_acceleration;float64[9] linear_acceleration_covariance",
     ),
     ("sensor_msgs/CompressedImage", "std_msgs/Header header;string format;uint8[] data"),
     ("visualization_msgs/UVCoordinate", "float32 u;float32 v"),

@@ -4,6 +4,7 @@
 //! elementary functions are those of `libm`.
 
 pub mod block_storage;
+pub mod gyro;
 pub mod laser;
 pub mod multi_beam;
 pub mod odometer;
@@ -18,20 +19,21 @@ pub mod speed_profile;
 pub mod standard;
 pub mod vehicle;
 pub mod warehouse_hall;
+pub mod wheels;
 pub mod world;
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::PoseFix;
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::Time;
-use agv_core::odometry::{Ackermann, Tricycle};
+use agv_core::odometry::{Ackermann, Tricycle, Wheel, WheelBased};
 
 use crate::recording::{RecordedEvent, Recording, Truth};
 use laser::{LaserTrack, Revolution, Scene};
 use path::Path;
 use random::{Random, Stream};
 use raycast::RayCaster;
-use scenario::{MotionReport, Scenario, ScenarioError, believed_parameters, believed_tricycle};
+use scenario::{MotionReport, Scenario, ScenarioError, believed_parameters, believed_tricycle, believed_wheels};
 use vehicle::Motion;
 use world::World;
 
@@ -86,6 +88,12 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
         arrivals.add(START, RecordedEvent::SetPose(start_fix(scenario, &path.start)));
     }
     report_motion(&mut arrivals, scenario, &motion, &true_tricycle, &mut odometry_random);
+    if scenario.gyro.fitted {
+        let mut random = Random::new(scenario.seed, Stream::Gyro);
+        for sample in gyro::samples(&motion, &scenario.gyro, START, &mut random) {
+            arrivals.add(sample.time, RecordedEvent::Gyro(sample));
+        }
+    }
     report_laser(
         &mut arrivals,
         scenario,
@@ -123,6 +131,25 @@ fn true_tricycle(scenario: &Scenario) -> Tricycle {
         steering_offset_backward: believed.steering_offset_backward + offset_error + backward_error,
         ..believed
     }
+}
+
+/// The wheels as they are: one side is larger than the other, and the first steered wheel is mounted a little askew.
+fn true_wheels(scenario: &Scenario) -> Vec<Wheel> {
+    let errors = &scenario.vehicle.truth;
+    let mut random = Random::new(scenario.seed, Stream::Vehicle);
+    let signs = if errors.random_signs { [random.sign(), random.sign()] } else { [1.0, 1.0] };
+    let Some(vehicle) = believed_wheels(scenario) else { return Vec::new() };
+    let mut wheels = vehicle.wheels().as_ref().to_vec();
+    let mut askew = signs[1] * errors.steering_offset_error_deg.to_radians();
+    for (number, wheel) in wheels.iter_mut().enumerate() {
+        let side = if number % 2 == 0 { 0.5 } else { -0.5 };
+        let larger = signs[0] * errors.drive_scale_error + side * signs[1] * errors.wheel_difference;
+        wheel.radius *= 1.0 + larger;
+        if wheel.steering.is_some() {
+            wheel.heading += std::mem::take(&mut askew);
+        }
+    }
+    wheels
 }
 
 fn true_laser(scenario: &Scenario) -> Pose {
@@ -182,6 +209,12 @@ fn report_motion(
                 Ackermann { wheelbase: tricycle.wheelbase, encoder_offset: scenario.vehicle.believed.encoder_offset };
             for sample in odometer::speeds(motion, &car, scale, offset_error, options, START, random) {
                 arrivals.add(sample.time, RecordedEvent::Speed(sample));
+            }
+        }
+        MotionReport::Differential | MotionReport::BiSteerable | MotionReport::Omnidirectional => {
+            let wheels = true_wheels(scenario);
+            for sample in wheels::samples(motion, &wheels, tricycle.wheelbase, options, START, random) {
+                arrivals.add(sample.time, RecordedEvent::Wheels(sample));
             }
         }
         MotionReport::Increments => {

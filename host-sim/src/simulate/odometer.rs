@@ -30,7 +30,8 @@ pub fn encoders(
         if leg.of != Some(state.leg) {
             leg = LegErrors::drawn(state.leg, options, random);
         }
-        counted_way += moved * (1.0 + leg.slip) + options.slip * libm::sqrt(moved.abs()) * random.normal();
+        let too_much = leg.slip + options.slip_of(0, index as f64 * motion.interval);
+        counted_way += moved * (1.0 + too_much) + options.slip * libm::sqrt(moved.abs()) * random.normal();
         let offset = match state.direction {
             Direction::Forward => tricycle.steering_offset_forward,
             Direction::Backward => tricycle.steering_offset_backward,

@@ -40,6 +40,8 @@ pub enum Stream {
     Frames = 16,
     /// Which faults come together.
     Pairs = 17,
+    /// Bias and noise of a gyro.
+    Gyro = 18,
 }
 
 /// One sequence of random numbers.

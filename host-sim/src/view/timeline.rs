@@ -266,6 +266,7 @@ impl Timeline {
                 self.laser.push(scan.end());
                 self.scans.take(scan, offset);
             }
+            Event::Gyro(sample) => self.see(sample.time),
             Event::SetPose(fix) => {
                 self.see(fix.time);
                 let Pose { x, y, theta } = fix.pose;

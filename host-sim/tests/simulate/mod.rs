@@ -1,6 +1,7 @@
 //! The simulation against independent truth: geometry, statistics of the stated noise, and determinism.
 
 mod determinism;
+mod gyro;
 mod laser;
 mod odometry;
 mod ray_casting;
@@ -8,4 +9,5 @@ mod reflectors;
 mod scenario;
 mod scenario_reference;
 mod support;
+mod wheels;
 mod world;

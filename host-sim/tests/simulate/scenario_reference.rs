@@ -83,6 +83,8 @@ const EVERYTHING: [&str; 3] = [
      [path]\nkind = \"legs\"\nlegs = [{ segments = [{ length = 1.0 }] }]\n\
      [laser]\ndirty_sectors = [{ from_deg = 0, to_deg = 1, lost_share = 0.5 }]\nknocks = [{ from = 1 }]\n\
      [drive]\ncarries = [{ from = 1 }]\n\
+     [odometry]\nslips = [{ from = 1, lasts = 1, share = 0.1 }]\n\
+     [gyro]\nfaults = [{ from = 1, lasts = 1 }]\n\
      [[people]]\nway = [[0, 0]]\nphase = 0.5\n",
 ];
 
@@ -96,7 +98,7 @@ fn no_key_is_left_out() {
         KEYS.iter().map(|key| key.name).chain(CHOICES.iter().map(|[name, ..]| *name)).map(str::to_owned).collect();
     assert_eq!(all.difference(&known).collect::<Vec<_>>(), Vec::<&String>::new());
     // And none is listed that a scenario does not have, but for lists of tables.
-    let lists = ["laser.dirty_sectors", "people", "path.legs"].map(str::to_owned);
+    let lists = ["gyro.faults", "laser.dirty_sectors", "odometry.slips", "people", "path.legs"].map(str::to_owned);
     let extra: Vec<_> = known.difference(&all).filter(|name| !lists.contains(name)).collect();
     assert_eq!(extra, Vec::<&String>::new());
     // The standard is within its own bounds.

@@ -15,6 +15,7 @@ use agv_wire::nav350::SensorFrame;
 
 use super::fault::{Fault, FaultKind, Line};
 use agv_host_sim::emulate::encoder_pair::{EmulatedPair, PairError};
+use agv_host_sim::emulate::gyro::EmulatedGyro;
 use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
 use agv_host_sim::serve::nav350::{Connection, Drive, DriveError, Sensor, SensorClockOptions};
 use agv_host_sim::simulate::START;
@@ -79,6 +80,7 @@ struct Rig<'a> {
     /// None while the power is cut.
     controller: Option<Box<Controller>>,
     pair: EmulatedPair,
+    gyro: Option<EmulatedGyro>,
     sensor: Sensor,
     connection: Option<Connection>,
     from_laser: Line<Vec<u8>>,
@@ -167,6 +169,7 @@ impl<'a> Rig<'a> {
             faults,
 
             controller: None,
+            gyro: EmulatedGyro::of(recording, &settings.gyro_frame),
             pair,
             sensor: Sensor::new(drive, clock(faults), None, true),
             connection: None,
@@ -192,6 +195,9 @@ impl<'a> Rig<'a> {
     /// Lets the vehicle drive off.
     fn begin(&mut self, now: Time, is_told: bool, listen: &mut impl FnMut(Time, Given)) {
         self.pair.begin(now);
+        if let Some(gyro) = &mut self.gyro {
+            gyro.begin(now);
+        }
         self.sensor.begin(now.since(Time::default()));
         if let (true, Some(controller), Some(RecordedEvent::SetPose(fix))) =
             (is_told, &mut self.controller, self.recording.events.first())
@@ -296,7 +302,7 @@ impl<'a> Rig<'a> {
                 self.from_laser.send_telegram(now, time, answer, self.faults);
             }
         }
-        for frame in self.pair.poll(now) {
+        for frame in self.pair.poll(now).into_iter().chain(self.gyro.iter_mut().flat_map(|gyro| gyro.poll(now))) {
             self.from_bus.send_frame(now, time, frame, self.faults);
         }
     }

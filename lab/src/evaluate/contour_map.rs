@@ -6,17 +6,14 @@
 
 use std::collections::HashSet;
 
-use agv_core::contours::{ContourMatch, Prediction, SurfacePoint, Surroundings, align, find_surface_points};
 use agv_core::geometry::{Point, Pose, difference};
 use agv_core::integrity::ProtectionLevel;
-use agv_core::integrity::separation::fault_free;
 use agv_core::localizer::PoseOutput;
-use agv_core::sensing::PointScan;
-use agv_core::state::{Mode, Reason};
+use agv_core::odometry::OdometryNoise;
 use agv_host_sim::accuracy::Spread;
-use agv_host_sim::import::{BEAMS, RANGES};
 use agv_host_sim::mapping::contour_map::{ContourMap, ContourMapper};
-use nalgebra::Matrix3;
+use agv_host_sim::recording::RecordedEvent;
+use agv_host_sim::replay::{ReplayError, replay_in};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -62,6 +59,12 @@ struct Compared {
     is_misleading: bool,
 }
 
+/// The way up to each scan, m, and the cells of its returns.
+struct Seen {
+    ways: Vec<f64>,
+    end_points: Vec<Vec<(i32, i32)>>,
+}
+
 /// One window that counts.
 struct Run {
     poses: Vec<WindowPose>,
@@ -70,19 +73,26 @@ struct Run {
 }
 
 /// Localises in all windows of `length` (m), with maps of cells of `cell` (m): by odometry and by contours, and the poses of the latter.
-#[must_use]
-pub fn localise(drive: &OfficeDrive, length: f64, cell: f64) -> (Vec<MapAccuracy>, Vec<WindowPose>) {
-    let ways = ways(drive);
-    let end_points: Vec<Vec<(i32, i32)>> = (0..drive.scans.len()).map(|scan| end_cells(drive, scan)).collect();
+///
+/// # Errors
+/// If a window cannot be replayed.
+pub fn localise(
+    drive: &OfficeDrive,
+    length: f64,
+    cell: f64,
+) -> Result<(Vec<MapAccuracy>, Vec<WindowPose>), ReplayError> {
+    let noise = drive.odometry_noise()?;
+    let end_points = (0..drive.scans.len()).map(|scan| end_cells(drive, scan)).collect();
+    let seen = Seen { ways: ways(drive), end_points };
     let runs: Vec<Run> = windows(drive, length)
         .into_par_iter()
         .enumerate()
-        .filter_map(|(number, window)| run(drive, (number, window), &ways, &end_points, cell))
-        .collect();
+        .filter_map(|(number, window)| run(drive, (number, window), &seen, cell, &noise).transpose())
+        .collect::<Result<_, _>>()?;
     let by_odometry: Vec<_> = runs.iter().map(|run| run.by_odometry.as_slice()).collect();
     let by_contours: Vec<_> = runs.iter().map(|run| run.by_contours.as_slice()).collect();
     let accuracies = vec![accuracy("odometry", &by_odometry, false), accuracy("contours", &by_contours, true)];
-    (accuracies, runs.into_iter().flat_map(|run| run.poses).collect())
+    Ok((accuracies, runs.into_iter().flat_map(|run| run.poses).collect()))
 }
 
 fn accuracy(method: &'static str, runs: &[&[Compared]], has_level: bool) -> MapAccuracy {
@@ -128,16 +138,16 @@ fn is_covered((first, last): (usize, usize), map: &[usize], end_points: &[Vec<(i
 fn run(
     drive: &OfficeDrive,
     (number, window): (usize, (usize, usize)),
-    ways: &[f64],
-    end_points: &[Vec<(i32, i32)>],
+    Seen { ways, end_points }: &Seen,
     cell: f64,
-) -> Option<Run> {
+    noise: &OdometryNoise,
+) -> Result<Option<Run>, ReplayError> {
     let (first, last) = window;
     let is_mapped =
         |scan: &usize| ways[*scan] <= ways[first] - MAP_DISTANCE || ways[*scan] >= ways[last] + MAP_DISTANCE;
     let mapped: Vec<usize> = (0..drive.scans.len()).filter(is_mapped).collect();
     if !is_covered(window, &mapped, end_points) {
-        return None;
+        return Ok(None);
     }
     let mut mapper = ContourMapper::new(cell);
     for scan in mapped {
@@ -158,75 +168,24 @@ fn run(
         compared(scan, &pose, None)
     });
     let by_odometry = by_odometry.collect();
-    let claims = localise_window(drive, window, &mapper.finish());
+    let claims = localise_window(drive, window, &mapper.finish(), noise)?;
     let numbered = claims.iter().zip(first..);
-    Some(Run {
+    Ok(Some(Run {
         poses: numbered.clone().map(|(claim, scan)| WindowPose { window: number, scan, pose: claim.pose }).collect(),
         by_contours: numbered.map(|(claim, scan)| compared(scan, &claim.pose, Some(claim.level))).collect(),
         by_odometry,
-    })
+    }))
 }
 
-/// What the vehicle says of the pose of its laser at each scan: a chain of matches, each predicted by the odometry.
-fn localise_window(drive: &OfficeDrive, (first, last): (usize, usize), map: &ContourMap) -> Vec<PoseOutput> {
-    let Ok(map) = map.view() else { return Vec::new() };
-    let mut surroundings: Box<Surroundings> = Box::default();
-    let mut points: heapless::Vec<SurfacePoint, 400> = heapless::Vec::new();
-    let mut scan_points: Box<PointScan<BEAMS>> = Box::default();
-    let mut pose = drive.truth[first];
-    let mut covariance = Matrix3::zeros();
-    let mut claims = vec![claim(&pose, &covariance)];
-    for scan in first + 1..=last {
-        let step = drive.odometry[scan - 1].between(&drive.odometry[scan]);
-        let predicted = Prediction::by_odometry(&pose, &step);
-        scan_points.set(&drive.scans[scan].view(), RANGES.0, RANGES.1);
-        find_surface_points(&scan_points, &mut points);
-        let found = align(&points, surroundings.around(&map, &predicted.pose), &predicted);
-        let jacobian = pose.compose_jacobian_first(&step);
-        let position = predicted.position_deviation.powi(2);
-        let by_step = nalgebra::Vector3::new(position, position, predicted.heading_deviation.powi(2));
-        covariance = jacobian * covariance * jacobian.transpose() + Matrix3::from_diagonal(&by_step);
-        covariance = corrected(covariance, found.as_ref());
-        pose = found.map_or(predicted.pose, |found| found.pose);
-        claims.push(claim(&pose, &covariance));
-    }
-    claims
-}
-
-/// By what the covariance of a match is multiplied that takes points as independent.
-const INFLATION: f64 = 3.0;
-
-/// The covariance behind a match: what it says nothing of stays as it was predicted. What was known before of the rest is not
-/// counted: it came from the same map.
-fn corrected(predicted: Matrix3<f64>, found: Option<&ContourMatch>) -> Matrix3<f64> {
-    let Some(found) = found else { return predicted };
-    let information = found.information / INFLATION;
-    let Some(axis) = found.free_axis else { return information.try_inverse().unwrap_or(predicted) };
-    // Along the free axis what was predicted holds.
-    let (x, y) = (f64::from(axis.x), f64::from(axis.y));
-    let along = nalgebra::Vector3::new(x, y, 0.0);
-    let variance = (along.transpose() * predicted * along).x.max(1e-12);
-    (information + along * along.transpose() / variance).try_inverse().unwrap_or(predicted)
-}
-
-/// A pose as the vehicle tells it.
-fn claim(pose: &Pose, covariance: &Matrix3<f64>) -> PoseOutput {
-    let [xx, xy, yy] = [covariance.m11, covariance.m12, covariance.m22];
-    let entries = [xx, xy, yy, covariance.m13, covariance.m23, covariance.m33];
-    PoseOutput {
-        time: agv_core::measurement::Time::default(),
-        pose: *pose,
-        covariance: entries,
-        mode: Mode::Features,
-        reason: Reason::None,
-        dead_reckoning_distance: 0.0,
-        correction: 0.0,
-        smooth: *pose,
-        level: fault_free(&entries),
-        acceptance: 1.0,
-        normalised_square: 2.0,
-        resets: 0,
-        last_reset: 0.0,
-        overflows: 0,
-    }
+/// What the vehicle says of the pose of its laser at each scan.
+fn localise_window(
+    drive: &OfficeDrive,
+    (first, last): (usize, usize),
+    map: &ContourMap,
+    noise: &OdometryNoise,
+) -> Result<Vec<PoseOutput>, ReplayError> {
+    let recording = drive.recording((first, last), drive.steps((first, last)), noise);
+    let replay = replay_in(&recording, map.view().ok(), |_| {})?;
+    let is_scan = |(event, _): &(&RecordedEvent, &PoseOutput)| matches!(event, RecordedEvent::Scan(_));
+    Ok(recording.events.iter().zip(&replay.poses).filter(is_scan).map(|(_, pose)| *pose).collect())
 }

@@ -22,7 +22,7 @@ pub(super) fn follow(drive: &OfficeDrive, (first, _): (usize, usize), steps: &[P
     let mut pose = drive.truth[first];
     let mut see = |matcher: &mut ContourMatcher, scan: usize| {
         points.set(&drive.scans[scan].view(), RANGES.0, RANGES.1);
-        matcher.see(&points);
+        matcher.see(points.view());
     };
     see(&mut matcher, first);
     matcher.keep(&pose);

@@ -124,4 +124,6 @@ pub enum Refusal {
     Pose,
     /// The flash does not keep it.
     Store(StoreError),
+    /// The CAN bus would be loaded by more than 60 % of its bit rate.
+    BusLoad,
 }

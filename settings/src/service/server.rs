@@ -203,6 +203,7 @@ fn perform<F: NorFlash>(
             leaf.change(&mut controller.settings, value).map_err(|error| match error {
                 LeafError::Kind => Refusal::Kind,
                 LeafError::Bounds => Refusal::Bounds,
+                LeafError::BusLoad => Refusal::BusLoad,
             })?;
             return Ok(Action::None);
         }

@@ -140,6 +140,9 @@ pub fn changed(share: f64) -> Settings {
         // Settings of any two shares go together.
         let share = if leaf.name == "features.nearest" { 0.1 * share } else { share };
         let value = match leaf.get(&settings).unwrap() {
+            // There are five bit rates, and on the lower ones there is no room for everything.
+            Value::Whole(_) if leaf.name == "can.bit_rate" => Value::Whole(if share < 0.5 { 800 } else { 1000 }),
+            Value::Whole(_) if leaf.name.ends_with("_profile") => Value::Whole(402),
             Value::Number(_) => Value::Number(least + share * (most - least)),
             Value::Whole(_) => Value::Whole((least + share * (most - least)) as u64),
             Value::Switch(is_on) => Value::Switch(is_on == (share < 0.5)),

@@ -18,6 +18,8 @@ pub struct Board {
     pub feature: &'static str,
     /// Binaries that are built for it.
     pub images: &'static [&'static str],
+    /// Most flash of an image, bytes.
+    pub flash: u64,
     /// Its RAM.
     pub ram: &'static [Region],
 }
@@ -43,13 +45,16 @@ impl Region {
 pub const AN500: Board = Board {
     feature: "an500",
     images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
+    flash: 512 * 1024,
     ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 368 * 1024 }],
 };
 
-/// The vehicle's board, a Nucleo-H743ZI. The stack has the DTCM for itself.
+/// The vehicle's board, a Nucleo-H743ZI. The stack has the DTCM for itself, and the program the first bank of flash, of which a
+/// tenth is left.
 pub const H743: Board = Board {
     feature: "h743",
     images: &["vehicle"],
+    flash: 1024 * 1024 / 10 * 9,
     ram: &[
         Region::of_chip("AXI", 0x2400_0000, 512 * 1024),
         Region::of_chip("D2", 0x3000_0000, 128 * 1024),

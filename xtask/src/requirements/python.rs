@@ -20,7 +20,7 @@ const CHIP: [Package; 2] = [
 /// It asks for an older `rosbags` than others do, and works without; so it is installed before them.
 const OUSTER: Package = ("ouster-sdk>=1,<2", "ouster.sdk");
 
-const PACKAGES: [Package; 13] = [
+const PACKAGES: [Package; 14] = [
     CHIP[0],
     CHIP[1],
     ("numpy>=1.24,<3", "numpy"),
@@ -28,6 +28,8 @@ const PACKAGES: [Package; 13] = [
     ("shapely>=2,<3", "shapely"),
     ("cantools>=39,<50", "cantools"),
     ("canopen>=2.2,<3", "canopen"),
+    // Says whether the description file of the controller's node is one.
+    ("eds-utils>=0.3.1,<1", "eds_utils"),
     ("mcap>=1.2,<2", "mcap"),
     ("mcap-ros2-support>=0.5,<1", "mcap_ros2"),
     ("rosbags>=0.10,<1", "rosbags"),

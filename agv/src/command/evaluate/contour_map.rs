@@ -46,7 +46,7 @@ impl ContourMap {
         let drive = self.drive.read()?;
         let bar = progress::spinner().with_message("driving");
         bar.tick();
-        let (accuracies, poses) = localise(&drive, self.length, self.cell);
+        let (accuracies, poses) = localise(&drive, self.length, self.cell)?;
         bar.finish_and_clear();
         anyhow::ensure!(!poses.is_empty(), "no window of the drive is covered by a map of the rest of it");
         if let Some(path) = &self.trajectory {

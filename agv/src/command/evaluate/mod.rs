@@ -5,6 +5,7 @@ mod carpark;
 mod contour_map;
 mod falko;
 mod features;
+mod gyro;
 mod halting_points;
 mod kidnapping;
 mod lidar3d_calibration;
@@ -53,6 +54,7 @@ enum Experiment {
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
     Features(features::Features),
+    Gyro(gyro::Gyro),
     Kidnapping(kidnapping::Kidnapping),
     Places(places::Places),
     Slam(slam::Slam),
@@ -75,6 +77,7 @@ impl Evaluate {
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
             Experiment::Features(experiment) => experiment.run(),
+            Experiment::Gyro(experiment) => experiment.run(),
             Experiment::Kidnapping(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),

@@ -9,13 +9,15 @@ use crate::measurement::Time;
 /// Landmarks that one solution leaves out.
 pub const TOGETHER: usize = 8;
 
-/// What is left out together: each reflector alone, and all natural features, which one map and one detector tell.
+/// What is left out together: each reflector alone, all natural features, which one map and one detector tell, and all contours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LandmarkKey {
     /// A reflector of the fixed map.
     Reflector(u16),
     /// All natural features.
     Features,
+    /// All contours.
+    Contours,
 }
 
 /// Some landmarks are not where the map has them: a solution that has not used them since they came in sight.
@@ -57,7 +59,7 @@ pub struct FreeSince {
     /// How well it fits.
     pub fit: Fit,
     /// Whether the place of the laser is free and the heading has not been found yet.
-    pub has_crooked_arm: bool,
+    pub awaits_heading: bool,
     /// The solution.
     pub solution: Solution,
 }
@@ -106,7 +108,7 @@ impl FreeSince {
             driven: 0.0,
             is_needed: false,
             fit: Fit { mean: 0.0 },
-            has_crooked_arm: false,
+            awaits_heading: false,
             solution,
         }
     }
@@ -116,8 +118,8 @@ impl FreeSince {
     /// places until then is forgotten.
     pub fn correct(&mut self, told: &SensorInformation, laser: &Laser) -> bool {
         let square = self.solution.correct(told, laser);
-        if self.has_crooked_arm && self.solution.is_heading_sure() {
-            self.has_crooked_arm = false;
+        if self.awaits_heading && self.solution.is_heading_sure() {
+            self.awaits_heading = false;
             self.solution.forget_places();
         }
         self.fit.refutes(square)

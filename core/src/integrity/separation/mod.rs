@@ -7,6 +7,7 @@
 
 mod assumed;
 mod contradiction;
+mod gyro;
 mod hypothesis;
 mod misfit;
 mod sensor_information;
@@ -17,15 +18,17 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, fault_free};
 use contradiction::Contradiction;
+use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
+use solution::FREE_POSITION;
 pub use solution::{Laser, Solution, Step};
 
 use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
-use crate::odometry::{BiasJacobian, Motion};
+use crate::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion};
 use crate::state::ProtectionLevel;
 
 /// Solutions without landmarks, and with a knock in an interval.
@@ -51,8 +54,8 @@ const WEAR: (f64, f64) = (6e-5, 1e-5);
 const CHANGE: [f64; 3] = [0.02, 0.01, 0.02];
 /// The errors of the map are found from events that tell the position this well, m; others hardly move the solutions.
 const WELL_SEEN: f64 = 0.03;
-/// Covariance of a pose of which it is known only about where it is: 1 m and 20 deg.
-const UNKNOWN_POSE: [f64; 6] = [1.0, 0.0, 1.0, 0.0, 0.0, 0.122];
+/// Covariance of a pose of which it is known only about where it is, within [`FREE_POSITION`] and 20 deg.
+const UNKNOWN_POSE: [f64; 6] = [FREE_POSITION * FREE_POSITION, 0.0, FREE_POSITION * FREE_POSITION, 0.0, 0.0, 0.122];
 /// Solutions go on at least once in this distance, m.
 const LONGEST_STEP: f64 = 0.3;
 
@@ -93,6 +96,8 @@ pub struct SolutionSeparation {
     /// Whether the corrections say that the laser has moved.
     is_laser_doubted: bool,
     odometry: Solution,
+    /// Of a vehicle with a gyro.
+    gyro: Option<GyroSeparation>,
     told: SensorInformation,
     contradiction: Contradiction,
     misfit: Misfit,
@@ -108,8 +113,15 @@ impl SolutionSeparation {
     /// one.
     #[must_use]
     pub fn new(assumed: AssumedDeviations, steering_lever: Option<f64>) -> Self {
+        Self::with_gyro(assumed, steering_lever, None)
+    }
+
+    /// The same of a vehicle whose turns that gyro tells, if it is fitted. It is made in one piece, as it is large.
+    #[must_use]
+    pub fn with_gyro(assumed: AssumedDeviations, steering_lever: Option<f64>, gyro: Option<&GyroParameters>) -> Self {
         let nowhere = Solution::new(Pose::default(), &[0.0; 6], &assumed);
         Self {
+            gyro: gyro.filter(|gyro| gyro.is_fitted).map(|gyro| GyroSeparation::new(gyro, &assumed)),
             assumed,
             steering_lever,
             time: Time::default(),
@@ -137,17 +149,54 @@ impl SolutionSeparation {
         }
     }
 
+    /// What is assumed of solutions that begin.
+    fn assumed(&self) -> &AssumedDeviations {
+        self.gyro.as_ref().map_or(&self.assumed, GyroSeparation::assumed)
+    }
+
+    /// What is believed of the gyro has changed by so much; its bias is known to so many rad/s, `prior` at most.
+    pub fn rebase_gyro(&mut self, change: &GyroErrors, bias: f64, prior: f64) {
+        let Some(gyro) = &mut self.gyro else { return };
+        gyro.know(bias, prior);
+        if *change == GyroErrors::default() {
+            return;
+        }
+        for solution in self.solutions() {
+            solution.rebase_odometry(change.bias, change.scale);
+        }
+    }
+
+    /// The bias of the gyro is about what is believed, with that deviation, rad/s, and nothing that was learnt holds.
+    pub fn free_gyro_bias(&mut self, deviation: f64) {
+        if self.gyro.is_some() {
+            for solution in self.solutions() {
+                solution.free_steering(deviation);
+            }
+        }
+    }
+
+    /// The bias of the gyro was seen at rest: so much beside what is believed, rad/s, with that variance.
+    pub fn see_rest(&mut self, bias: f64, variance: f64) {
+        if self.gyro.is_some() {
+            for solution in self.solutions() {
+                solution.see_steering(bias, variance);
+            }
+        }
+    }
+
     /// Begins at a pose of W that was given, with that covariance, or begins anew: who was carried is where the given pose has
     /// it, but if the laser was knocked instead, the solutions that allow for a knock still hold. `odometry_pose` is where the
     /// odometry has the vehicle now.
     pub fn begin(&mut self, time: Time, pose: &Pose, covariance: &[f64; 6], odometry_pose: &Pose) {
-        self.all = Solution::new(*pose, covariance, &self.assumed);
+        self.all = Solution::new(*pose, covariance, self.assumed());
+        if let Some(gyro) = &mut self.gyro {
+            gyro.begin(pose, covariance, &self.assumed);
+        }
         self.creeping = self.all.clone();
         if !self.creeps_fast {
             self.fast_creeping = self.all.clone();
         }
-        self.odometry = self.all.clone();
-        self.odometry.free_odometry();
+        self.restart_odometry();
         self.leave_outs.clear();
         if self.mounting.is_none() {
             self.mounting = Some(self.free_mounting(time));
@@ -163,11 +212,10 @@ impl SolutionSeparation {
         self.rest_on(pose, 1.0);
     }
 
-    /// The map has contradicted the pose at `now`, and nobody knows why: mounting or clock of the laser may be others since then, so
-    /// they are free again, and that counts at once, until a turn has shown them.
-    /// To be called behind [`Self::begin`].
-    pub fn doubt_mounting(&mut self, now: Time) {
-        self.mounting = Some(FreeSince { is_needed: true, ..self.free_mounting(now) });
+    /// The map has contradicted the pose before [`Self::begin`], and nobody knows why: mounting or clock of the laser may be others
+    /// since then, so they are free again, and that counts at once, until a turn has shown them.
+    pub fn doubt_mounting(&mut self) {
+        self.mounting = Some(FreeSince { is_needed: true, ..self.free_mounting(self.time) });
         self.next_mounting = None;
         let pose = self.pose;
         self.rest_on(&pose, self.surprise);
@@ -180,21 +228,35 @@ impl SolutionSeparation {
 
     /// What was wrong before may have been learnt as something else; so nothing is kept but about where the vehicle is.
     fn free_mounting(&self, since: Time) -> FreeSince {
-        let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
+        let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, self.assumed());
         solution.free_mounting();
         solution.free_clock();
-        FreeSince { has_crooked_arm: true, ..FreeSince::new(since, solution) }
+        FreeSince { awaits_heading: true, ..FreeSince::new(since, solution) }
     }
 
     /// A laser that was turned before has shown a wrong heading.
     fn free_yaw(&self, since: Time) -> FreeSince {
-        let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, &self.assumed);
+        let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, self.assumed());
         solution.free_yaw();
         FreeSince::new(since, solution)
     }
 
+    /// Begins the solution with an odometry that changes. The turns of a gyro are none of the wheels' errors.
+    fn restart_odometry(&mut self) {
+        self.odometry = self.all.clone();
+        if self.gyro.is_some() { self.odometry.free_scale() } else { self.odometry.free_odometry() }
+    }
+
     /// Takes a motion of the odometry; `odometry_pose` is where it has led to.
     pub fn travel(&mut self, motion: &Motion, odometry_pose: &Pose) {
+        self.travel_by_gyro(motion, None, odometry_pose);
+    }
+
+    /// The same for a motion of which a gyro has told the turn; `wheels` is what the wheels have told, none if they were believed.
+    pub fn travel_by_gyro(&mut self, motion: &Motion, wheels: Option<&Motion>, odometry_pose: &Pose) {
+        if let Some(gyro) = &mut self.gyro {
+            self.pending.covariance.m33 += gyro.travel(motion, wheels, &self.assumed);
+        }
         self.pending.covariance += motion.covariance;
         self.pending.distance += motion.distance;
         self.pending.last = Some(*motion);
@@ -212,8 +274,12 @@ impl SolutionSeparation {
         let step = Step {
             displacement,
             covariance: self.pending.covariance,
-            by_bias: BiasJacobian::of(&displacement, self.steering_lever),
+            by_bias: match &self.gyro {
+                Some(gyro) => gyro.jacobian(&displacement),
+                None => BiasJacobian::of(&displacement, self.steering_lever),
+            },
         };
+        let passed = now.since(self.time);
         let lasted = distance.max(0.5 * now.since(self.time).max(0.0));
         let wear = [WEAR.0, WEAR.1].map(|deviation| deviation * deviation * lasted);
         let creep = [CREEP.0, CREEP.1].map(|deviation| deviation * deviation * lasted);
@@ -221,6 +287,14 @@ impl SolutionSeparation {
             solution.predict(&step);
             let [place, yaw] = wear;
             solution.loosen_mounting(place, yaw);
+        }
+        if let Some(gyro) = &mut self.gyro {
+            let drift = gyro.step(&displacement, self.steering_lever, passed);
+            let [place, yaw] = wear;
+            gyro.alone_mut().loosen_mounting(place, yaw);
+            for solution in self.solutions() {
+                solution.loosen_odometry(&[0.0, drift, 0.0]);
+            }
         }
         let [place, yaw] = creep;
         self.creeping.loosen_mounting(place, yaw);
@@ -276,8 +350,12 @@ impl SolutionSeparation {
 
     /// Takes a landmark that fits the pose.
     pub fn see(&mut self, key: LandmarkKey, seen: &Seen, laser: &Laser) {
+        self.take(key, SensorInformation::of(seen, &laser.sensor));
+    }
+
+    /// Takes what fits the pose and is left out together with all that has the same key.
+    pub fn take(&mut self, key: LandmarkKey, told: SensorInformation) {
         let Some(place) = self.place_of(key) else { return };
-        let told = SensorInformation::of(seen, &laser.sensor);
         self.contradiction.fit();
         self.told = self.told.with(&told);
         if let Some(one) = self.leave_outs.get_mut(place) {
@@ -341,11 +419,13 @@ impl SolutionSeparation {
         }
         self.creeping.correct(&told, laser);
         self.correct_fast_creeping(&told, laser);
-        self.odometry.loosen_odometry(&CHANGE.map(|deviation| deviation * deviation * self.unseen.0));
+        let [scale, steering, turn] = CHANGE.map(|deviation| deviation * deviation * self.unseen.0);
+        let change = if self.gyro.is_some() { [scale, 0.0, 0.0] } else { [scale, steering, turn] };
+        self.odometry.loosen_odometry(&change);
         if is_refuted(self.odometry.correct(&told, laser)) {
-            self.odometry = self.all.clone();
-            self.odometry.free_odometry();
+            self.restart_odometry();
         }
+        self.correct_wheels_alone(&told, laser);
         self.knocks.retain_mut(|knock| {
             if !knock.is_over {
                 knock.solution.free_mounting();
@@ -357,6 +437,14 @@ impl SolutionSeparation {
         });
         self.correct_free(&told, laser);
         self.unseen = (0.0, 0.0);
+    }
+
+    fn correct_wheels_alone(&mut self, told: &SensorInformation, laser: &Laser) {
+        let Some(gyro) = &mut self.gyro else { return };
+        if is_refuted(gyro.alone_mut().correct(told, laser)) {
+            let pose = *self.all.pose();
+            gyro.begin(&pose, &self.all.entries(), &self.assumed);
+        }
     }
 
     /// Opens the next interval if none is open.
@@ -431,6 +519,7 @@ impl SolutionSeparation {
             .chain(fast_creep)
             .chain(self.leave_outs.iter().map(|one| &one.solution))
             .chain(self.knocks.iter().map(|one| &one.solution))
+            .chain(self.gyro.as_ref().map(GyroSeparation::alone))
             .chain(found_mounting.into_iter().chain(found_yaw).map(|one| &one.solution))
             .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
                 level.or(&solution.bound(pose, &one_fault, self.map_variances))

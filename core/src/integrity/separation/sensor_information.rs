@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use crate::geometry::{Point, Pose, larger_axis};
+use crate::geometry::{Point, Pose, difference, larger_axis};
 
 /// Below this information, of a metre or of a radian, a direction is not seen.
 const LEAST: f64 = 1e-3;
@@ -62,6 +62,19 @@ impl SensorInformation {
             square: residual.dot(&(weight * residual)),
             numbers: 2.0,
         }
+    }
+
+    /// What a whole pose of the laser says of one that is about at `sensor` in W: `covariance` is its own, of x, y (m) and heading
+    /// (rad), and `shared` what of it are errors of the map.
+    #[must_use]
+    pub fn of_pose(pose: &Pose, covariance: &Matrix3<f64>, shared: &[f64; 3], sensor: &Pose) -> Self {
+        let Some(matrix) = covariance.try_inverse() else { return Self::NONE };
+        let residual = Vector3::new(pose.x - sensor.x, pose.y - sensor.y, difference(pose.theta, sensor.theta));
+        let vector = matrix * residual;
+        let by_map = matrix * Matrix3::from_diagonal(&Vector3::from(*shared)) * matrix;
+        let told = Self { matrix, vector, by_map, square: residual.dot(&vector), numbers: 0.0 };
+        // It contradicts itself nowhere.
+        Self { numbers: told.told().iter().flatten().count() as f64, ..told }
     }
 
     /// With more landmarks.

@@ -62,9 +62,10 @@ const MOUNTING: usize = 3;
 const YAW: usize = 5;
 const CLOCK: usize = 6;
 const ODOMETRY: usize = 7;
+const STEERING: usize = 8;
 
 /// Deviations of what is free: position of R, m; place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
-const FREE_POSITION: f64 = 1.0;
+pub const FREE_POSITION: f64 = 1.0;
 const FREE_PLACE: f64 = 0.6;
 const FREE_YAW: f64 = 0.175;
 const FREE_CLOCK: f64 = 0.2;
@@ -239,6 +240,37 @@ impl Solution {
         self.forget(ODOMETRY, &FREE_ODOMETRY);
     }
 
+    /// The scale may be anything.
+    pub fn free_scale(&mut self) {
+        let [scale, ..] = FREE_ODOMETRY;
+        self.forget(ODOMETRY, &[scale]);
+    }
+
+    /// Nothing is known of the second error of the odometry but that it is about what is believed, with that deviation.
+    pub fn free_steering(&mut self, deviation: f64) {
+        self.forget(STEERING, &[deviation]);
+        self.lasting.steering = 0.0;
+    }
+
+    /// What is believed of the second and third error of the odometry has changed by so much: they are beside that.
+    pub fn rebase_odometry(&mut self, steering: f64, turn: f64) {
+        self.lasting.steering -= steering;
+        self.lasting.turn -= turn;
+    }
+
+    /// Something says what the second error of the odometry is, with that variance.
+    pub fn see_steering(&mut self, value: f64, variance: f64) {
+        let shares = self.covariance.data.0.get(STEERING).map_or_else(States::zeros, |column| States::from(*column));
+        let innovation_variance = shares.get(STEERING).copied().unwrap_or_default() + variance;
+        if innovation_variance <= 0.0 {
+            return;
+        }
+        let weight = 1.0 / innovation_variance;
+        let change = shares * ((value - self.lasting.steering) * weight);
+        subtract(&mut self.covariance, &shares, weight);
+        (self.pose, self.lasting) = shifted((&self.pose, &self.lasting), &change);
+    }
+
     /// The laser may have moved by so much, m^2 and rad^2.
     pub fn loosen_mounting(&mut self, place: f64, yaw: f64) {
         self.loosen(MOUNTING, &[place, place, yaw]);
@@ -346,6 +378,13 @@ impl Solution {
     pub fn variances(&self) -> (f64, f64) {
         let at = |row: usize, column: usize| self.covariance.get((row, column)).map_or(0.0, |entry: &f64| *entry);
         (not_negative(larger_axis(at(0, 0), at(0, 1), at(1, 1))), not_negative(at(2, 2)))
+    }
+
+    /// Covariance of the pose in W: xx, xy, yy, x heading, y heading, heading; m and rad.
+    #[must_use]
+    pub fn entries(&self) -> [f64; 6] {
+        let of = self.pose_covariance();
+        [of.m11, of.m12, of.m22, of.m13, of.m23, of.m33]
     }
 
     fn pose_covariance(&self) -> Matrix3<f64> {

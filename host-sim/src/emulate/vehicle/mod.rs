@@ -74,6 +74,8 @@ pub fn settings_like(recording: &Recording, laser_port: u16) -> Settings {
     settings.network.gateway = board::HOST;
     settings.network.laser = board::HOST;
     settings.network.laser_port = laser_port;
+    // It is told on the bus where it starts.
+    settings.nodes.accepts_pose = true;
     settings
 }
 

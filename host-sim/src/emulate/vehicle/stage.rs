@@ -5,7 +5,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::Event;
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_settings::Settings;
@@ -19,6 +18,7 @@ use crate::bus::{Bus, SlcanBus};
 use crate::emulate::board::{Board, BoardError};
 use crate::emulate::encoder_pair::EmulatedPair;
 use crate::emulate::foreign_traffic::ForeignTraffic;
+use crate::emulate::gyro::EmulatedGyro;
 use crate::recording::{Recording, truth_at};
 use crate::serve::nav350::Nav350;
 
@@ -52,6 +52,7 @@ struct Play<'a> {
     bus: SlcanBus,
     controller: NodeId,
     pair: EmulatedPair,
+    gyro: Option<EmulatedGyro>,
     receiver: PoseReceiver,
     foreign: ForeignTraffic,
     /// Frames of other nodes that there is time for.
@@ -97,9 +98,6 @@ impl Stage<'_> {
             }
             play.answer()?;
             if play.end.is_some() {
-                if self.trouble.is_pose_told.swap(false, Ordering::Relaxed) {
-                    play.tell_pose()?;
-                }
                 continue;
             }
             if self.mode().is_some_and(|mode| mode == Mode::Reflectors || mode == Mode::Mixed) {
@@ -125,6 +123,7 @@ impl Stage<'_> {
             bus,
             controller,
             pair: EmulatedPair::new(self.recording, node(nodes.drive), node(nodes.steering))?.standing(),
+            gyro: EmulatedGyro::of(self.recording, &self.settings.gyro_frame),
             receiver: PoseReceiver::new(controller),
             foreign: ForeignTraffic::new(1, &own),
             foreign_due: 0.0,
@@ -192,7 +191,11 @@ impl Play<'_> {
     }
 
     fn send_sensors(&mut self) -> Result<(), BoardError> {
-        for frame in self.pair.poll(self.now()) {
+        let now = self.now();
+        for frame in self.pair.poll(now) {
+            self.send_sensor_frame(&frame)?;
+        }
+        for frame in self.gyro.iter_mut().flat_map(|gyro| gyro.poll(now)).collect::<Vec<_>>() {
             self.send_sensor_frame(&frame)?;
         }
         Ok(())
@@ -256,13 +259,14 @@ impl Play<'_> {
         let stage = self.stage;
         let begin = Instant::now() + LEAD;
         stage.sensor.begin(begin);
-        let first_sample = stage.recording.events.iter().find_map(|event| match event.view() {
-            Event::Encoders(sample) => Some(sample.time),
-            _ => None,
-        });
+        let first_sample =
+            stage.recording.events.iter().find(|event| event.is_odometry()).and_then(|event| event.time());
         let shift = first_sample.map_or(0.0, |time| time.since(stage.first));
         let now = self.now();
         self.pair.begin(now.offset(LEAD.as_secs_f64() + shift));
+        if let Some(gyro) = &mut self.gyro {
+            gyro.begin(now.offset(LEAD.as_secs_f64() + shift));
+        }
         stage.heard().begin = Some(begin);
         self.end = Some(begin + Duration::from_secs_f64(seconds.min(self.pair.duration())));
     }

@@ -38,8 +38,6 @@ pub struct BusTrouble {
     pub foreign: AtomicU32,
     /// How many of them were sent.
     pub foreign_sent: AtomicU32,
-    /// Whether somebody is about to tell the vehicle where it is; off again when that was done.
-    pub is_pose_told: AtomicBool,
 }
 
 /// What is known of a drive while it goes on.

@@ -1,7 +1,10 @@
 //! What the localiser believes of the vehicle of a scenario.
 
 use agv_core::localizer::Parameters;
-use agv_core::odometry::{Ackermann, CounterRange, Tricycle, Vehicle};
+use agv_core::odometry::{
+    Ackermann, AngleEncoder, BiSteerable, CounterRange, Differential, DrivenWheel, GyroParameters, Omnidirectional,
+    SteeredWheel, Tricycle, Vehicle, WheelVehicle,
+};
 
 use super::{MotionReport, Scenario};
 
@@ -15,8 +18,21 @@ pub fn believed_parameters(scenario: &Scenario) -> Parameters {
             Vehicle::Ackermann(Ackermann { wheelbase: believed.wheelbase, encoder_offset: believed.encoder_offset })
         }
         MotionReport::Increments => Vehicle::Increments,
+        MotionReport::Differential | MotionReport::BiSteerable | MotionReport::Omnidirectional => {
+            believed_wheels(scenario).map_or(Vehicle::Increments, Vehicle::Wheels)
+        }
     };
-    Parameters::new(vehicle, scenario.laser.mounting.pose())
+    let gyro = &scenario.gyro;
+    let mut parameters = Parameters::new(vehicle, scenario.laser.mounting.pose());
+    if gyro.fitted {
+        parameters.gyro = GyroParameters {
+            is_fitted: true,
+            latency: gyro.middle_latency(),
+            range: gyro.range_deg.to_radians(),
+            ..GyroParameters::default()
+        };
+    }
+    parameters
 }
 
 /// The tricycle that the localiser believes in.
@@ -31,5 +47,35 @@ pub fn believed_tricycle(scenario: &Scenario) -> Tricycle {
         steering_range: CounterRange::new(believed.steering_counter).unwrap_or(CounterRange::BITS_32),
         steering_offset_forward: believed.steering_offset_forward_deg.to_radians(),
         steering_offset_backward: believed.steering_offset_backward_deg.to_radians(),
+    }
+}
+
+/// Radius of the wheels of a vehicle with several, m.
+const RADIUS: f64 = 0.1;
+
+/// The vehicle of several wheels that the localiser believes in; none if it is another one.
+#[must_use]
+pub fn believed_wheels(scenario: &Scenario) -> Option<WheelVehicle> {
+    let believed = &scenario.vehicle.believed;
+    let range = |values: u64| CounterRange::new(values).unwrap_or(CounterRange::BITS_32);
+    let turn = AngleEncoder { scale: believed.drive_scale / RADIUS, range: range(believed.drive_counter) };
+    let driven = DrivenWheel { radius: RADIUS, turn };
+    let scale = std::f64::consts::TAU / believed.steering_counter as f64;
+    let steering = AngleEncoder { scale, range: range(believed.steering_counter) };
+    let steered = |x: f64| SteeredWheel { x, y: 0.0, drive: driven, steering, steering_offset: 0.0 };
+    match scenario.vehicle.reports {
+        MotionReport::Encoders | MotionReport::Speed | MotionReport::Increments => None,
+        MotionReport::Differential => {
+            Some(WheelVehicle::Differential(Differential { track: believed.track, left: driven, right: driven }))
+        }
+        MotionReport::BiSteerable => {
+            let half = 0.5 * believed.wheelbase;
+            Some(WheelVehicle::BiSteerable(BiSteerable { front: steered(half), rear: steered(-half) }))
+        }
+        MotionReport::Omnidirectional => Some(WheelVehicle::FourOmnidirectional(Omnidirectional {
+            arm: 0.5 * believed.track,
+            first: std::f64::consts::FRAC_PI_4,
+            driven: [driven; 4],
+        })),
     }
 }

@@ -35,7 +35,7 @@ const SECONDS: [f64; 2] = [0.0, 86_400.0];
 const SIZE: [f64; 2] = [0.0, 1000.0];
 
 /// Every key that holds numbers.
-pub const KEYS: [Key; 90] = [
+pub const KEYS: [Key; 107] = [
     key("seed", "", SEED, "seed of all random numbers"),
     key("world.seed", "", SEED, "seed of dimensions and positions; the scenario's if absent"),
     key("world.moved_share", "", SHARE, "block storage: share of the pallets that have been moved"),
@@ -79,9 +79,16 @@ pub const KEYS: [Key; 90] = [
     key("vehicle.believed.steering_offset_forward_deg", "deg", TURN, "steering offset forward"),
     key("vehicle.believed.steering_offset_backward_deg", "deg", TURN, "steering offset backward"),
     key("vehicle.believed.encoder_offset", "m", [-20.0, 20.0], "car: the wheel with the speed sensor, to the left"),
+    key("vehicle.believed.track", "m", [0.05, 50.0], "distance of two wheels side by side, or opposite each other"),
     key("vehicle.true.drive_scale_error", "", [-0.999, 0.999], "true way a tick over the believed one, minus one"),
     key("vehicle.true.steering_offset_error_deg", "deg", TURN, "true steering offset minus the believed one"),
     key("vehicle.true.steering_offset_backward_error_deg", "deg", TURN, "what is added to that backward"),
+    key(
+        "vehicle.true.wheel_difference",
+        "",
+        [-0.5, 0.5],
+        "several wheels: radius of the left or front ones over the others, minus one",
+    ),
     key("vehicle.true.wheelbase_error", "m", [-50.0, 50.0], "true wheelbase minus the believed one"),
     key("vehicle.true.laser_error.x", "m", [-20.0, 20.0], "true mounting of the laser minus the believed one"),
     key("vehicle.true.laser_error.y", "m", [-20.0, 20.0], "the same"),
@@ -93,6 +100,21 @@ pub const KEYS: [Key; 90] = [
     key("odometry.leg_slip", "", SHARE, "slip that lasts for a leg, as a share of the way"),
     key("odometry.yaw_walk_deg", "deg/sqrt(m)", SPREAD_DEG, "walk of the heading"),
     key("odometry.side_slip", "m/sqrt(m)", SPREAD, "shift to the side"),
+    key("odometry.slips.from", "s", SECONDS, "when a wheel begins to slip, after the first event"),
+    key("odometry.slips.lasts", "s", SECONDS, "for how long"),
+    key("odometry.slips.share", "", [-1.0, 10.0], "what it turns too much, as a share of its way"),
+    key("odometry.slips.wheel", "", [0.0, 3.0], "which wheel, from 0; that of a tricycle drives"),
+    key("gyro.rate", "Hz", [1.0, 1000.0], "readings a second"),
+    key("gyro.noise_deg", "deg/s", SPREAD_DEG, "noise of a reading"),
+    key("gyro.bias_deg", "deg/s", SPREAD_DEG, "bias at the start"),
+    key("gyro.drift_deg_h", "deg/h", [0.0, 100_000.0], "what the bias walks in a minute"),
+    key("gyro.scale_error", "", [0.0, 0.5], "error of the scale; the seed chooses its sign"),
+    key("gyro.latency", "s", [0.0, 0.2], "from the end of a reading to when it is heard"),
+    key("gyro.range_deg", "deg/s", [1.0, 10_000.0], "largest rate that it tells"),
+    key("gyro.step_deg", "deg/s", [0.0, 10.0], "step of what it tells"),
+    key("gyro.faults.from", "s", SECONDS, "when something goes wrong with it, after the first event"),
+    key("gyro.faults.lasts", "s", SECONDS, "for how long"),
+    key("gyro.faults.jump_deg", "deg/s", [-100.0, 100.0], "by how much its bias is another one"),
     key("laser.mounting.x", "m", [-20.0, 20.0], "believed mounting, S in R"),
     key("laser.mounting.y", "m", [-20.0, 20.0], "the same"),
     key("laser.mounting.heading_deg", "deg", TURN, "the same"),
@@ -129,7 +151,7 @@ pub const KEYS: [Key; 90] = [
 ];
 
 /// What is chosen by a word or by yes and no: key, values, meaning.
-pub const CHOICES: [[&str; 3]; 17] = [
+pub const CHOICES: [[&str; 3]; 22] = [
     ["world.kind", "block_storage, warehouse_hall, shapes", "what stands where"],
     [
         "world.reflectors",
@@ -138,7 +160,11 @@ pub const CHOICES: [[&str; 3]; 17] = [
     ],
     ["path.kind", "p1, p2, p3, p4, mapping, hall_loop, legs", "the way"],
     ["path.legs.direction", "forward, backward", "sense of travel of a leg"],
-    ["vehicle.reports", "encoders, speed, increments", "what the vehicle reports of its motion"],
+    [
+        "vehicle.reports",
+        "encoders, speed, increments, differential, bi_steerable, omnidirectional",
+        "what the vehicle reports of its motion",
+    ],
     [
         "vehicle.true.random_signs",
         "true, false",
@@ -147,6 +173,11 @@ pub const CHOICES: [[&str; 3]; 17] = [
     ["vehicle.true.drive_reversed", "true, false", "a mistake: the driving wheel's encoder counts the wrong way"],
     ["vehicle.true.steering_reversed", "true, false", "a mistake: the steering's encoder counts the wrong way"],
     ["vehicle.true.encoders_swapped", "true, false", "a mistake: each encoder is taken for the other"],
+    ["odometry.slips", "list of tables", "when a wheel slips"],
+    ["gyro.fitted", "true, false", "whether the vehicle has a gyro"],
+    ["gyro.faults", "list of tables", "what goes wrong with the gyro"],
+    ["gyro.faults.frozen", "true, false", "whether it tells the same rate all the time"],
+    ["gyro.faults.silent", "true, false", "whether it tells nothing"],
     ["laser.scans", "true, false", "whether the localiser is given scans"],
     ["laser.intensities", "true, false", "whether strengths are reported"],
     ["laser.dirty_sectors", "list of tables", "where the window is dirty"],

@@ -5,6 +5,7 @@
 
 mod believed;
 mod check;
+mod gyro;
 pub mod keys;
 mod line;
 mod sensors;
@@ -13,10 +14,13 @@ mod vehicle;
 mod way;
 mod world;
 
-pub use believed::{believed_parameters, believed_tricycle};
+pub use believed::{believed_parameters, believed_tricycle, believed_wheels};
+pub use gyro::{GyroFault, GyroOptions};
 pub use sensors::{DirtySector, Knock, LaserOptions, ReflectorOptions};
 pub use start::{PersonOptions, StartOptions};
-pub use vehicle::{BelievedVehicle, Carry, DriveOptions, MotionReport, OdometryOptions, VehicleErrors, VehicleOptions};
+pub use vehicle::{
+    BelievedVehicle, Carry, DriveOptions, MotionReport, OdometryOptions, Slip, VehicleErrors, VehicleOptions,
+};
 pub use way::{PathKind, PathOptions, PoseOptions};
 pub use world::{CircleOptions, RectangleOptions, ReflectorShape, Shapes, WorldOptions};
 
@@ -111,6 +115,8 @@ pub struct Scenario {
     pub vehicle: VehicleOptions,
     /// Disturbances of the motion and noise of the encoders.
     pub odometry: OdometryOptions,
+    /// The gyro.
+    pub gyro: GyroOptions,
     /// The laser.
     pub laser: LaserOptions,
     /// Detection and survey of reflectors.

@@ -82,6 +82,12 @@ pub enum MotionReport {
     Speed,
     /// Displacements.
     Increments,
+    /// Counters of two driven wheels side by side.
+    Differential,
+    /// Counters of two wheels that steer and drive, one behind the other.
+    BiSteerable,
+    /// Counters of four omnidirectional wheels.
+    Omnidirectional,
 }
 
 /// What the localiser believes of the vehicle.
@@ -103,6 +109,8 @@ pub struct BelievedVehicle {
     pub steering_offset_backward_deg: f64,
     /// Distance of the wheel with the speed sensor to the left of the axis, m; for a car.
     pub encoder_offset: f64,
+    /// Distance of the driven wheels of a differential vehicle, and of opposite omnidirectional ones, m.
+    pub track: f64,
 }
 
 impl Default for BelievedVehicle {
@@ -115,6 +123,7 @@ impl Default for BelievedVehicle {
             steering_offset_forward_deg: 0.0,
             steering_offset_backward_deg: 0.0,
             encoder_offset: 0.0,
+            track: 0.8,
         }
     }
 }
@@ -129,6 +138,9 @@ pub struct VehicleErrors {
     pub steering_offset_error_deg: f64,
     /// What is added to that backward.
     pub steering_offset_backward_error_deg: f64,
+    /// Radius of a left wheel over that of a right one, of front over rear, minus one, of a vehicle with several; the seed chooses the
+    /// sign with that of the steering offset.
+    pub wheel_difference: f64,
     /// Whether the seed chooses the signs of the two errors above.
     pub random_signs: bool,
     /// True wheelbase minus the believed one, m.
@@ -149,6 +161,7 @@ impl Default for VehicleErrors {
             drive_scale_error: 0.002,
             steering_offset_error_deg: 0.05,
             steering_offset_backward_error_deg: 0.0,
+            wheel_difference: 5e-4,
             random_signs: true,
             wheelbase_error: 0.0,
             drive_reversed: false,
@@ -177,6 +190,32 @@ pub struct OdometryOptions {
     pub yaw_walk_deg: f64,
     /// Standard deviation of the shift to the side, m for the root of a metre.
     pub side_slip: f64,
+    /// When a wheel slips.
+    pub slips: Vec<Slip>,
+}
+
+/// A wheel slips for some time: it turns more than it goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Slip {
+    /// When it begins, s after the drive's first event.
+    pub from: f64,
+    /// How long it lasts, s.
+    pub lasts: f64,
+    /// What it turns too much, as a share of its way.
+    pub share: f64,
+    /// Which wheel, from 0.
+    #[serde(default)]
+    pub wheel: u8,
+}
+
+impl OdometryOptions {
+    /// What the wheel of that number turns too much at a time after the first event, as a share of its way.
+    #[must_use]
+    pub fn slip_of(&self, wheel: u8, time: f64) -> f64 {
+        let is_now = |slip: &&Slip| slip.wheel == wheel && (slip.from..slip.from + slip.lasts).contains(&time);
+        self.slips.iter().filter(is_now).map(|slip| slip.share).sum()
+    }
 }
 
 impl Default for OdometryOptions {
@@ -189,6 +228,7 @@ impl Default for OdometryOptions {
             leg_slip: 0.0,
             yaw_walk_deg: 0.02,
             side_slip: 0.5e-3,
+            slips: Vec::new(),
         }
     }
 }

@@ -91,6 +91,13 @@ pub struct ReflectorShape {
 }
 
 impl ReflectorShape {
+    /// One of the usual size that is seen from all directions.
+    #[must_use]
+    pub fn seen_all_round(x: f64, y: f64) -> Self {
+        let (radius, farthest) = (Self::standard_radius(), Self::standard_farthest());
+        Self { x, y, radius, farthest, facing_deg: None, half_width_deg: Self::standard_half_width() }
+    }
+
     fn standard_radius() -> f64 {
         0.04
     }

@@ -1,36 +1,17 @@
-//! A drive that is localised in a kept map of contours.
+//! The noise of an odometry, by what its scans say.
 
-use agv_core::contours::{ContourMatcher, KeptMap, KeptMapError, Prediction, Surroundings, align};
+use agv_core::contours::{ContourMatcher, Prediction};
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Localizer, MapUse, PoseOutput};
 use agv_core::measurement::Time;
 use agv_core::odometry::OdometryNoise;
 use agv_core::sensing::{PointScan, SensorPath};
-use agv_core::sources::ContourFix;
+use agv_core::state::PoseOutput;
 
-use super::contour_map::ContourMap;
 use super::known_poses::by_odometry;
 use crate::accuracy::quantile;
 use crate::import::{BEAMS, RANGES};
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
-use crate::replay::{Replay, ReplayError, replay, replay_aided};
-
-/// Why a drive cannot be localised in a map of contours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ContourReplayError {
-    /// The recording cannot be replayed.
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    /// The map is none.
-    #[error("the map of contours is not in order")]
-    Map,
-}
-
-impl From<KeptMapError> for ContourReplayError {
-    fn from(_: KeptMapError) -> Self {
-        Self::Map
-    }
-}
+use crate::replay::{ReplayError, replay};
 
 /// Places along the way during a revolution.
 const PATH_STEPS: u32 = 8;
@@ -67,55 +48,6 @@ impl OdometryPath<'_> {
     }
 }
 
-/// Localises a recording in a map, beside the landmarks that it uses anyhow. The state has no landmarks of its own then.
-///
-/// # Errors
-/// See [`ContourReplayError`].
-pub fn replay_in(
-    recording: &Recording,
-    map: &ContourMap,
-    progress: impl FnMut(usize),
-) -> Result<Replay, ContourReplayError> {
-    let map: KeptMap = map.view()?;
-    let mut surroundings: Box<Surroundings> = Box::default();
-    let mut matcher: Box<ContourMatcher<400, 1, 1>> = Box::default();
-    let mut points: Box<PointScan<BEAMS>> = Box::default();
-    let mut last: Option<Pose> = None;
-    let lasers = recording.parameters.lasers;
-    let aid = |localizer: &mut Localizer, event: &RecordedEvent, poses: &[PoseOutput]| {
-        let RecordedEvent::Scan(scan) = event else { return };
-        let Some(mount) = lasers.mount(scan.laser) else { return };
-        let odometry = OdometryPath(poses);
-        let now = localizer.outputs().pose;
-        let Some(smooth) = odometry.at(scan.start) else { return };
-        let predicted = now.pose.compose(&now.smooth.between(&smooth));
-        let step = last.map_or(Pose::default(), |last| last.between(&smooth));
-        odometry.points(scan, mount, &mut points);
-        matcher.see(&points);
-        let prediction =
-            Prediction { pose: predicted.compose(mount), ..Prediction::by_odometry(&Pose::default(), &step) };
-        let around = surroundings.around(&map, &prediction.pose);
-        let found = align(matcher.points(), around, &prediction);
-        if let Some(fix) = found.and_then(|found| ContourFix::new(scan.start, &found, mount)) {
-            localizer.aid(&fix);
-        }
-        last = Some(smooth);
-    };
-    Ok(replay_aided(recording, progress, aid)?)
-}
-
-/// Prepares the parameters of a recording for [`replay_in`]: no landmarks in the state, and the noise of its odometry as
-/// the scans say it is.
-///
-/// # Errors
-/// If the recording cannot be replayed.
-pub fn prepare(recording: &mut Recording) -> Result<OdometryNoise, ReplayError> {
-    let noise = odometry_noise(recording)?;
-    recording.parameters.maps = MapUse { slam: false, dynamic: false, ..recording.parameters.maps };
-    recording.parameters.odometry_noise = noise;
-    Ok(noise)
-}
-
 /// Steps shorter than this say nothing of the noise, m.
 const LEAST_WAY: f64 = 0.05;
 
@@ -145,7 +77,7 @@ pub fn odometry_noise(recording: &Recording) -> Result<OdometryNoise, ReplayErro
         }
         let (mount, Some(smooth)) = (recording.parameters.lasers.first(), path.at(scan.start)) else { continue };
         path.points(scan, mount, &mut points);
-        matcher.see(&points);
+        matcher.see(points.view());
         let laser = smooth.compose(mount);
         let mut pose = laser;
         if let Some((before, found_before)) = last {

@@ -1,0 +1,93 @@
+//! `agv evaluate gyro`.
+
+use agv_lab::evaluate::gyro;
+
+use super::super::progress;
+
+const HELP: &str = "\
+Examples:
+  agv evaluate gyro
+  agv evaluate gyro --drives 20 --seed 7 --json";
+
+/// How much heading a simulated vehicle loses on 12 m without landmarks, with a gyro and without, and how soon it tells a wheel
+/// that slips.
+#[derive(clap::Args)]
+#[command(after_help = HELP)]
+pub struct Gyro {
+    /// Drives of each kind.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    drives: u32,
+    /// First seed.
+    #[arg(long, default_value_t = 100_000)]
+    seed: u64,
+    /// JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The word of a value in JSON.
+fn word(value: impl serde::Serialize) -> String {
+    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+impl Gyro {
+    /// Runs the command.
+    pub fn run(self) -> anyhow::Result<()> {
+        let bar = progress::bar("driving", gyro::drives(self.drives));
+        let outcome = gyro::run(self.drives, self.seed, || bar.inc(1))?;
+        bar.finish_and_clear();
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&outcome)?);
+            return Ok(());
+        }
+        println!("heading that is lost on 12 m without landmarks, deg");
+        println!(
+            "{:<13} {:<8} {:<9} {:<5} {:>7} {:>8} {:>8} {:>8} {:>10} {:>12} {:>12}",
+            "vehicle",
+            "before",
+            "way",
+            "gyro",
+            "drives",
+            "median",
+            "95 %",
+            "worst",
+            "its seed",
+            "beyond level",
+            "false alarms"
+        );
+        for row in &outcome.headings {
+            println!(
+                "{:<13} {:<8} {:<9} {:<5} {:>7} {:>8.3} {:>8.3} {:>8.3} {:>10} {:>12} {:>12}",
+                word(row.vehicle),
+                word(row.before),
+                word(row.way),
+                if row.has_gyro { "yes" } else { "no" },
+                row.drives,
+                row.median_deg,
+                row.mark_95_deg,
+                row.worst_deg,
+                row.worst_seed,
+                row.beyond_level,
+                row.false_alarms
+            );
+        }
+        println!("\nslip of a driven wheel by a fifth, without landmarks");
+        println!(
+            "{:<13} {:<9} {:>7} {:>6} {:>12} {:>10} {:>12}",
+            "vehicle", "way", "drives", "told", "after, m", "its seed", "beyond level"
+        );
+        for row in &outcome.slips {
+            println!(
+                "{:<13} {:<9} {:>7} {:>6} {:>12.3} {:>10} {:>12}",
+                word(row.vehicle),
+                word(row.way),
+                row.drives,
+                row.told,
+                row.longest_m,
+                row.worst_seed,
+                row.beyond_level
+            );
+        }
+        Ok(())
+    }
+}

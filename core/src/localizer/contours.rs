@@ -1,0 +1,76 @@
+//! Correcting the pose by the contours of a kept map: a scan is used as a whole, at the time of its middle.
+
+use super::{Capacities, Localizer};
+use crate::filter::{Ekf, PoseObservation};
+use crate::geometry::Pose;
+use crate::maps::Verdict;
+use crate::measurement::{LaserId, Scan, Time};
+use crate::sources::{ContourOutcome, FindContours, FindFeatures, see_contours};
+
+/// While reflectors have the position as well as this, m, contours do not correct it.
+const BY_REFLECTORS: f64 = 0.02;
+
+/// A pose that contours have told in the present event, and when it was true.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ToldByContours {
+    pub time: Time,
+    pub seen: PoseObservation,
+}
+
+impl<C: Capacities> Localizer<C> {
+    /// Takes another map of contours, or none; also while the vehicle drives.
+    pub fn set_contours(&mut self, map: Option<<C::Contours as FindContours>::Map>) {
+        self.contours.set_map(map);
+    }
+
+    /// Whether scans are compared with a map of contours.
+    pub(super) fn uses_contours(&self) -> bool {
+        self.parameters.sources.contours && self.contours.has_map()
+    }
+
+    /// Corrects the pose by where the surfaces of the scan have the laser, which is at `mount`. The points of the scan are found, and
+    /// the workspace has the path of the laser.
+    pub(super) fn fuse_contours(&mut self, mount: &Pose, scan: &Scan) {
+        let time = scan.beam_time(scan.ranges.len() / 2);
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none()) else { return };
+        let Ok(state) = timeline.state_at(time) else {
+            let status = &mut self.outputs.sources.contours;
+            status.begin(time);
+            return status.add(time, Verdict::OutOfTime, false, None);
+        };
+        let place = self.workspace.path.place(time.since(scan.start));
+        let outcome = self.see_contours(time, &mount.compose(&place.inverse()), &state);
+        let is_used = outcome.wanted().is_some_and(|seen| self.timeline.fuse_pose(time, &seen) == Ok(true));
+        self.tell_contours(time, scan.laser, &outcome, is_used);
+    }
+
+    /// The same with landmarks in the state, where the filter stands; `place` is where the laser was then in the frame of the points.
+    pub(super) fn fuse_contours_by_slam(&mut self, mount: &Pose, place: &Pose, laser: LaserId) {
+        let (time, state) = (self.slam.time(), self.slam.state());
+        let outcome = self.see_contours(time, &mount.compose(&place.inverse()), &state);
+        let is_used = outcome.wanted().is_some_and(|seen| seen.apply(self.slam.parts().0));
+        self.tell_contours(time, laser, &outcome, is_used);
+    }
+
+    /// Compares the scan with the map; the frame of its points is at `frame` in R, which is at `state` at that time.
+    fn see_contours(&mut self, time: Time, frame: &Pose, state: &Ekf) -> ContourOutcome {
+        let is_led = self.distance.reflector <= self.parameters.limits.dead_reckoning_from
+            && state.position_deviation() <= BY_REFLECTORS;
+        let from = self.outputs.sources.contours.told.unwrap_or(time);
+        let motions = self.timeline.motions(from, time);
+        let step = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
+        see_contours(&mut self.contours, self.features.points(), frame, (state, &step), is_led)
+    }
+
+    fn tell_contours(&mut self, time: Time, laser: LaserId, outcome: &ContourOutcome, is_used: bool) {
+        self.outputs.has_cut |= self.contours.has_cut();
+        let verdict = if is_used || outcome.verdict != Verdict::Accepted { outcome.verdict } else { Verdict::Unknown };
+        let status = &mut self.outputs.sources.contours;
+        status.begin(time);
+        status.add(time, verdict, is_used, outcome.test_ratio);
+        if let Some(seen) = outcome.seen.filter(|_| is_used) {
+            self.distance.feature = 0.0;
+            self.told_by_contours = Some(ToldByContours { time, seen }).filter(|_| laser == LaserId::FIRST);
+        }
+    }
+}

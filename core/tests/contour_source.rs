@@ -1,0 +1,368 @@
+//! The vehicle's own filter in a kept map of contours: a simulated drive whose truth is kept apart.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use agv_core::contours::{KeptMap, KeptPoint, SurfacePoint, TILE, Tile};
+use agv_core::geometry::{Point, Pose, difference};
+use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, PoseOutput, SlamSlots};
+use agv_core::maps::Landmark;
+use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::odometry::Vehicle;
+use agv_core::sources::{Contours, SourceStatus};
+
+use super::support::walls::{Noise, Walls, corridor, range, room, surfaces};
+
+const BEAMS: usize = 720;
+type Small = Localizer<CapacitiesOf<BEAMS, 16, 16, 4, SlamSlots, Contours<'static, 400, 4096>>>;
+
+const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
+
+/// Samples of the odometry in a revolution, and the time between them, us.
+const SAMPLES: u64 = 12;
+const INTERVAL: u64 = 10_000;
+const REVOLUTION: f64 = (SAMPLES * INTERVAL) as f64 * 1e-6;
+
+/// A map of walls, moved by a pose. It stays in memory as long as the test runs.
+fn map(walls: &Walls, moved: &Pose) -> KeptMap<'static> {
+    let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
+    for (position, normal) in surfaces(walls, 0.1) {
+        let (position, normal) = (moved.transform(&position), moved.transform(&normal) - moved.position());
+        let place = Tile::place_of(position.x, position.y).unwrap();
+        let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
+        let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
+        by_tile.entry(place).or_default().push(KeptPoint::of(&point));
+    }
+    let (mut tiles, mut points) = (Vec::new(), Vec::new());
+    for (place, found) in by_tile {
+        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
+        points.extend(found);
+    }
+    KeptMap::new(tiles.leak(), points.leak()).unwrap()
+}
+
+/// Random walks of the odometry: of the way, m for a root of a metre, and of the heading, rad for one.
+const SLIP: f64 = 0.01;
+const YAW: f64 = 0.005;
+
+fn parameters() -> Parameters {
+    let mut parameters = Parameters::new(Vehicle::Increments, LASER);
+    parameters.odometry_noise.slip = SLIP;
+    parameters.odometry_noise.side_slip = SLIP;
+    parameters.odometry_noise.yaw = YAW;
+    parameters
+}
+
+struct Drive {
+    localizer: Box<Small>,
+    walls: Walls,
+    truth: Pose,
+    sample: u64,
+    noise: Noise,
+    reflectors: Vec<Landmark>,
+}
+
+impl Drive {
+    fn new(parameters: Parameters, walls: Walls, map: Option<KeptMap<'static>>, seed: u64) -> Self {
+        let mut localizer = Box::new(Small::new(parameters));
+        localizer.set_contours(map);
+        let truth = Pose::new(0.0, 0.1, 0.05);
+        let mut drive = Self { localizer, walls, truth, sample: 0, noise: Noise(seed), reflectors: Vec::new() };
+        drive.report(&Pose::default());
+        drive
+    }
+
+    /// The same, and it has been told where it is.
+    fn told(parameters: Parameters, walls: Walls, map: Option<KeptMap<'static>>, seed: u64) -> Self {
+        let mut drive = Self::new(parameters, walls, map, seed);
+        drive.tell(drive.truth, 0.01, 0.003);
+        drive
+    }
+
+    fn time(&self) -> Time {
+        Time::from_micros(1_000_000 + self.sample * INTERVAL)
+    }
+
+    fn tell(&mut self, pose: Pose, position_deviation: f64, heading_deviation: f64) {
+        let fix = PoseFix { time: self.time(), pose, position_deviation, heading_deviation };
+        self.localizer.handle(&Event::SetPose(fix));
+    }
+
+    fn report(&mut self, displacement: &Pose) {
+        let increment = PoseIncrement { time: self.time(), displacement: *displacement };
+        self.localizer.handle(&Event::Increment(increment));
+    }
+
+    fn said(&self) -> PoseOutput {
+        self.localizer.outputs().pose
+    }
+
+    fn status(&self) -> SourceStatus {
+        self.localizer.outputs().sources.contours
+    }
+
+    /// What the vehicle is off by in its own frame.
+    fn error(&self) -> Pose {
+        self.truth.between(&self.said().pose)
+    }
+
+    /// Drives for a revolution at a speed, m/s, and a rate of turn, rad/s, and sees the walls by the way. `scale` is the
+    /// reported way over the true one. Gives the pose after each event.
+    fn revolve(&mut self, (speed, turn): (f64, f64), scale: f64) -> Vec<PoseOutput> {
+        let (start, mut poses) = (self.time(), vec![self.truth]);
+        let seconds = INTERVAL as f64 * 1e-6;
+        let step = Pose::exp(&agv_core::geometry::Twist { x: speed * seconds, y: 0.0, theta: turn * seconds });
+        let mut said = Vec::new();
+        for _ in 0..SAMPLES {
+            self.sample += 1;
+            self.truth = self.truth.compose(&step);
+            poses.push(self.truth);
+            let root = step.x.abs().sqrt();
+            let mut noise = |deviation: f64| deviation * root * self.noise.normal();
+            let reported = Pose::new(scale * step.x + noise(SLIP), step.y + noise(SLIP), step.theta + noise(YAW));
+            self.report(&reported);
+            said.push(self.said());
+        }
+        let laser = |share: f64| {
+            let sample = share * SAMPLES as f64;
+            let before = (sample as usize).min(SAMPLES as usize - 1);
+            let since = poses[before].between(&poses[before + 1]).fraction(sample - before as f64);
+            poses[before].compose(&since).compose(&LASER)
+        };
+        let seen: Vec<_> = (0..self.reflectors.len())
+            .map(|index| {
+                let share = index as f64 / self.reflectors.len() as f64;
+                let seen = laser(share).inverse_transform(&self.reflectors[index].position());
+                let range = seen.norm() + 0.005 * self.noise.normal();
+                let bearing = seen.y.atan2(seen.x) + 5e-4 * self.noise.normal();
+                let time = start.offset(share * REVOLUTION);
+                ReflectorObservation { time, range: range as f32, bearing: bearing as f32 }
+            })
+            .collect();
+        if !seen.is_empty() {
+            self.localizer.handle(&Event::Reflectors(Reflectors::of_first(&seen)));
+            said.push(self.said());
+        }
+        let ranges: Vec<f32> = (0..BEAMS)
+            .map(|beam| {
+                let at = laser(beam as f64 / BEAMS as f64);
+                let bearing = beam as f64 * TAU / BEAMS as f64 - PI;
+                range(&self.walls, &Pose { theta: at.theta + bearing, ..at }, &mut self.noise)
+            })
+            .collect();
+        let scan = Scan {
+            laser: LaserId::FIRST,
+            start,
+            beam_interval: REVOLUTION / BEAMS as f64,
+            first_bearing: -PI,
+            bearing_step: TAU / BEAMS as f64,
+            ranges: &ranges,
+            intensities: &[],
+        };
+        self.localizer.handle(&Event::Scan(scan));
+        said.push(self.said());
+        said
+    }
+}
+
+/// There and back in the room: speed and rate of turn of each revolution.
+fn tour() -> Vec<(f64, f64)> {
+    let legs = [(1.0, 0.0, 45), (0.4, 0.65, 40), (1.0, 0.0, 45), (0.4, 0.65, 40)];
+    legs.into_iter().flat_map(|(speed, turn, count)| std::iter::repeat_n((speed, turn), count)).collect()
+}
+
+#[test]
+fn a_vehicle_in_a_room_stays_where_the_map_has_it() {
+    let map = map(&room(), &Pose::default());
+    let (mut squares, mut count) = (0.0, 0);
+    for seed in 1..=3 {
+        let mut drive = Drive::told(parameters(), room(), Some(map), seed);
+        for motion in tour() {
+            drive.revolve(motion, 1.0);
+            let (error, said) = (drive.error(), drive.said());
+            assert!(error.position().norm() < 0.02, "seed {seed}: {error:?} {said:?}");
+            assert!(error.theta.abs() < 0.4_f64.to_radians(), "seed {seed}: {error:?}");
+            assert!(said.level.position >= error.position().norm(), "seed {seed}: {error:?} {said:?}");
+            assert_eq!(said.mode, Mode::Features, "seed {seed}: {said:?}");
+            assert_eq!(drive.status().accepted, 1, "{:?}", drive.status());
+            let [xx, xy, yy, xh, yh, hh] = said.covariance;
+            let covariance = nalgebra::Matrix3::new(xx, xy, xh, xy, yy, yh, xh, yh, hh);
+            let off = nalgebra::Vector3::new(
+                said.pose.x - drive.truth.x,
+                said.pose.y - drive.truth.y,
+                difference(said.pose.theta, drive.truth.theta),
+            );
+            squares += off.dot(&covariance.cholesky().unwrap().solve(&off));
+            count += 1;
+        }
+    }
+    let mean = squares / f64::from(count);
+    assert!((0.3..5.0).contains(&mean), "the normalised square is {mean} in the mean; 3 is expected");
+}
+
+#[test]
+fn contours_that_are_switched_off_leave_no_trace() {
+    let map = map(&room(), &Pose::default());
+    let mut without = parameters();
+    without.sources.contours = false;
+    let mut off = Drive::told(without, room(), Some(map), 7);
+    let mut none = Drive::told(parameters(), room(), None, 7);
+    for motion in tour().into_iter().take(60) {
+        assert_eq!(off.revolve(motion, 1.0), none.revolve(motion, 1.0));
+    }
+    assert_eq!((off.status().told, none.status().told), (None, None));
+}
+
+#[test]
+fn in_a_corridor_the_free_axis_stays_free() {
+    let map = map(&corridor(None), &Pose::default());
+    for seed in 1..=3 {
+        let mut drive = Drive::told(parameters(), corridor(None), Some(map), seed);
+        drive.truth = Pose { theta: 0.0, ..drive.truth };
+        drive.tell(drive.truth, 0.01, 0.003);
+        let mut before = drive.said().covariance[0];
+        for _ in 0..100 {
+            drive.revolve((1.0, 0.0), 1.002);
+            let (error, said) = (drive.error(), drive.said());
+            let [xx, _, yy, ..] = said.covariance;
+            assert!(error.y.abs() < 0.02 && error.theta.abs() < 0.3_f64.to_radians(), "seed {seed}: {error:?}");
+            // Twelve metres of 1 cm for a root of a metre, and 2 mm a metre.
+            assert!(error.x.abs() < 0.024 + 4.0 * SLIP * 12.0_f64.sqrt(), "seed {seed}: {error:?}");
+            assert!(said.level.position >= error.position().norm(), "seed {seed}: {error:?} {said:?}");
+            assert!(xx > before && yy < 2e-4, "seed {seed}: {said:?}");
+            before = xx;
+        }
+        // What is known of the way is what the odometry knows.
+        let expected = 1e-4 + SLIP * SLIP * 12.0;
+        assert!((0.7..1.4).contains(&(before / expected)), "seed {seed}: {before} instead of {expected}");
+    }
+}
+
+/// A wall of the room and its cupboard have moved, by 5 to 50 cm.
+#[test]
+fn walls_that_have_moved_do_not_take_the_pose_along() {
+    let map = map(&room(), &Pose::default());
+    for (wall, by) in [(0, (0.0, -0.05)), (0, (0.0, 0.12)), (1, (0.3, 0.0)), (5, (-0.5, 0.0))] {
+        let mut walls = room();
+        let [ax, ay, bx, by_] = &mut walls[wall];
+        (*ax, *bx, *ay, *by_) = (*ax + by.0, *bx + by.0, *ay + by.1, *by_ + by.1);
+        for cupboard in &mut walls[6..] {
+            cupboard[0] -= 0.4;
+            cupboard[2] -= 0.4;
+        }
+        let mut drive = Drive::told(parameters(), walls, Some(map), 3);
+        for motion in tour() {
+            drive.revolve(motion, 1.0);
+            let (error, said) = (drive.error(), drive.said());
+            assert!(error.position().norm() < 0.06, "wall {wall} by {by:?}: {error:?} {said:?}");
+            assert!(said.level.position >= error.position().norm(), "wall {wall} by {by:?}: {error:?} {said:?}");
+        }
+    }
+}
+
+#[test]
+fn a_start_that_is_wrong_is_put_right_and_said() {
+    let map = map(&room(), &Pose::default());
+    for wrong in [Pose::new(0.3, -0.2, 0.26), Pose::new(-0.35, 0.1, -0.4), Pose::new(0.0, 0.4, 0.1)] {
+        let mut drive = Drive::new(parameters(), room(), Some(map), 4);
+        drive.tell(drive.truth.compose(&wrong), 0.1, 0.1);
+        let resets = drive.said().resets;
+        drive.revolve((0.5, 0.1), 1.0);
+        let (error, said) = (drive.error(), drive.said());
+        assert!(
+            error.position().norm() < 0.03 && error.theta.abs() < 0.01,
+            "{wrong:?}: {error:?} {:?}",
+            drive.status()
+        );
+        assert_ne!(said.resets, resets, "{said:?}");
+    }
+}
+
+/// Of a start 4 m off the map says nothing, or that it is wrong; it does not say that it is right.
+#[test]
+fn a_start_that_is_quite_wrong_is_not_believed() {
+    let map = map(&room(), &Pose::default());
+    for wrong in [Pose::new(4.0, 1.0, 0.5), Pose::new(5.0, -1.0, 2.5), Pose::new(3.0, 2.5, -1.5)] {
+        let mut drive = Drive::new(parameters(), room(), Some(map), 5);
+        drive.tell(drive.truth.compose(&wrong), 0.1, 0.05);
+        for revolution in 0..40 {
+            drive.revolve((0.5, 0.1), 1.0);
+            let (error, said) = (drive.error(), drive.said());
+            let is_found = error.position().norm() < 0.03;
+            let is_believed = said.mode == Mode::Features;
+            assert!(is_found || !is_believed, "{wrong:?}, {revolution}: {error:?} {said:?} {:?}", drive.status());
+        }
+    }
+}
+
+#[test]
+fn standing_in_front_of_one_map_makes_its_error_no_smaller() {
+    let map = map(&room(), &Pose::default());
+    let mut drive = Drive::told(parameters(), room(), Some(map), 6);
+    for _ in 0..300 {
+        drive.revolve((0.0, 0.0), 1.0);
+        let [xx, _, yy, _, _, heading] = drive.said().covariance;
+        assert!(xx.min(yy) >= 0.004_f64.powi(2) && heading >= 0.0009_f64.powi(2), "{:?}", drive.said());
+        assert!(drive.error().position().norm() < 0.015, "{:?}", drive.error());
+    }
+}
+
+fn reflectors() -> Vec<Landmark> {
+    let places = [(9.9, 4.1), (9.9, -1.3), (1.2, 4.9), (-1.9, 2.7), (3.4, -2.9)];
+    (0..).zip(places).map(|(id, (x, y))| Landmark::reflector(id, Point::new(x, y), 0.002)).collect()
+}
+
+/// The map of contours lies 3 cm beside that of the reflectors.
+#[test]
+fn reflectors_go_before_contours_and_no_jump_between_them_goes_unsaid() {
+    let map = map(&room(), &Pose::new(0.02, 0.022, 0.0));
+    let mut drive = Drive::told(parameters(), room(), Some(map), 8);
+    assert_eq!(drive.localizer.add_landmarks(&reflectors()), Ok(()));
+    let (mut last, mut used) = (drive.said(), 0);
+    for (revolution, motion) in tour().into_iter().enumerate() {
+        // Reflectors are in sight for 30 revolutions of 60.
+        let in_sight = revolution % 60 < 30;
+        drive.reflectors = if in_sight { reflectors() } else { Vec::new() };
+        let said = drive.revolve(motion, 1.0);
+        for pose in said {
+            let expected = last.pose.compose(&last.smooth.between(&pose.smooth));
+            let jump = (pose.pose.position() - expected.position()).norm();
+            assert!(jump <= 0.01 || pose.resets != last.resets, "{revolution}: {jump} m, {pose:?}");
+            last = pose;
+        }
+        used += usize::from(drive.status().used == drive.status().told);
+        let error = drive.error().position().norm();
+        if in_sight && revolution % 60 > 2 {
+            assert_eq!(drive.status().accepted, 0, "{revolution}");
+            assert!(error < 0.015, "{revolution}: {error}");
+        }
+        assert!(error < 0.05 && drive.said().level.position >= error, "{revolution}: {error} {:?}", drive.said());
+    }
+    assert!(used > 50, "contours were used {used} times");
+}
+
+/// Rows of uprights every 0.4 m between two walls: a scan fits as well 0.4 m further on.
+#[test]
+fn of_two_places_that_look_alike_the_one_where_the_vehicle_should_be_is_taken() {
+    let mut walls = corridor(None);
+    for upright in -40..60 {
+        for side in [-1.0, 1.0] {
+            let x = 0.4 * f64::from(upright);
+            walls.push([x, side, x + 0.08, side]);
+            walls.push([x, side, x, 1.2 * side]);
+            walls.push([x + 0.08, side, x + 0.08, 1.2 * side]);
+        }
+    }
+    let map = map(&walls, &Pose::default());
+    for seed in 1..=3 {
+        let mut drive = Drive::told(parameters(), walls.clone(), Some(map), seed);
+        drive.truth = Pose { theta: 0.0, ..drive.truth };
+        drive.tell(drive.truth, 0.01, 0.003);
+        for _ in 0..60 {
+            drive.revolve((0.8, 0.0), 1.0);
+            let (error, said) = (drive.error(), drive.said());
+            assert!(error.position().norm() < 0.1, "seed {seed}: {error:?} {said:?} {:?}", drive.status());
+        }
+    }
+}

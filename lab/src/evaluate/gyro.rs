@@ -1,0 +1,353 @@
+//! How much heading a vehicle loses without landmarks, with a gyro and without, and how soon a slipping wheel is told.
+//!
+//! The whole controller drives in simulated time, with emulated encoders, gyro and laser. For the time before it sees reflectors;
+//! then its laser is silent. Defined before the runs:
+//!
+//! - lost heading: the change of the published heading's error from the last pose before the laser falls silent to the pose after
+//!   12 m of way, which is what a perfect start at that place would leave;
+//! - the 95 % mark: the smallest value that 95 % of all drives do not exceed; no drive is left out;
+//! - told: the first pose on the bus with the reason [`Reason::WheelsSlip`] after the slip began; its way is that of the truth.
+
+use agv_core::geometry::{Pose, difference};
+use agv_core::state::Reason;
+use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
+use agv_host_sim::simulate::scenario::{
+    GyroOptions, MotionReport, PathKind, PathOptions, PoseOptions, ReflectorShape, Scenario, Shapes, Slip, WorldOptions,
+};
+use agv_host_sim::simulate::{SimulateError, simulate};
+use serde::Serialize;
+
+use crate::campaign::fault::{Fault, FaultKind};
+use crate::campaign::rig::{self, RigError, RigOptions};
+
+/// Way without landmarks, m.
+const WAY: f64 = 12.0;
+/// Time before, s.
+const BEFORE: f64 = 60.0;
+/// A gyro that was not heard before the drive is not missed for so long any more, s.
+const SETTLED: f64 = 2.0;
+/// Share of a wheel's way that slips.
+const SLIP: f64 = 0.2;
+
+/// Why it cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum GyroError {
+    /// The scenario makes no sense.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The controller cannot be driven.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+/// What the vehicle does in the time before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Before {
+    /// It stands.
+    Stands,
+    /// It drives curves to the left and to the right.
+    Drives,
+}
+
+/// The way without landmarks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Way {
+    /// A line.
+    Straight,
+    /// A line, a quarter of a turn, and a line.
+    Curve,
+}
+
+/// The vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VehicleKind {
+    /// One wheel that steers and drives.
+    Tricycle,
+    /// Two driven wheels side by side.
+    Differential,
+}
+
+/// What was measured of one kind of drive.
+#[derive(Clone, Debug, Serialize)]
+pub struct HeadingRow {
+    /// The vehicle.
+    pub vehicle: VehicleKind,
+    /// What it did before.
+    pub before: Before,
+    /// The way.
+    pub way: Way,
+    /// Whether there was a gyro.
+    pub has_gyro: bool,
+    /// Drives.
+    pub drives: usize,
+    /// Median of the lost heading, deg.
+    pub median_deg: f64,
+    /// The 95 % mark, deg.
+    pub mark_95_deg: f64,
+    /// The largest, deg, and its seed.
+    pub worst_deg: f64,
+    /// Seed of the worst drive.
+    pub worst_seed: u64,
+    /// Drives in which the error of the heading was larger than its protection level at any pose on the way.
+    pub beyond_level: usize,
+    /// Drives in which a slip or a fault of the gyro was told, though there was none.
+    pub false_alarms: usize,
+}
+
+/// What was measured of slips.
+#[derive(Clone, Debug, Serialize)]
+pub struct SlipRow {
+    /// The vehicle, whose first wheel slips.
+    pub vehicle: VehicleKind,
+    /// Where the wheel slips.
+    pub way: Way,
+    /// Drives.
+    pub drives: usize,
+    /// Those in which the slip was told.
+    pub told: usize,
+    /// The longest way until it was told, m.
+    pub longest_m: f64,
+    /// Seed of that drive.
+    pub worst_seed: u64,
+    /// Drives in which the position or heading was beyond its protection level at any pose of the slip and the metre behind.
+    pub beyond_level: usize,
+}
+
+/// All that was measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct GyroOutcome {
+    /// Headings.
+    pub headings: Vec<HeadingRow>,
+    /// Slips.
+    pub slips: Vec<SlipRow>,
+}
+
+/// One drive without landmarks.
+struct Drive {
+    lost: f64,
+    is_beyond: bool,
+    is_alarmed: bool,
+}
+
+/// Drives each kind with seeds from `seed` on. `step` is called after each drive.
+///
+/// # Errors
+/// See [`GyroError`].
+pub fn run(drives: u32, seed: u64, mut step: impl FnMut()) -> Result<GyroOutcome, GyroError> {
+    let seeds = seed..seed + u64::from(drives);
+    let (mut headings, mut slips) = (Vec::new(), Vec::new());
+    for vehicle in VEHICLES {
+        for (before, way, has_gyro) in kinds() {
+            let kind = Kind { vehicle, before, way, has_gyro };
+            let mut found = Vec::new();
+            for seed in seeds.clone() {
+                found.push((seed, blind_drive(kind, seed)?));
+                step();
+            }
+            headings.push(heading_row(kind, &found));
+        }
+        for way in WAYS {
+            let mut row =
+                SlipRow { vehicle, way, drives: 0, told: 0, longest_m: 0.0, worst_seed: seed, beyond_level: 0 };
+            for seed in seeds.clone() {
+                let (told, is_beyond) = slipping_drive(vehicle, way, seed)?;
+                row.drives += 1;
+                row.told += usize::from(told.is_some());
+                row.beyond_level += usize::from(is_beyond);
+                if let Some(way) = told.filter(|way| *way > row.longest_m) {
+                    (row.longest_m, row.worst_seed) = (way, seed);
+                }
+                step();
+            }
+            slips.push(row);
+        }
+    }
+    Ok(GyroOutcome { headings, slips })
+}
+
+const VEHICLES: [VehicleKind; 2] = [VehicleKind::Tricycle, VehicleKind::Differential];
+const WAYS: [Way; 2] = [Way::Straight, Way::Curve];
+
+/// One kind of drive.
+#[derive(Clone, Copy)]
+struct Kind {
+    vehicle: VehicleKind,
+    before: Before,
+    way: Way,
+    has_gyro: bool,
+}
+
+fn kinds() -> impl Iterator<Item = (Before, Way, bool)> {
+    [Before::Stands, Before::Drives]
+        .into_iter()
+        .flat_map(|before| WAYS.into_iter().flat_map(move |way| [true, false].map(|has_gyro| (before, way, has_gyro))))
+}
+
+/// How many drives [`run`] makes.
+#[must_use]
+pub fn drives(of_each: u32) -> u64 {
+    let of_vehicle = kinds().count() + WAYS.len();
+    (VEHICLES.len() * of_vehicle) as u64 * u64::from(of_each)
+}
+
+fn heading_row(kind: Kind, found: &[(u64, Drive)]) -> HeadingRow {
+    let Kind { vehicle, before, way, has_gyro } = kind;
+    let mut lost: Vec<f64> = found.iter().map(|(_, drive)| drive.lost.to_degrees()).collect();
+    lost.sort_by(f64::total_cmp);
+    // No drive is as good as one that was not made.
+    let at = |share: f64| {
+        let place = (share * lost.len() as f64).ceil() as usize;
+        lost.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+    };
+    let worst = found.iter().max_by(|one, other| one.1.lost.total_cmp(&other.1.lost));
+    HeadingRow {
+        vehicle,
+        before,
+        way,
+        has_gyro,
+        drives: found.len(),
+        median_deg: at(0.5),
+        mark_95_deg: at(0.95),
+        worst_deg: at(1.0),
+        worst_seed: worst.map_or(0, |(seed, _)| *seed),
+        beyond_level: found.iter().filter(|(_, drive)| drive.is_beyond).count(),
+        false_alarms: found.iter().filter(|(_, drive)| drive.is_alarmed).count(),
+    }
+}
+
+fn segment(length: f64, curvature: f64) -> PathSegment {
+    PathSegment { length, curvature }
+}
+
+/// A hall with reflectors at its walls, and the way through it.
+fn scenario(kind: Kind, seed: u64) -> Scenario {
+    let Kind { vehicle, before, way, has_gyro } = kind;
+    let mut scenario = Scenario { seed, ..Scenario::default() };
+    scenario.vehicle.reports = match vehicle {
+        VehicleKind::Tricycle => MotionReport::Encoders,
+        VehicleKind::Differential => MotionReport::Differential,
+    };
+    let place = |number: u32| {
+        // No two of them are as far apart as two others.
+        let along = f64::from(number) * 3.1 + f64::from(number * number % 7) * 0.23;
+        let (length, width) = (30.0, 22.0);
+        match along % 104.0 {
+            way if way < length => (way, 0.0),
+            way if way < length + width => (length, way - length),
+            way if way < 2.0 * length + width => (2.0 * length + width - way, width),
+            way => (0.0, 2.0 * (length + width) - way),
+        }
+    };
+    let reflectors = (0..33)
+        .map(|number| {
+            let (x, y) = place(number);
+            ReflectorShape::seen_all_round(x - 6.0, y - 11.0)
+        })
+        .collect();
+    scenario.world = WorldOptions::Shapes(Shapes { reflectors, ..Shapes::default() });
+    scenario.laser.scans = false;
+    scenario.drive.start_standstill = 1.0;
+    let mut segments = Vec::new();
+    match before {
+        Before::Stands => scenario.drive.start_standstill = BEFORE,
+        Before::Drives => {
+            // Circles to either side, 47 m in the 60 s before.
+            let circle = std::f64::consts::TAU * 1.9;
+            for side in [1.0, -1.0, 1.0, -1.0] {
+                segments.push(segment(circle, side / 1.9));
+            }
+        }
+    }
+    match way {
+        Way::Straight => segments.push(segment(16.0, 0.0)),
+        Way::Curve => {
+            let radius = 2.5;
+            let quarter = std::f64::consts::FRAC_PI_2 * radius;
+            segments.extend([segment(6.0, 0.0), segment(quarter, 1.0 / radius), segment(6.0, 0.0)]);
+        }
+    }
+    scenario.path = PathOptions {
+        kind: PathKind::Legs,
+        start: PoseOptions { x: 0.0, y: -1.0, heading_deg: 0.0 },
+        legs: vec![Leg { direction: Direction::Forward, segments }],
+    };
+    scenario.gyro = GyroOptions { fitted: has_gyro, ..GyroOptions::default() };
+    scenario
+}
+
+/// When the last metres begin of which the vehicle sees nothing, s after the first event, and how long the drive lasts.
+fn times(scenario: &Scenario, before: Before) -> (f64, f64) {
+    let speed = scenario.drive.speed;
+    let length: f64 = scenario.path.legs.iter().flat_map(|leg| &leg.segments).map(|segment| segment.length).sum();
+    let driven = length - if before == Before::Stands { length } else { 16.0 };
+    let lead = 0.5 * speed / scenario.drive.acceleration;
+    let blind = scenario.drive.start_standstill + driven / speed + lead + 1.0;
+    let end = scenario.drive.start_standstill + length / speed + 2.0 * lead;
+    (blind, end)
+}
+
+/// The laser's network is gone from then on, s.
+fn silence_from(from: f64) -> Fault {
+    Fault { name: "no laser".to_owned(), from, until: None, what: FaultKind::LaserUnreachable, can_recover: false }
+}
+
+fn heading_error(found: &Pose, truth: &Pose) -> f64 {
+    difference(found.theta, truth.theta)
+}
+
+fn blind_drive(kind: Kind, seed: u64) -> Result<Drive, GyroError> {
+    let scenario = scenario(kind, seed);
+    let (blind, end) = times(&scenario, kind.before);
+    let simulation = simulate(&scenario)?;
+    let silence = silence_from(blind);
+    let options = RigOptions { seconds: end, seed, is_told: true };
+    let (mut at_start, mut way_driven, mut last): (Option<f64>, f64, Option<Pose>) = (None, 0.0, None);
+    let mut drive = Drive { lost: f64::INFINITY, is_beyond: false, is_alarmed: false };
+    rig::drive(&simulation.recording, &[&silence], &options, |heard| {
+        let Some(output) = heard.output else { return };
+        let Some(truth) = (heard.truth)(output.time) else { return };
+        let error = heading_error(&output.pose, &truth);
+        drive.is_alarmed |= heard.time > SETTLED && matches!(output.reason, Reason::WheelsSlip | Reason::GyroFault);
+        if heard.time < blind || way_driven > WAY {
+            return;
+        }
+        let begun = *at_start.get_or_insert(error);
+        way_driven += last.replace(truth).map_or(0.0, |last| last.between(&truth).position().norm());
+        drive.is_beyond |= error.abs() > output.level.heading;
+        if way_driven >= WAY {
+            drive.lost = (error - begun).abs();
+        }
+    })?;
+    Ok(drive)
+}
+
+/// The way until the slip was told, and whether the pose was beyond its protection level meanwhile.
+fn slipping_drive(vehicle: VehicleKind, way: Way, seed: u64) -> Result<(Option<f64>, bool), GyroError> {
+    let mut scenario = scenario(Kind { vehicle, before: Before::Stands, way, has_gyro: true }, seed);
+    // In the middle of the curve or of the line.
+    let lead = 0.5 * scenario.drive.speed / scenario.drive.acceleration;
+    let from = BEFORE + lead + 7.5 / scenario.drive.speed;
+    scenario.odometry.slips = vec![Slip { from, lasts: 1.5, share: SLIP, wheel: 0 }];
+    let (_, end) = times(&scenario, Before::Stands);
+    let simulation = simulate(&scenario)?;
+    let silence = silence_from(BEFORE + lead + 1.0);
+    let options = RigOptions { seconds: end.min(from + 3.0), seed, is_told: true };
+    let (mut begun, mut told, mut is_beyond) = (None::<Pose>, None, false);
+    let (mut driven, mut last) = (0.0, None::<Pose>);
+    rig::drive(&simulation.recording, &[&silence], &options, |heard| {
+        let Some(output) = heard.output.filter(|_| heard.time >= from) else { return };
+        let Some(truth) = (heard.truth)(output.time) else { return };
+        begun.get_or_insert(truth);
+        driven += last.replace(truth).map_or(0.0, |last| last.between(&truth).position().norm());
+        let position = (output.pose.position() - truth.position()).norm();
+        is_beyond |=
+            heading_error(&output.pose, &truth).abs() > output.level.heading || position > output.level.position;
+        if output.reason == Reason::WheelsSlip {
+            told.get_or_insert(driven);
+        }
+    })?;
+    Ok((told, is_beyond))
+}
