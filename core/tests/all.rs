@@ -52,6 +52,7 @@ mod timeline;
 mod uncertain_motion;
 mod wheel_vehicle;
 mod wheels;
+mod whole_drives;
 
 /// A file that is no module of this program would be no test, and nobody would notice.
 #[test]

@@ -16,6 +16,14 @@ pub fn corners() -> impl Iterator<Item = Point> {
     WALLS.into_iter().flat_map(of).map(|(x, y)| Point::new(x, y))
 }
 
+/// The walls from one point to another.
+pub fn walls() -> Vec<[f64; 4]> {
+    let of = |[left, right, low, high]: [f64; 4]| {
+        [[left, low, right, low], [right, low, right, high], [right, high, left, high], [left, high, left, low]]
+    };
+    WALLS.into_iter().flat_map(of).collect()
+}
+
 /// Distance to the nearest wall.
 pub fn cast(origin: &Pose, bearing: f64) -> f64 {
     let (sine, cosine) = (origin.theta + bearing).sin_cos();
