@@ -29,7 +29,7 @@ const HELP: &str = "\
 Examples:
   agv
   agv --report /tmp/report
-  agv simulate host-sim/scenarios/block_storage_p2.toml --output drive.agvlog
+  agv simulate block_storage_p2 --output drive.agvlog
   agv replay drive.agvlog --report report
   agv view drive.agvlog
 

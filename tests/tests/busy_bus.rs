@@ -425,7 +425,6 @@ fn the_board_localises_among_foreign_frames() {
         assert!(driven.stream.damages == 0 && contents.damages.is_empty());
         let again = replay::replay(&contents.recording, |_| ()).unwrap();
         assert_eq!(replay::compare(&contents.outputs, &again).first_difference, None);
-        assert!(agv_tests::faults(&driven).is_empty(), "{:?}", driven.emergencies);
         assert!(sent > 5 * FOREIGN_RATE, "{sent}");
         let errors = vehicle::errors(&driven, &recording).unwrap();
         println!("{errors:?}");
@@ -433,6 +432,7 @@ fn the_board_localises_among_foreign_frames() {
         if driven.longest_stall >= LONGEST_STALL || errors.longest_gap_s >= LONGEST_GAP {
             continue;
         }
+        assert!(agv_tests::faults(&driven).is_empty(), "{:?}", driven.emergencies);
         let faults = driven.poses.iter().filter(|heard| heard.heard > driven.begin);
         let faults: Vec<_> = faults.flat_map(|heard| [heard.pose.health.drive, heard.pose.health.steering]).collect();
         println!("{} of {} poses with a fault of an encoder", faults.iter().flatten().count(), faults.len() / 2);

@@ -16,7 +16,7 @@ use crate::command::progress;
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Campaign {
-    /// The campaign, such as host-sim/scenarios/faults.toml; or tables of results, to put together.
+    /// The campaign, a file or `faults`, which comes with the program; or tables of results, to put together.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Every two faults together instead of each alone.
@@ -44,9 +44,9 @@ pub struct Campaign {
 
 const HELP: &str = "\
 Examples:
-  agv campaign host-sim/scenarios/faults.toml
-  agv campaign host-sim/scenarios/faults.toml --only laser --runs 5
-  agv campaign host-sim/scenarios/faults.toml --shard 0/2 --output 0.parquet
+  agv campaign faults
+  agv campaign faults --only laser --runs 5
+  agv campaign faults --shard 0/2 --output 0.parquet
   agv campaign 0.parquet 1.parquet";
 
 impl Campaign {

@@ -30,7 +30,7 @@ Examples:
   agv can monitor can0
   agv can encoders slcan:/dev/ttyACM0@500000 --drive 1 --steering 2
   agv can pose slcan-tcp:localhost:3333 --json
-  agv can serve-encoders vcan0 --scenario host-sim/scenarios/block_storage_p1.toml";
+  agv can serve-encoders vcan0 --scenario block_storage_p1";
 
 /// Take part in a CAN bus: can0, slcan:/dev/ttyACM0@500000, slcan-tcp:HOST:PORT
 #[derive(clap::Args)]
@@ -107,7 +107,7 @@ struct Pose {
 struct ServeEncoders {
     /// The bus
     bus: String,
-    /// Scenario file to simulate; see host-sim/scenarios
+    /// Scenario to simulate, a file or one that comes with the program; see `agv simulate`
     #[arg(long, required_unless_present = "log", conflicts_with = "log")]
     scenario: Option<PathBuf>,
     /// Log to play

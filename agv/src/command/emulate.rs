@@ -21,7 +21,7 @@ is printed. In the repository, `cargo xtask emulate` builds the firmware first.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
-  agv emulate --image vehicle --scenario host-sim/scenarios/warehouse_hall.toml --seconds 30 --json
+  agv emulate --image vehicle --scenario warehouse_hall --seconds 30 --json
   agv emulate --image vehicle --untold --seconds 10
   agv emulate --image vehicle --folder /tmp/vehicle && defmt-print -e vehicle < /tmp/vehicle/defmt.bin";
 

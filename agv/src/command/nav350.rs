@@ -27,7 +27,7 @@ Examples:
   agv nav350 probe 192.168.1.10
   agv nav350 layout download 192.168.1.10 hall.imk
   agv nav350 layout convert hall.imk hall.csv
-  agv nav350 serve --scenario host-sim/scenarios/warehouse_hall.toml --port 2112
+  agv nav350 serve --scenario warehouse_hall --port 2112
   agv nav350 serve --log drive.agvlog --dialect cola-a";
 
 /// Talk to a NAV350, or be one

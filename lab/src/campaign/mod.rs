@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use agv_host_sim::simulate::SimulateError;
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, ScenarioError, toml_complaint};
+use agv_host_sim::simulate::standard;
 use fault::{Fault, simulate_with, window};
 use rayon::prelude::*;
 use results::Row;
@@ -131,7 +132,7 @@ impl Campaign {
     /// # Errors
     /// See [`CampaignError`].
     pub fn read(path: &Path) -> Result<(Self, Scenario), CampaignError> {
-        let text = std::fs::read_to_string(path).map_err(CampaignError::Read)?;
+        let text = standard::read_to_string(path).map_err(CampaignError::Read)?;
         let campaign: Self = toml::from_str(&text).map_err(|error| {
             let (line, problem) = toml_complaint(&text, &error);
             CampaignError::Parse { line, problem }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use agv_host_sim::simulate::random::Random;
 use agv_host_sim::simulate::scenario::{Carry, Knock, toml_complaint};
+use agv_host_sim::simulate::standard;
 use serde::{Deserialize, Serialize};
 
 use super::blinding::Blinding;
@@ -150,7 +151,7 @@ pub const FEWEST_SIZES: usize = 9;
 /// # Errors
 /// See [`KindsError`].
 pub fn read(path: &Path) -> Result<Catalogue, KindsError> {
-    let text = std::fs::read_to_string(path).map_err(|source| KindsError::Read { path: path.to_owned(), source })?;
+    let text = standard::read_to_string(path).map_err(|source| KindsError::Read { path: path.to_owned(), source })?;
     parse(&text)
 }
 

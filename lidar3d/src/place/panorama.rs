@@ -114,6 +114,7 @@ impl Panorama {
     }
 
     /// Number of columns.
+    #[cfg(feature = "std")]
     pub(super) const fn columns(&self) -> usize {
         self.columns
     }
@@ -146,12 +147,14 @@ impl Panorama {
     }
 
     /// The point in the middle of a column, so far away on the level, m; columns go on round.
+    #[cfg(feature = "std")]
     pub(super) fn on_level(&self, column: usize, level: f32) -> [f32; 2] {
         let (sin, cos) = libm::sincosf((column as f32 + 0.5) / self.columns as f32 * TAU);
         [level * cos, level * sin]
     }
 
     /// In which of 480 directions something is seen, in two rows at least of the column or those beside it.
+    #[cfg(feature = "std")]
     pub(super) fn known_directions(&self) -> [bool; COLUMNS] {
         let wide = COLUMNS / self.columns;
         core::array::from_fn(|direction| {

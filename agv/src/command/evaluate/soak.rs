@@ -17,7 +17,7 @@ use crate::command::progress;
 #[command(after_help = HELP)]
 pub struct Soak {
     /// The drive; it goes on lap after lap.
-    #[arg(long, default_value = "host-sim/scenarios/warehouse_hall.toml")]
+    #[arg(long, default_value = "warehouse_hall")]
     scenario: PathBuf,
     /// Hours of the drive.
     #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=48))]

@@ -25,7 +25,7 @@ use crate::command::setting_arguments::SettingArguments;
 #[command(after_help = HELP)]
 pub struct Trust {
     /// The kinds of faults.
-    #[arg(long, default_value = "host-sim/scenarios/trust.toml")]
+    #[arg(long, default_value = "trust")]
     kinds: PathBuf,
     /// Only kinds with this in their names, and none beside them.
     #[arg(long)]

@@ -34,6 +34,7 @@ use super::block_storage::{BlockStorage, BlockStoragePath, ReflectorPlacement};
 use super::path::Path;
 use super::people::Person;
 use super::random::{Random, Stream};
+use super::standard;
 use super::warehouse_hall;
 use super::world::World;
 
@@ -154,7 +155,7 @@ impl Scenario {
     /// The file cannot be read or is not a scenario.
     pub fn read(path: &FilePath) -> Result<Self, ScenarioError> {
         let text =
-            std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.to_path_buf(), source })?;
+            standard::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.to_path_buf(), source })?;
         // An empty text states a drive with nothing but defaults, but nobody keeps that in a file.
         if text.trim().is_empty() {
             return Err(ScenarioError::Empty { path: path.to_path_buf() });
