@@ -45,7 +45,7 @@ const BENDS: &[Phase] = &[
 
 const STANDARD: Equipment = Equipment::STANDARD;
 
-pub const DRIVES: [Recorded; 24] = [
+pub const DRIVES: [Recorded; 37] = [
     recorded("tricycle", 1, STANDARD, BENDS),
     recorded("differential", 2, Equipment { kind: Kind::Differential, ..STANDARD }, BENDS),
     recorded("two steered axles", 3, Equipment { kind: Kind::BiSteerable, ..STANDARD }, BENDS),
@@ -261,6 +261,157 @@ pub const DRIVES: [Recorded; 24] = [
                 0.5,
                 0.1,
             ),
+        ],
+    ),
+    recorded("car with counters", 25, Equipment { kind: Kind::Car, ..STANDARD }, BENDS),
+    recorded("car that tells its speed", 26, Equipment { kind: Kind::Speeds, ..STANDARD }, BENDS),
+    recorded(
+        "noisy encoders",
+        27,
+        Equipment {
+            kind: Kind::BiSteerable,
+            set: |parameters| {
+                parameters.odometry_noise.speed = 0.01;
+                parameters.odometry_noise.turn = 0.01;
+            },
+            ..STANDARD
+        },
+        &[from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.8, 0.2), go(2.4, 0.7, -0.5), go(1.2, 0.0, 0.0)],
+    ),
+    recorded(
+        "two steered axles, one wheel slips",
+        28,
+        Equipment { kind: Kind::BiSteerable, ..STANDARD },
+        &[
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 2.4, 0.8, 0.2),
+            from(|drive| drive.wrong.scale = 0.05, 2.4, 0.7, -0.3),
+        ],
+    ),
+    recorded(
+        "gyro, blind, one wheel slips",
+        29,
+        Equipment { gyro: true, kind: Kind::Differential, ..STANDARD },
+        &[
+            go(3.6, 0.0, 0.0),
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.8, 0.2),
+            from(|drive| drive.wrong = Wrong { scale: 0.2, ..Wrong::BLIND }, 2.4, 0.8, 0.0),
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.8, -0.2),
+        ],
+    ),
+    recorded(
+        "gyro is mute for a while",
+        30,
+        Equipment { gyro: true, ..STANDARD },
+        &[
+            go(2.4, 0.0, 0.0),
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 2.4, 0.8, 0.3),
+            from(|drive| drive.wrong.is_mute = true, 1.2, 0.7, 0.3),
+            from(|drive| drive.wrong.is_mute = false, 2.4, 0.7, -0.3),
+        ],
+    ),
+    recorded(
+        "gyro, turned by hand",
+        31,
+        Equipment { gyro: true, ..STANDARD },
+        &[
+            go(2.4, 0.0, 0.0),
+            from(|drive| drive.wrong = Wrong { spin: 0.2, ..Wrong::BLIND }, 1.2, 0.0, 0.0),
+            from(|drive| drive.wrong = Wrong::BLIND, 1.2, 0.0, 0.0),
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.7, 0.1),
+        ],
+    ),
+    recorded(
+        "gyro that is late",
+        32,
+        Equipment {
+            gyro: true,
+            set: |parameters| {
+                parameters.gyro.latency = 0.004;
+                parameters.gyro.noise = 3e-4;
+            },
+            ..STANDARD
+        },
+        &[
+            go(1.2, 0.0, 0.0),
+            go(2.4, 0.8, 0.4),
+            from(|drive| drive.wrong = Wrong::BLIND, 2.4, 0.8, -0.4),
+            go(1.2, 0.0, 0.0),
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 2.4, -0.8, 0.4),
+        ],
+    ),
+    recorded(
+        "contours, told beside",
+        33,
+        Equipment { landmarks: false, contours: true, is_told: false, ..STANDARD },
+        &[
+            from(
+                |drive| {
+                    drive.wrong.sees = |_| false;
+                    let (time, truth) = (drive.time(), drive.truth);
+                    drive.tell(time, truth.compose(&Pose::new(0.3, -0.2, 0.08)), 0.2, 0.05);
+                },
+                2.4,
+                0.0,
+                0.0,
+            ),
+            go(3.6, 0.7, 0.1),
+            from(
+                |drive| {
+                    let (time, truth) = (drive.time(), drive.truth);
+                    drive.tell(time, truth.compose(&Pose::new(0.4, 0.3, -0.05)), 0.01, 0.003);
+                },
+                3.6,
+                0.6,
+                -0.3,
+            ),
+        ],
+    ),
+    recorded(
+        "contours and a map while driving",
+        34,
+        Equipment { landmarks: false, contours: true, set: |parameters| parameters.maps.slam = true, ..STANDARD },
+        &[go(3.6, 0.7, 0.1), go(2.4, 0.6, -0.4)],
+    ),
+    recorded(
+        "laser is pushed forward, then lost and told again",
+        35,
+        STANDARD,
+        &[
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.8, 0.1),
+            from(|drive| drive.wrong.laser = Pose::new(0.05, 0.0, 0.01), 3.6, 0.8, 0.2),
+            from(
+                |drive| {
+                    let (time, truth) = (drive.time(), drive.truth);
+                    drive.wrong.laser = Pose::new(0.0, 0.0, 0.0);
+                    drive.tell(time, truth, 0.05, 0.02);
+                },
+                4.8,
+                0.6,
+                -0.5,
+            ),
+        ],
+    ),
+    recorded(
+        "laser creeps",
+        36,
+        STANDARD,
+        &[
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.8, 0.1),
+            from(|drive| drive.wrong.laser = Pose::new(0.01, 0.02, 0.002), 1.2, 0.8, 0.1),
+            from(|drive| drive.wrong.laser = Pose::new(0.02, 0.04, 0.004), 1.2, 0.6, -0.4),
+            from(|drive| drive.wrong.laser = Pose::new(0.03, 0.06, 0.006), 1.2, 0.6, -0.4),
+            from(|drive| drive.wrong.laser = Pose::new(0.04, 0.08, 0.008), 3.6, 0.6, 0.2),
+        ],
+    ),
+    recorded(
+        "scans and few reflectors, turning",
+        37,
+        STANDARD,
+        &[
+            from(|drive| drive.wrong.sees = |id| id % 4 == 1, 2.4, 0.4, 0.6),
+            go(2.4, 0.4, -0.6),
+            from(|drive| drive.wrong = Wrong::BLIND, 1.2, 0.8, 0.0),
+            from(|drive| drive.wrong = Wrong::NOTHING, 1.2, -0.4, 0.3),
         ],
     ),
 ];

@@ -47,7 +47,7 @@ impl Second {
             smooth.x,
             smooth.theta,
             predicted.x + predicted.y + predicted.theta,
-            statuses().map(|status| f64::from(status.accepted)).sum(),
+            statuses().map(|status| f64::from(status.accepted) + 0.1 * f64::from(status.observations)).sum(),
             statuses().map(|status| f64::from(status.gated)).sum(),
             statuses().map(|status| f64::from(status.test_ratio)).sum(),
             bias.scale + bias.steering,

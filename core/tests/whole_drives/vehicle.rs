@@ -8,12 +8,12 @@ use agv_core::geometry::{Point, Pose, Twist, difference};
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, OutputPredictor, Parameters, PoseFix};
 use agv_core::maps::Landmark;
 use agv_core::measurement::{
-    EncoderSample, GyroSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time, WheelReading,
-    WheelSample,
+    EncoderSample, GyroSample, LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, SpeedSample, Time,
+    WheelReading, WheelSample,
 };
 use agv_core::odometry::{
-    AngleEncoder, BiSteerable, CounterRange, Differential, DrivenWheel, GyroParameters, SteeredWheel, Tricycle,
-    Vehicle, WheelVehicle,
+    Ackermann, AckermannWheels, AngleEncoder, BiSteerable, CounterRange, Differential, DrivenWheel, GyroParameters,
+    SteeredWheel, Tricycle, Vehicle, WheelVehicle,
 };
 use agv_core::sources::Contours;
 
@@ -47,6 +47,10 @@ pub enum Kind {
     Tricycle,
     Differential,
     BiSteerable,
+    /// A car with counters of its rear wheels and of its steering.
+    Car,
+    /// A car that tells a speed and an angle.
+    Speeds,
     Increments,
 }
 
@@ -72,6 +76,13 @@ impl Kind {
                 let steered = |x: f64| SteeredWheel { x, y: 0.0, drive: wheel, steering, steering_offset: 0.0 };
                 Vehicle::Wheels(WheelVehicle::BiSteerable(BiSteerable { front: steered(0.7), rear: steered(-0.7) }))
             }
+            Self::Car => {
+                let rear = Differential { track: TRACK, left: wheel, right: wheel };
+                let steering = AngleEncoder { scale: STEERING_TICK, range: CounterRange::BITS_16 };
+                let car = AckermannWheels { rear, wheelbase: WHEELBASE, steering, steering_offset: 0.0 };
+                Vehicle::Wheels(WheelVehicle::Ackermann(car))
+            }
+            Self::Speeds => Vehicle::Ackermann(Ackermann { wheelbase: WHEELBASE, encoder_offset: 0.5 * TRACK }),
             Self::Increments => Vehicle::Increments,
         }
     }
@@ -100,6 +111,10 @@ pub struct Wrong {
     pub gyro: f64,
     /// Whether the gyro repeats itself.
     pub is_frozen: bool,
+    /// Whether it tells nothing.
+    pub is_mute: bool,
+    /// How fast it is turned by hand, rad/s.
+    pub spin: f64,
     /// Whether the odometry says nothing.
     pub is_silent: bool,
 }
@@ -116,6 +131,8 @@ impl Wrong {
         scans: true,
         gyro: 0.0,
         is_frozen: false,
+        is_mute: false,
+        spin: 0.0,
         is_silent: false,
     };
     pub const BLIND: Self = Self { sees: |_| false, scans: false, ..Self::NOTHING };
@@ -153,6 +170,7 @@ pub struct Drive {
     speed: f64,
     turn: f64,
     told: f64,
+    told_speed: f64,
     has_gyro: bool,
     /// True poses since the revolution began.
     poses: Vec<Pose>,
@@ -213,6 +231,7 @@ impl Drive {
             speed: 0.0,
             turn: 0.0,
             told: 0.0,
+            told_speed: 0.0,
             has_gyro: equipment.gyro,
             poses: Vec::new(),
             truths: Vec::new(),
@@ -245,6 +264,10 @@ impl Drive {
 
     fn handle(&mut self, event: &Event<'_>) {
         self.localizer.handle(event);
+        // As on a vehicle whose localiser is busy with what the laser has seen: it speaks behind that.
+        if !matches!(event, Event::SetPose(_) | Event::Reflectors(_) | Event::Scan(_)) {
+            return;
+        }
         let said = self.localizer.outputs().pose;
         let biases = self.localizer.odometry_bias();
         self.predictor.update(&said, &biases);
@@ -263,11 +286,16 @@ impl Drive {
                 self.predictor.encoders(&sample);
                 self.handle(&Event::Encoders(sample));
             }
-            Kind::Differential | Kind::BiSteerable => {
+            Kind::Differential | Kind::BiSteerable | Kind::Car => {
                 let mut wheels = [WheelReading::default(); 4];
                 (wheels[0], wheels[1]) = (reading(0), reading(1));
+                wheels[2].steering = angle(self.steering[0]);
                 self.predictor.wheels(&WheelSample { time, wheels });
                 self.handle(&Event::Wheels(WheelSample { time, wheels }));
+            }
+            Kind::Speeds => {
+                let (speed, steering) = (self.told_speed, self.steering[0]);
+                self.handle(&Event::Speed(SpeedSample { time, speed, steering }));
             }
             Kind::Increments => self.handle(&Event::Increment(PoseIncrement { time, displacement: *displacement })),
         }
@@ -281,7 +309,7 @@ impl Drive {
         let (way, angle) = (INTERVAL * self.speed, INTERVAL * self.turn);
         let root = way.abs().sqrt();
         let walk = 4e-4 * root * self.noise.normal();
-        let turned = angle * (1.0 - self.wrong.drift) + walk;
+        let turned = angle * (1.0 - self.wrong.drift) + walk + INTERVAL * self.wrong.spin;
         self.truth = self.truth.compose(&Pose::exp(&Twist { x: way, y: 0.0, theta: turned }));
         self.poses.push(self.truth);
         self.truths.push(self.truth);
@@ -295,9 +323,14 @@ impl Drive {
                     self.steering[0] = (across / way).atan() + self.wrong.steering;
                 }
             }
-            Kind::Differential => {
-                self.ways[0] += told(way - 0.5 * TRACK * angle, self.wrong.scale) + slip();
+            Kind::Differential | Kind::Car | Kind::Speeds => {
+                let left = told(way - 0.5 * TRACK * angle, self.wrong.scale) + slip();
+                self.ways[0] += left;
                 self.ways[1] += way + 0.5 * TRACK * angle + slip();
+                self.told_speed = left / INTERVAL;
+                if way != 0.0 {
+                    self.steering[0] = (WHEELBASE * angle / way).atan() + self.wrong.steering;
+                }
             }
             Kind::BiSteerable => {
                 for (wheel, x) in [(0, 0.7), (1, -0.7)] {
@@ -311,10 +344,10 @@ impl Drive {
             Kind::Increments => (),
         }
         let displacement = Pose::exp(&Twist { x: told(way, self.wrong.scale) + slip(), y: 0.0, theta: angle });
-        if self.has_gyro {
+        if self.has_gyro && !self.wrong.is_mute {
             let rate = turned / INTERVAL + 4e-3 + self.wrong.gyro + 8.7e-4 * self.noise.normal();
             self.told = if self.wrong.is_frozen { self.told } else { (rate / 1.6e-4).round() * 1.6e-4 };
-            let sample = GyroSample { time: self.time(), rate: self.told };
+            let sample = GyroSample { time: self.time().offset(-0.003), rate: self.told };
             self.predictor.gyro(&sample);
             self.handle(&Event::Gyro(sample));
         }
