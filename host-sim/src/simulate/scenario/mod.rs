@@ -154,8 +154,8 @@ impl Scenario {
     /// # Errors
     /// The file cannot be read or is not a scenario.
     pub fn read(path: &FilePath) -> Result<Self, ScenarioError> {
-        let text =
-            standard::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.to_path_buf(), source })?;
+        let text = standard::read_to_string(path)
+            .map_err(|source| ScenarioError::Read { path: path.to_path_buf(), source })?;
         // An empty text states a drive with nothing but defaults, but nobody keeps that in a file.
         if text.trim().is_empty() {
             return Err(ScenarioError::Empty { path: path.to_path_buf() });
