@@ -68,7 +68,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("people");
         assert_eq!(read_to_string(&file).unwrap_err().kind(), std::io::ErrorKind::NotFound);
-        std::fs::write(&file, "seed = 3").unwrap();
+        crate::output_file::write(&file, "seed = 3").unwrap();
         assert_eq!(read_to_string(&file).unwrap(), "seed = 3");
         assert!(read_to_string(Path::new("people")).unwrap().contains("people"));
         assert!(read_to_string(Path::new("faults.toml")).unwrap().contains("[[fault]]"));
