@@ -155,14 +155,21 @@ fn install(test: &str, package: &Path, root: &Path) {
         std::fs::create_dir_all(place.parent().unwrap()).unwrap();
         std::fs::copy(library, place).unwrap();
     }
-    let inside = Command::new("chroot").arg(root).args(["/usr/bin/agv", "settings", "vehicle.wheelbase"]).output();
-    match inside {
-        Ok(run) if run.status.success() => {
-            assert!(String::from_utf8(run.stdout).unwrap().contains("vehicle.wheelbase"));
+    // The scenario is the program's own: nothing of the repository is there.
+    for (arguments, said) in
+        [(["settings", "vehicle.wheelbase"], "vehicle.wheelbase"), (["simulate", "warehouse_hall"], "[reflectors]")]
+    {
+        let show = (arguments[0] == "simulate").then_some("--show");
+        let inside = Command::new("chroot").arg(root).arg("/usr/bin/agv").args(arguments).args(show).output();
+        match inside {
+            Ok(run) if run.status.success() => {
+                let told = String::from_utf8(run.stdout).unwrap();
+                assert!(told.contains(said), "{arguments:?}: {told}");
+            }
+            Ok(run) if String::from_utf8_lossy(&run.stderr).contains("not permitted") => {
+                skip(test, "only root may try the package in a root of its own");
+            }
+            other => panic!("{arguments:?}: {other:?}"),
         }
-        Ok(run) if String::from_utf8_lossy(&run.stderr).contains("not permitted") => {
-            skip(test, "only root may try the package in a root of its own");
-        }
-        other => panic!("{other:?}"),
     }
 }
