@@ -29,9 +29,6 @@ const KEY: [u8; 32] = [0x42; 32];
 const PATIENCE: Duration = Duration::from_secs(30);
 /// How long the vehicle is emulated at most, s.
 const SECONDS: f64 = 120.0;
-/// A machine that keeps the encoders waiting for longer shows faults of its own, s.
-const LONGEST_STALL: f64 = 0.012;
-
 /// Reflectors that it sees: a vehicle that stands is not believed to have found itself with fewer than five.
 const SEEN: usize = 8;
 
@@ -498,11 +495,10 @@ fn strangers_change_nothing_and_stop_nothing() {
         seen = Some(attack(watch, folder.path()));
     };
     let driven = vehicle::drive(&recording, &options, SECONDS, look).unwrap();
-    println!("longest stall {:.0} ms", 1e3 * driven.longest_stall);
     let (poses, with_reflectors) = seen.unwrap();
     assert!(agv_tests::faults(&driven).is_empty(), "{:?}", driven.emergencies);
     // A machine that keeps the encoders waiting adds faults of its own.
-    let least = if driven.longest_stall < LONGEST_STALL { poses * 9 / 10 } else { poses / 2 };
+    let least = if agv_tests::is_fair(&driven) { poses * 9 / 10 } else { poses / 2 };
     assert!(with_reflectors >= least, "{with_reflectors} of {poses} poses with reflectors");
     assert_eq!(driven.poses.last().unwrap().pose.mode, Mode::Reflectors);
 }
