@@ -527,3 +527,41 @@ fn a_gyro_that_nobody_knows_is_a_misuse() {
     let time = drive.now().offset(0.01);
     assert_eq!(drive.localizer.handle(&Event::Gyro(GyroSample { time, rate: 0.0 })).misuse, Some(Misuse::WrongVehicle));
 }
+
+#[test]
+fn a_turn_between_two_readings_is_a_share_of_theirs() {
+    let mut turns = GyroTurns::new(&FITTED);
+    let at = |milliseconds: u64| Time::from_micros(1_000_000 + 1000 * milliseconds);
+    for (step, rate) in [0.1, 0.3, 0.3, -0.2].into_iter().enumerate() {
+        turns.sample(&GyroSample { time: at(10 * step as u64), rate }).unwrap();
+    }
+    // Angles at the readings, by the trapezoidal rule: 0, 0.002, 0.005, 0.0055.
+    for (from, to, angle) in [(4, 10, 0.0012), (10, 13, 0.0009), (13, 25, 0.00235), (20, 24, 0.0002), (0, 30, 0.0055)] {
+        let turn = turns.turn(at(from), at(to)).unwrap();
+        assert!((turn.angle - angle).abs() < 1e-15, "{from} to {to}: {} {angle}", turn.angle);
+        assert!((turn.duration - 1e-3 * (to - from) as f64).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_bias_that_nothing_tells_is_known_to_twice_its_prior_at_least() {
+    let mut gyro = GyroState::new(&FITTED);
+    let long = GyroTurn { angle: 0.0, duration: 1e5, variance: 0.0 };
+    for hours in 1..200 {
+        let _ = gyro.predict(0.0, &Pose::default(), 1e5, Some(&long));
+        let walked = FITTED.bias.powi(2) + FITTED.drift.powi(2) * 1e5 * f64::from(hours);
+        let expected = walked.sqrt().min(2.0 * FITTED.bias);
+        assert!((gyro.deviations().0 / expected - 1.0).abs() < 1e-9, "{hours}: {:?} {expected}", gyro.deviations());
+    }
+    assert_eq!(gyro.deviations().0, 2.0 * FITTED.bias);
+}
+
+#[test]
+fn rest_with_a_variance_that_is_no_number_tells_nothing() {
+    let fresh = GyroState::new(&FITTED);
+    for variance in [f64::NAN, f64::INFINITY, -FITTED.bias.powi(2), -1.0] {
+        let mut gyro = fresh;
+        gyro.see_rest(0.004, variance);
+        assert_eq!((gyro.errors(), gyro.covariance()), (fresh.errors(), fresh.covariance()), "{variance}");
+    }
+}

@@ -126,3 +126,21 @@ fn a_new_pose_forgets_the_corrections_and_a_suspicion_of_the_odometry_alone() {
     assert_eq!(after(Pose::new(0.0, 0.01, 0.0)), (Some(Suspect::Laser), Some(Suspect::Laser)));
     assert_eq!(MountingCheck::default().suspect(), None);
 }
+
+/// A laser that stands elsewhere shows in bends alone, and one that is turned on straights alone.
+#[test]
+fn straights_alone_and_turns_alone_end_no_suspicion_of_the_laser() {
+    for motion in [Pose::new(0.15, 0.0, 0.0), Pose::new(0.0, 0.0, 0.1)] {
+        let mut check = MountingCheck::new();
+        check.suspect_laser();
+        for _ in 0..400 {
+            check.add(&motion, &Pose::default());
+            assert_eq!(check.suspect(), Some(Suspect::Laser), "{motion:?}");
+        }
+        // A bend without a contradiction ends it.
+        for _ in 0..20 {
+            check.add(&Pose::new(0.15, 0.0, 0.1), &Pose::default());
+        }
+        assert_eq!(check.suspect(), None, "{motion:?}");
+    }
+}

@@ -500,3 +500,11 @@ fn the_stated_covariance_is_the_spread_of_noisy_controls() {
         }
     }
 }
+
+/// Speeds say how fast a vehicle was, whatever the time between two of them; counters only count so far.
+#[test]
+fn a_vehicle_that_tells_its_speed_may_be_silent_for_as_long_as_it_likes() {
+    let car = Ackermann { wheelbase: WHEELBASE, encoder_offset: 0.4 };
+    assert_eq!(car.longest_interval(5.0), f64::INFINITY);
+    assert_eq!(Increments.longest_interval(5.0), f64::INFINITY);
+}

@@ -88,6 +88,9 @@ fn what_is_left_out_was_never_added() {
         assert!((one.0 - other.0).norm() < 1e-9 && (one.1 - other.1).abs() < 1e-9, "{one:?} {other:?}");
         assert!((one.2 / other.2 - 1.0).abs() < 1e-9);
     }
+    let (square, freedom) = left.misfit();
+    let (expected, expected_freedom) = sum(&others, &sensor).misfit();
+    assert!((square / expected - 1.0).abs() < 1e-6 && freedom == expected_freedom, "{square} {expected} {freedom}");
 }
 
 /// The errors of a map that stay are those of weighted least squares: drawn, not computed.

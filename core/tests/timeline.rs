@@ -382,3 +382,19 @@ fn a_surprise_is_taken_nearly_whole() {
     assert!((state.pose.x - 0.3 * 25.0 / 26.0).abs() < 1e-12, "{:?}", state.pose);
     assert!((state.covariance().m11 - 1e-4 * 25.0 / 26.0).abs() < 1e-15, "{}", state.covariance());
 }
+
+/// A driver that repeats half of what it has told: only the other half is new.
+#[test]
+fn of_a_motion_that_overlaps_what_was_told_the_rest_counts() {
+    let mut timeline: Timeline<40> = Timeline::new(0.1);
+    timeline.begin(time(0, 0), Ekf::new(Pose::default(), 0.0, 0.0));
+    timeline.advance(&straight(0));
+    let late = |micros: u64| Motion { start: time(0, micros), end: time(1, micros), ..straight(0) };
+    timeline.advance(&late(4_000));
+    assert_eq!(timeline.now(), time(1, 4_000));
+    assert!((timeline.state().pose.x - 0.014).abs() < 1e-12, "{:?}", timeline.state().pose);
+    // What lies before the newest entry is told twice.
+    timeline.advance(&straight(0));
+    assert_eq!(timeline.now(), time(1, 4_000));
+    assert!((timeline.state().pose.x - 0.014).abs() < 1e-12, "{:?}", timeline.state().pose);
+}

@@ -45,7 +45,7 @@ const BENDS: &[Phase] = &[
 
 const STANDARD: Equipment = Equipment::STANDARD;
 
-pub const DRIVES: [Recorded; 37] = [
+pub const DRIVES: [Recorded; 44] = [
     recorded("tricycle", 1, STANDARD, BENDS),
     recorded("differential", 2, Equipment { kind: Kind::Differential, ..STANDARD }, BENDS),
     recorded("two steered axles", 3, Equipment { kind: Kind::BiSteerable, ..STANDARD }, BENDS),
@@ -412,6 +412,101 @@ pub const DRIVES: [Recorded; 37] = [
             go(2.4, 0.4, -0.6),
             from(|drive| drive.wrong = Wrong::BLIND, 1.2, 0.8, 0.0),
             from(|drive| drive.wrong = Wrong::NOTHING, 1.2, -0.4, 0.3),
+        ],
+    ),
+    recorded(
+        "round and round, the laser is pushed in between",
+        38,
+        STANDARD,
+        &[
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 1.2, 0.0, 0.0),
+            go(12.0, 0.8, 0.4),
+            from(|drive| drive.wrong.laser = Pose::new(0.0, 0.08, 0.01), 12.0, 0.8, -0.4),
+            go(9.6, 0.8, 0.4),
+        ],
+    ),
+    recorded(
+        "gyro, map while driving",
+        39,
+        Equipment { gyro: true, landmarks: false, set: |parameters| parameters.maps.slam = true, ..STANDARD },
+        &[
+            go(2.4, 0.0, 0.0),
+            go(3.6, 0.7, 0.2),
+            from(|drive| drive.wrong.gyro = 0.01, 2.4, 0.6, -0.4),
+            go(1.2, 0.0, 0.0),
+        ],
+    ),
+    recorded(
+        "car, gyro, its scale is learned in turns",
+        40,
+        Equipment { gyro: true, kind: Kind::Car, set: |parameters| parameters.gyro.scale = 0.02, ..STANDARD },
+        &[
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 2.4, 0.0, 0.0),
+            go(7.2, 0.6, 0.6),
+            go(7.2, 0.6, -0.6),
+            from(|drive| drive.wrong = Wrong::BLIND, 4.8, 0.6, 0.6),
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 2.4, -0.6, 0.0),
+        ],
+    ),
+    recorded(
+        "increments, blind, then reflectors on one side",
+        41,
+        Equipment { kind: Kind::Increments, ..STANDARD },
+        &[
+            from(|drive| drive.wrong = Wrong::BLIND, 6.0, 0.8, 0.2),
+            from(|drive| drive.wrong = Wrong { sees: |id| id < 4, ..Wrong::REFLECTORS }, 4.8, -0.8, 0.2),
+            from(|drive| drive.wrong = Wrong { scale: 0.05, ..Wrong::REFLECTORS }, 4.8, 0.7, -0.3),
+        ],
+    ),
+    recorded(
+        "two steered axles, map while driving, told anew",
+        42,
+        Equipment {
+            kind: Kind::BiSteerable,
+            landmarks: false,
+            set: |parameters| parameters.maps.slam = true,
+            ..STANDARD
+        },
+        &[
+            go(3.6, 0.7, 0.3),
+            from(
+                |drive| {
+                    let (time, truth) = (drive.time().offset(-0.1), drive.truth);
+                    drive.tell(time, truth.compose(&Pose::new(-0.07, 0.01, -0.03)), 0.02, 0.01);
+                },
+                2.4,
+                -0.7,
+                0.3,
+            ),
+            from(|drive| drive.wrong.drift = 0.1, 2.4, 0.6, -0.5),
+        ],
+    ),
+    recorded(
+        "half of the reflectors moved alike",
+        43,
+        STANDARD,
+        &[
+            from(|drive| drive.wrong = Wrong::REFLECTORS, 3.6, 0.8, 0.1),
+            from(
+                |drive| {
+                    let moved = |id, place: Point| if id % 2 == 0 { place + Point::new(0.06, 0.04) } else { place };
+                    drive.wrong.moved = moved;
+                },
+                6.0,
+                0.7,
+                0.3,
+            ),
+            go(4.8, 0.7, -0.4),
+        ],
+    ),
+    recorded(
+        "late laser of a vehicle that turns about itself, then one whose clock is put right",
+        44,
+        Equipment { kind: Kind::Differential, ..STANDARD },
+        &[
+            from(|drive| drive.wrong = Wrong { late: 0.03, ..Wrong::REFLECTORS }, 3.6, 0.02, 0.5),
+            from(|drive| drive.wrong.late = 0.0, 3.6, 0.02, -0.5),
+            go(3.6, 0.9, 0.0),
         ],
     ),
 ];
