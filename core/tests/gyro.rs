@@ -3,7 +3,7 @@
 
 use agv_core::filter::{GyroState, KnownPose};
 use agv_core::geometry::{Point, Pose, Twist, difference};
-use agv_core::localizer::{Event, Localizer, Misuse, Mode, Parameters, PoseFix, Reason};
+use agv_core::localizer::{Event, Localize, Localizer, Misuse, Mode, Parameters, PoseFix, Reason};
 use agv_core::maps::Landmark;
 use agv_core::measurement::{GyroSample, ReflectorObservation, Reflectors, Time, WheelReading, WheelSample};
 use agv_core::odometry::{
@@ -563,5 +563,35 @@ fn rest_with_a_variance_that_is_no_number_tells_nothing() {
         let mut gyro = fresh;
         gyro.see_rest(0.004, variance);
         assert_eq!((gyro.errors(), gyro.covariance()), (fresh.errors(), fresh.covariance()), "{variance}");
+    }
+}
+
+/// What a controller sees of the localiser that it was lent.
+#[test]
+fn a_localiser_that_was_lent_says_what_it_has_learned_of_the_gyro() {
+    fn errors(localizer: impl Localize) -> Option<GyroErrors> {
+        localizer.gyro_errors()
+    }
+    for is_fitted in [false, true] {
+        let mut localizer: Box<Localizer> =
+            Box::new(Localizer::new(parameters(GyroParameters { is_fitted, ..FITTED })));
+        for step in 0..200 {
+            let time = Time::from_micros(1_000_000 + 10_000 * step);
+            localizer.handle(&Event::Gyro(GyroSample { time, rate: 0.004 + 1e-5 * (step % 3) as f64 }));
+            localizer.handle(&Event::Wheels(WheelSample { time, wheels: [WheelReading::default(); 4] }));
+            if step == 2 {
+                let pose = Pose::default();
+                localizer.handle(&Event::SetPose(PoseFix {
+                    time,
+                    pose,
+                    position_deviation: 0.01,
+                    heading_deviation: 0.01,
+                }));
+            }
+        }
+        let learned = localizer.gyro_errors();
+        assert_eq!(learned.is_some(), is_fitted);
+        assert!(learned.is_none_or(|learned| (learned.bias - 0.00401).abs() < 2e-4), "{learned:?}");
+        assert_eq!(errors(&mut *localizer), learned);
     }
 }

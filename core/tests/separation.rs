@@ -7,7 +7,7 @@ use agv_core::integrity::separation::{
     SolutionSeparation, Step, fault_free,
 };
 use agv_core::measurement::Time;
-use agv_core::odometry::{BiasJacobian, Motion};
+use agv_core::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::falko::scene::Random;
@@ -640,5 +640,33 @@ fn a_level_without_faults_is_that_of_the_larger_axis_wherever_it_points() {
         let level = fault_free(&entries);
         assert!((level.position - 7.45 * long).abs() < 1e-12, "{level:?}");
         assert!((level.heading - 7.15 * 0.003).abs() < 1e-12, "{level:?}");
+    }
+}
+
+/// Blind, on a straight, with wheels that are as good as exact: what is left is the bias of the gyro, for as long as it was believed.
+#[test]
+fn the_heading_is_bounded_by_what_is_known_of_the_bias_of_a_gyro() {
+    let gyro = GyroParameters { is_fitted: true, ..GyroParameters::default() };
+    let wheels = AssumedDeviations { scale: 1e-6, steering: 1e-6, turn: 1e-6, ..AssumedDeviations::default() };
+    for known in [1e-3, 4e-3, 1.0] {
+        let mut monitor = SolutionSeparation::with_gyro(wheels, Some(1.4), Some(&gyro));
+        monitor.rebase_gyro(&GyroErrors::default(), known, gyro.bias);
+        let (begin, mut odometry) = (Time::from_micros(1_000_000), Pose::default());
+        monitor.begin(begin, &odometry, &[1e-8, 0.0, 1e-8, 0.0, 0.0, 1e-10], &odometry);
+        for step in 0..100 {
+            let start = begin.offset(0.1 * f64::from(step));
+            let displacement = Pose::new(0.05, 0.0, 0.0);
+            odometry = odometry.compose(&displacement);
+            let covariance = Matrix3::from_diagonal(&Vector3::new(1e-8, 1e-10, 1e-12));
+            let motion = Motion { start, end: start.offset(0.1), displacement, covariance, distance: 0.05 };
+            monitor.travel_by_gyro(&motion, Some(&motion), &odometry);
+        }
+        monitor.step(begin.offset(10.0), &odometry);
+        let laser = monitor.laser(&Pose::default(), &odometry);
+        monitor.begin_event();
+        monitor.end_event(&odometry, &laser, 1.0);
+        let expected = FAULT_FREE.heading * 10.0 * f64::min(known, gyro.bias);
+        let found = monitor.level().heading;
+        assert!((found / expected - 1.0).abs() < 0.02, "{known}: {found} {expected}");
     }
 }
