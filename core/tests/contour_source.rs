@@ -366,3 +366,30 @@ fn of_two_places_that_look_alike_the_one_where_the_vehicle_should_be_is_taken() 
         }
     }
 }
+
+/// A controller with room for few points of a map.
+#[test]
+fn surroundings_that_are_cut_are_said_to_be() {
+    type Narrow = Localizer<CapacitiesOf<BEAMS, 16, 16, 4, SlamSlots, Contours<'static, 400, 256>>>;
+    let map = map(&room(), &Pose::default());
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: Time::from_micros(1_000_000),
+        beam_interval: REVOLUTION / BEAMS as f64,
+        first_bearing: -PI,
+        bearing_step: TAU / BEAMS as f64,
+        ranges: &[3.0; BEAMS],
+        intensities: &[],
+    };
+    let fix = |pose| PoseFix { time: scan.start, pose, position_deviation: 0.01, heading_deviation: 0.003 };
+    let mut narrow = Box::new(Narrow::new(parameters()));
+    narrow.set_contours(Some(map));
+    let mut wide = Box::new(Small::new(parameters()));
+    wide.set_contours(Some(map));
+    let increment = PoseIncrement { time: scan.end(), displacement: Pose::default() };
+    for event in [Event::SetPose(fix(Pose::default())), Event::Increment(increment), Event::Scan(scan)] {
+        narrow.handle(&event);
+        wide.handle(&event);
+    }
+    assert_eq!((narrow.outputs().pose.overflows, wide.outputs().pose.overflows), (1, 0));
+}

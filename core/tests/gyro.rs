@@ -92,7 +92,8 @@ fn a_motion_takes_another_turn_as_an_arc_of_that_turn() {
     for (turn, other) in [(0.0, 0.02), (0.03, -0.01), (-0.05, -0.04)] {
         let arc = |turn: f64| Pose::exp(&Twist { x: 0.3, y: 0.0, theta: turn });
         let time = Time::from_micros(5);
-        let motion = Motion { displacement: arc(turn), ..Motion::none(time) };
+        let covariance = Matrix3::new(4e-6, 1e-6, 0.0, 1e-6, 3e-6, 0.0, 0.0, 0.0, 2e-6);
+        let motion = Motion { displacement: arc(turn), covariance, ..Motion::none(time) };
         let found = motion.with_turn(other, 1e-6);
         let expected = arc(other);
         assert!((found.displacement.x - expected.x).abs() < 2e-5 && (found.displacement.y - expected.y).abs() < 2e-5);
@@ -101,6 +102,16 @@ fn a_motion_takes_another_turn_as_an_arc_of_that_turn() {
         let by = (arc(other + 1e-6).y - arc(other - 1e-6).y) / 2e-6;
         assert!((found.covariance.m23 - by * 1e-6).abs() < 2e-9, "{} {by}", found.covariance.m23);
         assert!((found.covariance.m33 - 1e-6).abs() < 1e-18);
+        let by_x = (arc(other + 1e-6).x - arc(other - 1e-6).x) / 2e-6;
+        let own = motion.covariance;
+        for (name, entry, expected) in [
+            ("xx", found.covariance.m11, own.m11 + by_x * by_x * 1e-6),
+            ("xy", found.covariance.m12, own.m12 + by_x * by * 1e-6),
+            ("yy", found.covariance.m22, own.m22 + by * by * 1e-6),
+            ("xh", found.covariance.m13, by_x * 1e-6),
+        ] {
+            assert!((entry - expected).abs() < 3e-9, "{name}: {entry} {expected}");
+        }
     }
 }
 

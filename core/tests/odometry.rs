@@ -8,10 +8,11 @@
 
 use agv_core::filter::Ekf;
 use agv_core::geometry::{Pose, Twist, difference};
-use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time};
+use agv_core::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time, WheelReading, WheelSample};
 use agv_core::odometry::{
-    Ackermann, Believed, Control, CounterRange, Increments, Integration, Kinematics, Motion, OdometerParameters,
-    OdometryBias, OdometryError, OdometryNoise, Tricycle, Vehicle, VehicleOdometer,
+    Ackermann, AngleEncoder, Believed, Control, CounterRange, Differential, DrivenWheel, Increments, Integration,
+    Kinematics, Motion, OdometerParameters, OdometryBias, OdometryError, OdometryNoise, RecentMotion, Tricycle,
+    Vehicle, VehicleOdometer,
 };
 use nalgebra::Matrix3;
 use proptest::prelude::*;
@@ -507,4 +508,56 @@ fn a_vehicle_that_tells_its_speed_may_be_silent_for_as_long_as_it_likes() {
     let car = Ackermann { wheelbase: WHEELBASE, encoder_offset: 0.4 };
     assert_eq!(car.longest_interval(5.0), f64::INFINITY);
     assert_eq!(Increments.longest_interval(5.0), f64::INFINITY);
+}
+
+#[test]
+fn two_wheels_are_backward_if_their_middle_is_and_as_before_if_it_stands() {
+    let turn = AngleEncoder { scale: 1e-3, range: CounterRange::BITS_16 };
+    let wheel = DrivenWheel { radius: 0.1, turn };
+    let vehicle = Differential { track: 0.6, left: wheel, right: wheel };
+    let report = |micros, counts: [i32; 2]| {
+        let count = |count: i32| WheelReading { count: count.rem_euclid(65_536) as u32, steering: 0 };
+        let wheels = [count(counts[0]), count(counts[1]), WheelReading::default(), WheelReading::default()];
+        WheelSample { time: Time::from_micros(micros), wheels }
+    };
+    for was_backward in [false, true] {
+        let noise = OdometryNoise::default();
+        let believed = Believed { noise, integration: Integration::default(), was_backward };
+        for (counts, is_backward) in
+            [([100, 100], false), ([-100, -100], true), ([-20, 100], false), ([20, -100], true), ([0, 0], was_backward)]
+        {
+            let step = vehicle.step(&report(0, [0, 0]), &report(10_000, counts), 0.01, &believed);
+            assert_eq!(step.is_backward, is_backward, "{counts:?}, {was_backward} before");
+        }
+    }
+}
+
+/// The velocity between two samples is that of the last one to two tenths of a second, however the samples came.
+#[test]
+fn the_recent_motion_is_that_of_one_to_two_tenths_of_a_second() {
+    let time = |milliseconds: u64| Time::from_micros(1000 * milliseconds);
+    let mut recent = RecentMotion::standing(time(0));
+    let at = |milliseconds: u64, x: f64| Motion {
+        start: time(milliseconds),
+        end: time(milliseconds + 10),
+        displacement: Pose::new(x, 0.0, 0.0),
+        distance: x,
+        ..Motion::none(time(milliseconds))
+    };
+    // 1 m/s for half a second, then 2 m/s.
+    for step in 0..80 {
+        recent.add(&at(10 * step, if step < 50 { 0.01 } else { 0.02 }));
+        let now = recent.end();
+        assert_eq!(now, time(10 * step + 10));
+        let passed = 0.01 * (step + 1) as f64;
+        let speed = -recent.pose_at(now.offset(-0.01)).x / 0.01;
+        match step {
+            0..50 => assert!((speed - 1.0).abs() < 1e-9, "{passed}: {speed}"),
+            70.. => assert!((speed - 2.0).abs() < 1e-9, "{passed}: {speed}"),
+            _ => assert!((1.0..=2.0).contains(&speed), "{passed}: {speed}"),
+        }
+    }
+    // What is further away than 0.32 s is taken for as far.
+    assert_eq!(recent.pose_at(recent.end().offset(1.0)), recent.pose_at(recent.end().offset(0.32)));
+    assert_eq!(recent.pose_at(recent.end().offset(-1.0)), recent.pose_at(recent.end().offset(-0.32)));
 }

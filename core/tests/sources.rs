@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use agv_core::contours::ContourMatch;
 use agv_core::filter::{Ekf, Linearisation, Slots};
-use agv_core::geometry::Pose;
+use agv_core::geometry::{Pose, difference};
 use agv_core::localizer::{MapUse, Mode, Parameters};
 use agv_core::maps::Verdict;
 use agv_core::measurement::Time;
@@ -202,4 +202,42 @@ fn an_aid_that_is_late_is_used_where_the_vehicle_was_then() {
     assert_eq!(stage.localizer.aid(&never).verdict, Verdict::OutOfTime);
     let nowhere = Told { state: 7, time: stage.time(), ..never };
     assert_eq!(stage.localizer.aid(&nowhere).verdict, Verdict::Unknown);
+}
+
+/// All of the pose, as it is.
+struct WholePose(Time, Pose);
+
+impl Aid<3> for WholePose {
+    fn time(&self) -> Time {
+        self.0
+    }
+
+    fn linearise<S: Slots>(&self, state: &Ekf<S>) -> Option<Linearisation<3>> {
+        let off = [self.1.x - state.pose.x, self.1.y - state.pose.y, difference(self.1.theta, state.pose.theta)];
+        let linearisation = Linearisation::new(off.into(), Matrix3::from_diagonal_element(1e-4));
+        Some((0..3).fold(linearisation, |sum, state| sum.with(state, Vector3::ith(state, 1.0))))
+    }
+
+    fn gate(&self) -> f64 {
+        16.0
+    }
+}
+
+/// What says all of the pose is something to rest on; what says a part of it is not.
+#[test]
+fn a_vehicle_rests_on_an_aid_that_says_all_of_the_pose() {
+    for (is_whole, mode) in [(true, Mode::Features), (false, Mode::DeadReckoning)] {
+        let mut stage = Stage::told(parameters());
+        for _ in 0..40 {
+            stage.drive(0.8, 0.1);
+            let (time, truth) = (stage.time(), stage.truth);
+            let outcome = if is_whole {
+                stage.localizer.aid(&WholePose(time, truth))
+            } else {
+                stage.localizer.aid(&Told { time, state: 0, value: truth.x, deviation: 0.01 })
+            };
+            assert_eq!(outcome.verdict, Verdict::Accepted);
+        }
+        assert_eq!(stage.said().mode, mode);
+    }
 }
