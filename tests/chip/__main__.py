@@ -11,7 +11,8 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 
 from bench import Bench
-from checks import CHECKS
+from checks import CHECKS, checks_of
+from emulated_chip.description import Description
 
 
 def run(options, name):
@@ -38,13 +39,14 @@ def main():
     parser.add_argument("--list", action="store_true", help="only name the checks")
     parser.add_argument("checks", nargs="*", help="checks to run; all of them if none is named")
     options = parser.parse_args()
+    all_checks = checks_of(Description(options.description).name)
     if options.list:
-        print("\n".join(CHECKS))
+        print("\n".join(all_checks))
         return 0
-    unknown = [name for name in options.checks if name not in CHECKS]
+    unknown = [name for name in options.checks if name not in all_checks]
     if unknown:
         parser.error(f"there is no check {unknown[0]}")
-    names = options.checks or list(CHECKS)
+    names = options.checks or all_checks
     has_failed = False
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         for answer in pool.map(run, [options] * len(names), names):

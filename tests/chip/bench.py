@@ -6,6 +6,7 @@ from emulated_chip.can_peers import Listener
 from emulated_chip.chip import Chip
 from emulated_chip.clock import MILLISECOND
 from emulated_chip.description import Description
+from emulated_chip.flash import Flash
 from emulated_chip.image import Image
 
 # Longest start that a check waits for: flash that has to be erased, twice.
@@ -19,6 +20,14 @@ class Bench:
         self.is_long = is_long
         self.facts = {}
         self._hook = Path(hook)
+
+    def has_one_bank(self):
+        """Whether program and settings share a bank of flash: the processor stands still while it is written."""
+        return self.description.settings_bank() == 0
+
+    def flash(self):
+        """The bank of the settings, erased."""
+        return Flash(self.description.banks()[self.description.settings_bank()][1])
 
     def chip(self, **options):
         """A chip that has just got its power, on a bus with one node that listens."""

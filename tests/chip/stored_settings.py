@@ -47,6 +47,9 @@ def starts(number):
 # Leaf 300 is the controller's node: a whole number (variant 1 of the leaf's value) as `postcard` writes it.
 NODE_17 = item(300, bytes([1, 17]))
 
+# Leaf 312 lets masters of the bus change settings: a switch (variant 2 of the value).
+ACCEPTS_SETTINGS = item(312, bytes([2, 1]))
+
 # Leaf 308 is the bit rate of the bus in kbit/s, in the seven bits a byte of `postcard`.
 BIT_RATE_250 = item(308, bytes([1, 0x80 | 250 & 0x7F, 250 >> 7]))
 

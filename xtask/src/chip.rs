@@ -1,22 +1,24 @@
-//! `cargo xtask chip`: the image that is flashed, in the emulated STM32H743.
+//! `cargo xtask chip`: the image that is flashed, in the emulated chip of its board.
 //!
 //! The emulated chip is a program of its own, `tests/chip`, in a process of its own: Unicorn, on which it stands, is under
 //! the GPL and belongs to no product.
-
-mod metadata;
 
 use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context, bail};
 
+use crate::firmware::image::{Board, H743};
 use crate::{firmware, repository, requirements};
 
-/// Check the image that is flashed in the emulated STM32H743
+/// Check the image that is flashed in the emulated chip of its board
 #[derive(clap::Args)]
 pub struct Chip {
     /// Checks to run, by name; all of them if none is named.
     checks: Vec<String>,
+    /// Feature of the board: h743 or h723.
+    #[arg(long, default_value = H743.feature)]
+    board: String,
     /// Only name the checks.
     #[arg(long)]
     list: bool,
@@ -34,10 +36,12 @@ impl Chip {
         for missing in requirements::prepare_chip() {
             eprintln!("{missing}");
         }
-        let image = self.image.map_or_else(firmware::flashed_vehicle, Ok)?;
+        let board = Board::named(&self.board)?;
+        let description = describe(board.chip()?.metadata)?;
+        let image = self.image.map_or_else(|| firmware::flashed_vehicle(board), Ok)?;
         let mut python = Command::new(requirements::python());
         python.arg(repository().join("tests/chip")).arg("--image").arg(image);
-        python.arg("--description").arg(describe()?).arg("--hook").arg(build_hook()?);
+        python.arg("--description").arg(description).arg("--hook").arg(build_hook()?);
         for (is_wanted, option) in [(self.list, "--list"), (self.long, "--long")] {
             if is_wanted {
                 python.arg(option);
@@ -52,11 +56,17 @@ impl Chip {
     }
 }
 
-/// Writes the chip's description, and returns where.
-fn describe() -> anyhow::Result<PathBuf> {
-    let path = folder()?.join("stm32h743zi.json");
-    let text = serde_json::to_string(&metadata::describe()?)?;
-    std::fs::write(&path, text).with_context(|| path.display().to_string())?;
+/// Writes the description of a chip, and returns where.
+fn describe(chip: &str) -> anyhow::Result<PathBuf> {
+    let path = folder()?.join(chip).with_extension("json");
+    let cargo = std::env::var_os("CARGO").map_or_else(|| PathBuf::from("cargo"), PathBuf::from);
+    let mut describe = Command::new(cargo);
+    describe.args(["run", "--quiet", "--release", "--package", "agv-chip-description", "--features", chip]);
+    let output = describe.current_dir(repository()).output().context("cargo cannot be started")?;
+    if !output.status.success() {
+        bail!("{chip} is not described: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    std::fs::write(&path, output.stdout).with_context(|| path.display().to_string())?;
     Ok(path)
 }
 
