@@ -77,6 +77,19 @@ def emergencies(chip, since=0):
     return [int.from_bytes(frame.data[:2], "little") for _, frame in chip.listener.of(0x90, since)]
 
 
+# What the program paints the stack with.
+PAINT = 0xC0DE_57AC.to_bytes(4, "little")
+
+
+def deepest_stack(chip):
+    """Bytes of the stack that were ever used."""
+    top, end, guard = (chip.image.address(name) for name in ("_stack_start", "_stack_end", "_stack_guard"))
+    ram = chip.ram_at(end)
+    stack = ram.bytes(end + guard, top - end - guard)
+    unused = next((place for place in range(0, len(stack), 4) if stack[place : place + 4] != PAINT), len(stack))
+    return len(stack) - unused
+
+
 def describe(chip):
     """What has gone wrong, in one line."""
     parts = [str(finding.as_json()) for finding in chip.findings]

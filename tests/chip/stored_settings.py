@@ -60,10 +60,17 @@ def write(flash, page, items):
     flash.bytes[page * PAGE : page * PAGE + len(contents)] = contents
 
 
-def fill(flash, page, first_items=b"", room=0):
-    """Fills a page with counts of starts behind other items, but for so many items at its end. Returns the last count."""
+# A piece of a map that no index names: it takes much room, and few items to look through.
+PIECE = item(2000, b"\1" * 1200)
+
+
+def fill(flash, page, first_items=b"", room=0, with_pieces=False):
+    """Fills a page with counts of starts behind other items, but for so many items at its end. Most of it may be pieces of a map
+    instead. Returns the last count."""
     contents = bytearray(b"\0" * WORD + first_items)
     number = 0
+    while with_pieces and len(contents) + 2 * len(PIECE) <= PAGE:
+        contents += PIECE
     while len(contents) + 2 * WORD * (room + 1) <= PAGE - WORD:
         number += 1
         contents += starts(number)

@@ -33,15 +33,7 @@ pub struct Chip {
 impl Chip {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        for missing in requirements::prepare_chip() {
-            eprintln!("{missing}");
-        }
-        let board = Board::named(&self.board)?;
-        let description = describe(board.chip()?.metadata)?;
-        let image = self.image.map_or_else(|| firmware::flashed_vehicle(board), Ok)?;
-        let mut python = Command::new(requirements::python());
-        python.arg(repository().join("tests/chip")).arg("--image").arg(image);
-        python.arg("--description").arg(description).arg("--hook").arg(build_hook()?);
+        let mut python = command(Board::named(&self.board)?, self.image)?;
         for (is_wanted, option) in [(self.list, "--list"), (self.long, "--long")] {
             if is_wanted {
                 python.arg(option);
@@ -54,6 +46,19 @@ impl Chip {
             bail!("a check has failed")
         }
     }
+}
+
+/// The program that emulates the chip of a board, with an image, or the one that is built.
+pub fn command(board: &Board, image: Option<PathBuf>) -> anyhow::Result<Command> {
+    for missing in requirements::prepare_chip() {
+        eprintln!("{missing}");
+    }
+    let description = describe(board.chip()?.metadata)?;
+    let image = image.map_or_else(|| firmware::flashed_vehicle(board), Ok)?;
+    let mut python = Command::new(requirements::python());
+    python.arg(repository().join("tests/chip")).arg("--image").arg(image);
+    python.arg("--description").arg(description).arg("--hook").arg(build_hook()?);
+    Ok(python)
 }
 
 /// Writes the description of a chip, and returns where.

@@ -14,12 +14,7 @@ unsafe extern "C" {
 /// To be called once, before anybody uses what is there. All zero must be a valid beginning of every static there, as it is
 /// of a `StaticCell`.
 pub unsafe fn clear() {
-    let (mut word, end) = (&raw mut _large_start, &raw mut _large_end);
-    while word < end {
-        // SAFETY: the linker has put both on whole words, and nobody uses what is between them yet.
-        unsafe {
-            word.write_volatile(0);
-            word = word.add(1);
-        }
-    }
+    let (start, end) = (&raw mut _large_start, &raw mut _large_end);
+    // SAFETY: the linker has put both on whole words, and nobody uses what is between them yet.
+    unsafe { start.write_bytes(0, end.addr().saturating_sub(start.addr()) / size_of::<u32>()) };
 }

@@ -56,7 +56,7 @@ def says_before_it_stands_still(bench):
     """A master of the bus stores a setting while the page is full. With two banks of flash the poses go on; with one the
     processor stands still for as long as a page takes to erase, and says so before."""
     chip = bench.chip()
-    fill(chip.settings_flash, FIRST_PAGE, ACCEPTS_SETTINGS, room=2)
+    fill(chip.settings_flash, FIRST_PAGE, ACCEPTS_SETTINGS, room=2, with_pieces=True)
     start(chip)
     chip.run_for(3 * SECOND)
     erases = chip.settings_flash.erases
