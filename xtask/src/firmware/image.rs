@@ -51,13 +51,17 @@ impl Region {
     }
 }
 
-/// The emulated board, in as much RAM as the vehicle's had for everything.
+/// The emulated board, with what the vehicle's has: its flash, and its RAM in domains D1 and D2 together.
 pub const AN500: Board = Board {
     feature: "an500",
     chip: None,
     images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
-    flash: 512 * 1024,
-    ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 368 * 1024 }],
+    flash: H743.flash,
+    ram: &[Region {
+        name: "RAM",
+        addresses: 0x2000_0000..0x2040_0000,
+        budget: H743.ram[0].budget + H743.ram[1].budget,
+    }],
 };
 
 /// The vehicle's board, a Nucleo-H743ZI. The stack has the DTCM for itself, and the program the first bank of flash, of which a
