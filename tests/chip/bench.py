@@ -82,7 +82,7 @@ PAINT = 0xC0DE_57AC.to_bytes(4, "little")
 
 
 def deepest_stack(chip):
-    """Bytes of the stack that were ever used."""
+    """Bytes of the stack that were used since the program's loop began."""
     top, end, guard = (chip.image.address(name) for name in ("_stack_start", "_stack_end", "_stack_guard"))
     ram = chip.ram_at(end)
     stack = ram.bytes(end + guard, top - end - guard)

@@ -2,7 +2,7 @@
 
 The first line says what the vehicle is like; each other line has what is said to the chip now and until when it runs, and is
 answered by what the chip has said until then. Times are microseconds since power came. A line without a time is answered by how many
-bytes of the stack were ever used.
+bytes of the stack were used since the program's loop began.
 """
 
 import json

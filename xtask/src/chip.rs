@@ -25,6 +25,9 @@ pub struct Chip {
     /// Full sweeps instead of samples of them.
     #[arg(long)]
     long: bool,
+    /// Be a part of a vehicle that `agv emulate --chip` plays, over standard input and output.
+    #[arg(long)]
+    serve: bool,
     /// Another image than the one that is built.
     #[arg(long)]
     image: Option<PathBuf>,
@@ -34,7 +37,7 @@ impl Chip {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let mut python = command(Board::named(&self.board)?, self.image)?;
-        for (is_wanted, option) in [(self.list, "--list"), (self.long, "--long")] {
+        for (is_wanted, option) in [(self.list, "--list"), (self.long, "--long"), (self.serve, "--serve")] {
             if is_wanted {
                 python.arg(option);
             }

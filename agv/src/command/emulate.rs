@@ -20,7 +20,8 @@ use super::progress;
 const HELP: &str = "\
 The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
 replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that
-is printed. In the repository, `cargo xtask emulate` builds the firmware first.
+is printed. In the repository, `cargo xtask emulate` builds the firmware first, and `cargo xtask emulate --chip` drives with the
+image that is flashed, in the emulated chip of its board and in virtual time.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
@@ -63,7 +64,7 @@ struct Outcome {
     damages: usize,
     events: usize,
     is_bit_equal: bool,
-    /// Bytes of the stack that were ever used, if the emulated chip tells.
+    /// Bytes of the stack that were used since the program's loop began, if the emulated chip tells.
     #[serde(skip_serializing_if = "Option::is_none")]
     stack: Option<u32>,
 }

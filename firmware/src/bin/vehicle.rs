@@ -231,6 +231,9 @@ fn start() -> Vehicle {
 #[inline(never)]
 fn run(vehicle: Vehicle) -> ! {
     let Vehicle { localization, mut revolutions, mut watchdog, mut supervisor } = vehicle;
+    // What builds the large values goes deeper than what runs then: each is told apart.
+    defmt::info!("stack at the start: {} of {} bytes", stack::deepest(), stack::reserved());
+    stack::paint();
     let mut deepest = 0;
     loop {
         let is_busy = localization.step(&mut revolutions);

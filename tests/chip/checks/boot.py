@@ -1,6 +1,6 @@
 """From reset to the loop."""
 
-from bench import check_sound, deepest_stack, describe, poses
+from bench import check_sound, describe, poses
 from emulated_chip.clock import MILLISECOND
 from emulated_chip.system_control import DATA_CACHE_ON, INSTRUCTION_CACHE_ON, CCR
 
@@ -24,7 +24,6 @@ def boots(bench):
     bench.note("start_ms", chip.clock.now() / MILLISECOND)
     chip.run_for(100 * MILLISECOND)
     bench.note("first_pose_ms", poses(chip)[0] / MILLISECOND)
-    bench.note("stack_bytes", deepest_stack(chip))
 
 
 def has_the_clocks_of_the_manual(bench):

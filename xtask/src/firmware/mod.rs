@@ -35,8 +35,12 @@ enum Action {
         #[arg(long)]
         icount: bool,
     },
-    /// Flash, RAM and stack of every image, against its budget.
-    Size,
+    /// Flash and RAM of every image, against its budget.
+    Size {
+        /// Only the vehicle's images of real boards, as the book has them.
+        #[arg(long)]
+        table: bool,
+    },
     /// Flash an image to a vehicle's board, through probe-rs.
     Flash {
         /// Name of the image.
@@ -58,9 +62,9 @@ impl Firmware {
                 build_board(&AN500)?;
                 emulate(&image, icount)
             }
-            Action::Size => {
+            Action::Size { table } => {
                 build()?;
-                size::print()
+                if table { size::print_table() } else { size::print() }
             }
             Action::Flash { image, board } => flash(&image, Board::named(&board)?),
         }

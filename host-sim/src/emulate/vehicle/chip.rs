@@ -156,7 +156,7 @@ struct Play<'a> {
 pub struct InChip {
     /// The drive.
     pub driven: Driven,
-    /// Bytes of the stack that were ever used.
+    /// Bytes of the stack that were used since the program's loop began.
     pub stack: u32,
 }
 
