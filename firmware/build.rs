@@ -8,8 +8,13 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
-    let is_emulated = env::var_os("CARGO_FEATURE_AN500").is_some();
-    let layout = if is_emulated { "src/board/an500/memory.x" } else { "../memory.x" };
+    let has = |feature: &str| env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();
+    let is_emulated = has("AN500");
+    let layout = match (is_emulated, has("H723")) {
+        (true, _) => "src/board/an500/memory.x",
+        (_, true) => "src/board/h723/memory.x",
+        _ => "../memory.x",
+    };
     println!("cargo:rerun-if-changed={layout}");
     let folder = PathBuf::from(env::var_os("OUT_DIR").expect("cargo names the folder of outputs"));
     fs::copy(layout, folder.join("memory.x")).expect("the memory layout can be copied");

@@ -11,7 +11,9 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 
 from bench import Bench
-from checks import CHECKS
+from checks import CHECKS, checks_of
+from emulated_chip.description import Description
+from served import serve
 
 
 def run(options, name):
@@ -36,15 +38,21 @@ def main():
     parser.add_argument("--hook", required=True, help="block_hook.c, built as a shared library")
     parser.add_argument("--long", action="store_true", help="full sweeps instead of samples of them")
     parser.add_argument("--list", action="store_true", help="only name the checks")
+    parser.add_argument("--serve", action="store_true", help="be a part of a vehicle: see served.py")
     parser.add_argument("checks", nargs="*", help="checks to run; all of them if none is named")
     options = parser.parse_args()
-    if options.list:
-        print("\n".join(CHECKS))
+    if options.serve:
+        bench = Bench(options.image, options.description, options.hook)
+        serve(bench, sys.stdin, lambda line: print(line, flush=True))
         return 0
-    unknown = [name for name in options.checks if name not in CHECKS]
+    all_checks = checks_of(Description(options.description).name)
+    if options.list:
+        print("\n".join(all_checks))
+        return 0
+    unknown = [name for name in options.checks if name not in all_checks]
     if unknown:
         parser.error(f"there is no check {unknown[0]}")
-    names = options.checks or list(CHECKS)
+    names = options.checks or all_checks
     has_failed = False
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         for answer in pool.map(run, [options] * len(names), names):

@@ -6,6 +6,7 @@ from emulated_chip.can_peers import Listener
 from emulated_chip.chip import Chip
 from emulated_chip.clock import MILLISECOND
 from emulated_chip.description import Description
+from emulated_chip.flash import Flash
 from emulated_chip.image import Image
 
 # Longest start that a check waits for: flash that has to be erased, twice.
@@ -19,6 +20,14 @@ class Bench:
         self.is_long = is_long
         self.facts = {}
         self._hook = Path(hook)
+
+    def has_one_bank(self):
+        """Whether program and settings share a bank of flash: the processor stands still while it is written."""
+        return self.description.settings_bank() == 0
+
+    def flash(self):
+        """The bank of the settings, erased."""
+        return Flash(self.description.banks()[self.description.settings_bank()][1])
 
     def chip(self, **options):
         """A chip that has just got its power, on a bus with one node that listens."""
@@ -66,6 +75,19 @@ def longest_gap(times, start, end):
 def emergencies(chip, since=0):
     """Codes of the emergency frames of node 16."""
     return [int.from_bytes(frame.data[:2], "little") for _, frame in chip.listener.of(0x90, since)]
+
+
+# What the program paints the stack with.
+PAINT = 0xC0DE_57AC.to_bytes(4, "little")
+
+
+def deepest_stack(chip):
+    """Bytes of the stack that were used since the program's loop began."""
+    top, end, guard = (chip.image.address(name) for name in ("_stack_start", "_stack_end", "_stack_guard"))
+    ram = chip.ram_at(end)
+    stack = ram.bytes(end + guard, top - end - guard)
+    unused = next((place for place in range(0, len(stack), 4) if stack[place : place + 4] != PAINT), len(stack))
+    return len(stack) - unused
 
 
 def describe(chip):

@@ -47,6 +47,9 @@ def starts(number):
 # Leaf 300 is the controller's node: a whole number (variant 1 of the leaf's value) as `postcard` writes it.
 NODE_17 = item(300, bytes([1, 17]))
 
+# Leaf 312 lets masters of the bus change settings: a switch (variant 2 of the value).
+ACCEPTS_SETTINGS = item(312, bytes([2, 1]))
+
 # Leaf 308 is the bit rate of the bus in kbit/s, in the seven bits a byte of `postcard`.
 BIT_RATE_250 = item(308, bytes([1, 0x80 | 250 & 0x7F, 250 >> 7]))
 
@@ -57,10 +60,17 @@ def write(flash, page, items):
     flash.bytes[page * PAGE : page * PAGE + len(contents)] = contents
 
 
-def fill(flash, page, first_items=b"", room=0):
-    """Fills a page with counts of starts behind other items, but for so many items at its end. Returns the last count."""
+# A piece of a map that no index names: it takes much room, and few items to look through.
+PIECE = item(2000, b"\1" * 1200)
+
+
+def fill(flash, page, first_items=b"", room=0, with_pieces=False):
+    """Fills a page with counts of starts behind other items, but for so many items at its end. Most of it may be pieces of a map
+    instead. Returns the last count."""
     contents = bytearray(b"\0" * WORD + first_items)
     number = 0
+    while with_pieces and len(contents) + 2 * len(PIECE) <= PAGE:
+        contents += PIECE
     while len(contents) + 2 * WORD * (room + 1) <= PAGE - WORD:
         number += 1
         contents += starts(number)

@@ -1,32 +1,101 @@
-//! The image that is flashed, in the emulated STM32H743: `tests/chip` judges, this asks it.
+//! The images that are flashed, each in its emulated chip: `tests/chip` judges, this asks it.
 
+use std::path::Path;
 use std::process::{Command, Output};
 
+use agv_host_sim::emulate::vehicle::{InChip, drive_in_chip, errors};
+use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::simulate;
+use agv_host_sim::{log, replay};
 use agv_tests::{image, python, repository, skip};
 use serde_json::Value;
 
 /// Fewer checks than this were not all.
 const LEAST: usize = 20;
 
-fn chip(arguments: &[&str]) -> Output {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    Command::new(cargo).args(["xtask", "chip"]).args(arguments).current_dir(repository("")).output().unwrap()
+/// What is asked of the smaller board in the short form: what its single bank of flash, its clocks and its memory change.
+const OF_ONE_BANK: [&str; 4] =
+    ["boots", "has_the_clocks_of_the_manual", "says_before_it_stands_still", "writes_after_an_error"];
+
+fn chip(arguments: &[&str]) -> Command {
+    let mut chip = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    chip.args(["xtask", "chip"]).args(arguments).current_dir(repository(""));
+    chip
+}
+
+/// Whether there are the image and what emulates its chip. A word about what is missing.
+fn is_there(test: &str, board: &str) -> bool {
+    if image(test, board, "vehicle").is_none() || python(test, "unicorn, elftools").is_none() {
+        return false;
+    }
+    let has_compiler = Command::new("cc").arg("--version").output().is_ok_and(|run| run.status.success());
+    if !has_compiler {
+        skip(test, "there is no compiler for C (Debian package gcc)");
+    }
+    has_compiler
+}
+
+/// Asks for checks of a board, all if none is named, and fails if one has failed or fewer have answered.
+fn check(test: &str, board: &str, checks: &[&str]) {
+    if !is_there(test, board) {
+        return;
+    }
+    let is_long = std::env::var_os("AGV_LONG").is_some();
+    let mut arguments = vec!["--board", board];
+    arguments.extend(if is_long { &["--long"][..] } else { checks });
+    let output: Output = chip(&arguments).output().unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
+    let answers: Vec<Value> = printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let least = if is_long || checks.is_empty() { LEAST } else { checks.len() };
+    assert!(answers.len() >= least, "{} checks:\n{}", answers.len(), String::from_utf8_lossy(&output.stderr));
+    let failed: Vec<&Value> = answers.iter().filter(|answer| answer["passed"] != true).collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
 fn the_flashed_image_lives_in_the_emulated_chip() {
-    const TEST: &str = "the_flashed_image_lives_in_the_emulated_chip";
-    if image(TEST, "h743", "vehicle").is_none() || python(TEST, "unicorn, elftools").is_none() {
+    check("the_flashed_image_lives_in_the_emulated_chip", "h743", &[]);
+}
+
+#[test]
+fn the_image_of_the_smaller_board_lives_in_its_chip() {
+    check("the_image_of_the_smaller_board_lives_in_its_chip", "h723", &OF_ONE_BANK);
+}
+
+/// The hall among reflectors in virtual time: poses as on the emulated board, a log that replays to the same bits.
+fn drives_through_the_hall(test: &str, board: &str, seconds: f64) {
+    if !is_there(test, board) {
         return;
     }
-    if !Command::new("cc").arg("--version").output().is_ok_and(|run| run.status.success()) {
-        return skip(TEST, "there is no compiler for C (Debian package gcc)");
-    }
-    let output = chip(if std::env::var_os("AGV_LONG").is_some() { &["--long"] } else { &[] });
-    let printed = String::from_utf8(output.stdout).unwrap();
-    let answers: Vec<Value> = printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert!(answers.len() >= LEAST, "{} checks:\n{}", answers.len(), String::from_utf8_lossy(&output.stderr));
-    let failed: Vec<&Value> = answers.iter().filter(|answer| answer["passed"] != true).collect();
-    assert!(failed.is_empty(), "{failed:#?}");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/scenarios/warehouse_hall.toml");
+    let recording = simulate(&Scenario::read(&scenario).unwrap()).unwrap().recording;
+    let folder = tempfile::tempdir().unwrap();
+    let InChip { driven, stack } =
+        drive_in_chip(&recording, chip(&["--board", board, "--serve"]), folder.path(), seconds).unwrap();
+    let errors = errors(&driven, &recording).unwrap();
+    println!("{errors:?}, {stack} bytes of stack");
+    assert!(errors.poses as f64 >= 99.0 * seconds && errors.localised_share > 0.99, "{errors:?}");
+    assert!(errors.position_max_m < 0.02 && errors.heading_max_deg < 0.1, "{errors:?}");
+    assert!(errors.longest_gap_s < 0.015, "{errors:?}");
+    let contents = log::read_contents(&driven.log, |_| ()).unwrap();
+    // Poses are published before anybody listens to the log.
+    assert!(driven.stream.damages <= 1, "{:?}", driven.stream);
+    let again = replay::replay(&contents.recording, |_| ()).unwrap();
+    let outputs = replay::compare(&contents.outputs, &again);
+    assert_eq!(outputs.first_difference, None);
+    assert!(outputs.compared as f64 > 100.0 * seconds, "{}", outputs.compared);
+    let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
+    assert_eq!(published.first_difference, None);
+    assert!(published.compared as f64 >= 99.0 * seconds, "{} poses were published", published.compared);
+}
+
+#[test]
+fn the_flashed_image_drives_through_the_hall() {
+    drives_through_the_hall("the_flashed_image_drives_through_the_hall", "h743", 10.0);
+}
+
+#[test]
+fn the_image_of_the_smaller_board_drives_through_the_hall() {
+    drives_through_the_hall("the_image_of_the_smaller_board_drives_through_the_hall", "h723", 3.0);
 }

@@ -26,7 +26,7 @@ struct House {
     floors: &'static [&'static [&'static str]],
 }
 
-const HOUSES: [House; 7] = [
+const HOUSES: [House; 8] = [
     House {
         folder: "controller",
         floors: &[
@@ -94,6 +94,7 @@ const HOUSES: [House; 7] = [
             &["emulate"],
         ],
     },
+    House { folder: "firmware", floors: &[&["app"], &["board"]] },
     House { folder: "lab", floors: &[&["campaign"], &["evaluate", "trust"]] },
 ];
 

@@ -87,7 +87,7 @@ fn names_of_crate(image: &[u8], sources: &str) -> bool {
 
 #[test]
 fn no_panic_of_the_vehicle_is_in_what_it_computes() {
-    for board in ["an500", "h743"] {
+    for board in ["an500", "h743", "h723"] {
         let Some(path) = image("no_panic_of_the_vehicle_is_in_what_it_computes", board, "vehicle") else { return };
         let image = loaded(&path);
         for folder in ["controller", "core", "places", "wire"] {

@@ -1,9 +1,12 @@
 //! `agv emulate`.
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
 
-use agv_host_sim::emulate::vehicle::{self, Errors, VehicleOptions, Watch};
+use agv_host_sim::emulate::vehicle::{self, Driven, Errors, InChip, VehicleOptions, Watch};
+use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{simulate, standard};
 use agv_host_sim::{log, replay};
@@ -17,7 +20,8 @@ use super::progress;
 const HELP: &str = "\
 The firmware runs on QEMU's MPS2-AN500 with an emulated NAV350 and emulated encoders, in real time. Its log stream is
 replayed here afterwards, and must give the same bits. Meanwhile `agv view --live` shows the drive at the address that
-is printed. In the repository, `cargo xtask emulate` builds the firmware first.
+is printed. In the repository, `cargo xtask emulate` builds the firmware first, and `cargo xtask emulate --chip` drives with the
+image that is flashed, in the emulated chip of its board and in virtual time.
 
 Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
@@ -30,8 +34,8 @@ Examples:
 #[command(after_help = HELP)]
 pub struct Emulate {
     /// Firmware image of the emulated board.
-    #[arg(long, value_name = "ELF")]
-    image: PathBuf,
+    #[arg(long, value_name = "ELF", required_unless_present = "chip")]
+    image: Option<PathBuf>,
     /// Scenario to drive; the standard hall if absent.
     #[arg(long)]
     scenario: Option<PathBuf>,
@@ -47,6 +51,9 @@ pub struct Emulate {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    /// Drive in virtual time instead, with the controller that this program and its arguments emulate; stands last.
+    #[arg(long, value_name = "PROGRAM", num_args = 1.., allow_hyphen_values = true, conflicts_with_all = ["image", "untold"])]
+    chip: Vec<OsString>,
 }
 
 #[derive(Serialize)]
@@ -57,6 +64,9 @@ struct Outcome {
     damages: usize,
     events: usize,
     is_bit_equal: bool,
+    /// Bytes of the stack that were used since the program's loop began, if the emulated chip tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stack: Option<u32>,
 }
 
 impl Emulate {
@@ -67,14 +77,13 @@ impl Emulate {
             None => toml::from_str(standard::HALL).context("standard hall")?,
         };
         let recording = simulate(&scenario)?.recording;
-        let image = self.image.canonicalize().with_context(|| self.image.display().to_string())?;
         let temporary = std::env::temp_dir().join(format!("agv-emulate-{}", std::process::id()));
         let folder = self.folder.clone().unwrap_or_else(|| temporary.clone());
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let folder = folder.canonicalize()?;
-        let options =
-            VehicleOptions { image: &image, folder: &folder, key: None, provision: true, is_told: !self.untold };
-        let outcome = self.drive(&recording, &options);
+        let outcome = self
+            .drive(&recording, &folder)
+            .and_then(|(driven, stack)| Ok(Outcome { stack, ..judge(&driven, &recording)? }));
         if self.folder.is_none() {
             // What cannot be removed is left to the system.
             let _ = std::fs::remove_dir_all(&temporary);
@@ -83,8 +92,8 @@ impl Emulate {
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcome)?);
         } else {
-            let Outcome { errors, records, events, is_bit_equal, damages } = &outcome;
-            print_rows(&[
+            let Outcome { errors, records, events, is_bit_equal, damages, stack } = &outcome;
+            let mut rows = vec![
                 ["poses".to_owned(), errors.poses.to_string()],
                 ["with reflectors".to_owned(), format!("{:.1} %", 100.0 * errors.localised_share)],
                 ["position, 95 %".to_owned(), format!("{:.1} mm", 1e3 * errors.position_p95_m)],
@@ -96,7 +105,9 @@ impl Emulate {
                 ["damages".to_owned(), damages.to_string()],
                 ["events replayed".to_owned(), events.to_string()],
                 ["the same bits".to_owned(), if *is_bit_equal { "yes" } else { "no" }.to_owned()],
-            ]);
+            ];
+            rows.extend(stack.map(|bytes| ["deepest stack".to_owned(), format!("{bytes} bytes")]));
+            print_rows(&rows);
         }
         if !outcome.is_bit_equal {
             bail!("the replay of the log stream differs from what the firmware said");
@@ -104,26 +115,37 @@ impl Emulate {
         Ok(())
     }
 
-    fn drive(
-        &self,
-        recording: &agv_host_sim::recording::Recording,
-        options: &VehicleOptions,
-    ) -> anyhow::Result<Outcome> {
+    /// The drive, and how much of its stack the program has used, if that is known.
+    fn drive(&self, recording: &Recording, folder: &Path) -> anyhow::Result<(Driven, Option<u32>)> {
         let seconds = self.seconds.unwrap_or(f64::MAX);
-        let driven = vehicle::drive(recording, options, seconds, look)?;
-        let errors = vehicle::errors(&driven, recording).context("the controller has said no pose")?;
-        let contents = log::read_contents(&driven.log, |_| ())?;
-        let again = replay::replay(&contents.recording, |_| ())?;
-        let outputs = replay::compare(&contents.outputs, &again);
-        let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
-        Ok(Outcome {
-            errors,
-            records: driven.stream.records,
-            damages: driven.stream.damages,
-            events: contents.recording.events.len(),
-            is_bit_equal: outputs.is_equal() && published.is_equal(),
-        })
+        let Some(image) = &self.image else {
+            let [program, arguments @ ..] = &self.chip[..] else { bail!("which program emulates the chip?") };
+            let mut command = Command::new(program);
+            command.args(arguments);
+            let InChip { driven, stack } = vehicle::drive_in_chip(recording, command, folder, seconds)?;
+            return Ok((driven, Some(stack)));
+        };
+        let image = image.canonicalize().with_context(|| image.display().to_string())?;
+        let options = VehicleOptions { image: &image, folder, key: None, provision: true, is_told: !self.untold };
+        Ok((vehicle::drive(recording, &options, seconds, look)?, None))
     }
+}
+
+/// How far the poses were off, and whether the log replays to the same bits.
+fn judge(driven: &Driven, recording: &Recording) -> anyhow::Result<Outcome> {
+    let errors = vehicle::errors(driven, recording).context("the controller has said no pose")?;
+    let contents = log::read_contents(&driven.log, |_| ())?;
+    let again = replay::replay(&contents.recording, |_| ())?;
+    let outputs = replay::compare(&contents.outputs, &again);
+    let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
+    Ok(Outcome {
+        errors,
+        records: driven.stream.records,
+        damages: driven.stream.damages,
+        events: contents.recording.events.len(),
+        is_bit_equal: outputs.is_equal() && published.is_equal(),
+        stack: None,
+    })
 }
 
 /// Says where the drive can be seen, and shows the pose while the vehicle drives, on a terminal only.

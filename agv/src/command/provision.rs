@@ -16,7 +16,7 @@ use super::setting_arguments::SettingArguments;
 use super::setting_text::show;
 
 const HELP: &str = "\
-The image is for the last two pages of the controller's flash, 0x081C0000 on the STM32H743:
+The image is for the last two pages of the controller's flash, 0x081C0000 on the STM32H743 and 0x080C0000 on the STM32H723:
   probe-rs download --chip STM32H743ZITx --binary-format bin --base-address 0x081C0000 flash.bin
 
 Examples:

@@ -14,24 +14,24 @@ use super::exchange::{self, now};
 use super::service::SharedController;
 use super::shared_settings::SharedSettings;
 use super::supervision::{self, Task};
-use crate::board::current as board;
-
 /// How often state machines are asked what is due.
 const STEP: Duration = Duration::from_millis(1);
 
-/// Takes part in the bus for ever.
+/// Takes part in the bus for ever, with a controller of that name.
 pub async fn run<F: NorFlash>(
+    name: &'static str,
     mut port: impl CanPort,
     settings: &Settings,
     controller: &SharedController<F>,
     troubles: Troubles,
 ) -> ! {
-    let mut bus = Bus::new(settings, board::NAME, troubles, now());
+    let mut bus = Bus::new(settings, name, troubles, now());
     let mut nodes = bus.nodes();
     port.listen_to(&nodes, bus.other_frames());
     let mut objects = SharedSettings { controller };
     let mut lost_events = exchange::lost_events();
     let mut ticker = Ticker::every(STEP);
+    exchange::bus_has_started();
     loop {
         let woken = select(port.receive(), ticker.next()).await;
         supervision::check_in(Task::Bus);
@@ -43,6 +43,9 @@ pub async fn run<F: NorFlash>(
         }
         if exchange::has_saving_failed() {
             bus.report(ErrorKind::SettingsLost, now());
+        }
+        if exchange::is_pause_announced() {
+            bus.report(ErrorKind::Pause, now());
         }
         if let Some(estimate) = exchange::newest_estimate() {
             bus.update(&estimate);

@@ -1,15 +1,10 @@
-//! How much this image localises with.
+//! How much a localiser has room for.
 
-use agv_core::localizer;
+use agv_core::filter::{Slots, slot_states};
+use agv_core::localizer::Capacities;
 
-/// Whether the localiser has room for landmarks in its state, without which `maps.slam` cannot be switched on.
-pub const HAS_SLAM: bool = cfg!(feature = "slam");
-
-/// What the localiser of this image has room for.
-#[cfg(feature = "slam")]
-type Capacities = localizer::SlamCapacities;
-#[cfg(not(feature = "slam"))]
-type Capacities = localizer::VehicleCapacities;
-
-/// The localiser of this image.
-pub type Localizer = localizer::Localizer<Capacities>;
+/// Whether there is room for past poses and landmarks in the state, without which `maps.slam` cannot be switched on.
+#[must_use]
+pub const fn has_slots<C: Capacities>() -> bool {
+    C::Slots::STATES > slot_states(0, 0)
+}

@@ -37,6 +37,8 @@ static LASER: Mutex<Cell<SensorWatch>> = Mutex::new(Cell::new(SensorWatch::new()
 /// Somebody on the bus wants the settings stored.
 static SAVE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static HAS_SAVING_FAILED: AtomicBool = AtomicBool::new(false);
+static IS_PAUSE_ANNOUNCED: AtomicBool = AtomicBool::new(false);
+static HAS_BUS_STARTED: AtomicBool = AtomicBool::new(false);
 static IS_STANDING: AtomicBool = AtomicBool::new(true);
 static ARE_SETTINGS_SOUND: AtomicBool = AtomicBool::new(true);
 /// Events that the localiser was too slow for.
@@ -131,6 +133,28 @@ pub fn saving_has_failed() {
 #[must_use]
 pub fn has_saving_failed() -> bool {
     HAS_SAVING_FAILED.swap(false, Ordering::Relaxed)
+}
+
+/// The tasks of the bus run: from now on it is told of a pause.
+pub fn bus_has_started() {
+    HAS_BUS_STARTED.store(true, Ordering::Relaxed);
+}
+
+/// The processor is about to stand still: waits for so long, us, that the bus is told before, if it has started.
+pub fn announce_pause(time: u64) {
+    if !HAS_BUS_STARTED.load(Ordering::Relaxed) {
+        return;
+    }
+    IS_PAUSE_ANNOUNCED.store(true, Ordering::Relaxed);
+    let end = now().micros() + time;
+    // The bus runs above whoever waits here.
+    while now().micros() < end {}
+}
+
+/// Whether a pause was announced, since the last call.
+#[must_use]
+pub fn is_pause_announced() -> bool {
+    IS_PAUSE_ANNOUNCED.swap(false, Ordering::Relaxed)
 }
 
 /// The time of the firmware.

@@ -1,21 +1,20 @@
 //! The localiser's loop, below all interrupts.
 
-use agv_core::localizer::Event;
+use agv_core::localizer::{Capacities, Event, Localizer};
 
-use super::capacities::Localizer;
 use super::exchange::{self, BUS_EVENTS, RevolutionReceiver};
 use super::log_stream::LogWriter;
 use super::supervision::{self, Task};
 
 /// What handles events.
-pub struct Localization {
+pub struct Localization<C: Capacities + 'static> {
     /// The localiser, and what searches its pose when it has none.
-    pub localization: agv_controller::Localization<&'static mut Localizer>,
+    pub localization: agv_controller::Localization<&'static mut Localizer<C>>,
     /// Where events and outputs are written.
     pub log: LogWriter,
 }
 
-impl Localization {
+impl<C: Capacities> Localization<C> {
     /// Handles what has come, and returns whether there was anything.
     ///
     /// Samples that wait go first: they are what a revolution is seen from. A revolution takes up to 10 ms at 480 MHz; what

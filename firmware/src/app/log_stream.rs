@@ -3,7 +3,7 @@
 //! Frames are numbered. What does not fit the queue, because the network is slow or nobody listens, is dropped whole; the
 //! gap in the numbers tells how much. Nothing ever waits.
 
-use agv_core::localizer::Parameters;
+use agv_core::localizer::{Parameters, StatedCapacities};
 use agv_core::maps::Landmark;
 use agv_core::record::{Header, LANDMARKS_A_RECORD, Record, encode};
 use embassy_net::Stack;
@@ -12,8 +12,6 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
-
-use super::capacities::Localizer;
 
 /// Bytes that wait for the network.
 const QUEUE: usize = 14 * 1024;
@@ -92,14 +90,19 @@ impl Default for LogMemory {
     }
 }
 
+/// What a log begins with: all that a replay must know.
+#[derive(Clone, Copy)]
+pub struct Beginning {
+    /// What the localiser believes.
+    pub parameters: &'static Parameters,
+    /// How much it has room for.
+    pub capacities: StatedCapacities,
+    /// Its map.
+    pub landmarks: &'static [Landmark],
+}
+
 /// Gives the stream to one listener after the other, for ever.
-pub async fn run(
-    stack: Stack<'static>,
-    memory: &'static mut LogMemory,
-    port: u16,
-    parameters: &Parameters,
-    landmarks: &[Landmark],
-) -> ! {
+pub async fn run(stack: Stack<'static>, memory: &'static mut LogMemory, port: u16, beginning: Beginning) -> ! {
     let LogMemory { receive, transmit, piece } = memory;
     let mut socket = TcpSocket::new(stack, receive, transmit);
     loop {
@@ -107,7 +110,7 @@ pub async fn run(
         if socket.accept(port).await.is_err() {
             continue;
         }
-        if greet(&mut socket, piece, parameters, landmarks).await.is_ok() {
+        if greet(&mut socket, piece, beginning).await.is_ok() {
             PIPE.clear();
             IS_HEARD.store(true, Ordering::Relaxed);
             loop {
@@ -136,13 +139,9 @@ async fn send(socket: &mut TcpSocket<'_>, mut bytes: &[u8]) -> Result<(), Gone> 
 }
 
 /// Sends what a log begins with.
-async fn greet(
-    socket: &mut TcpSocket<'_>,
-    frame: &mut [u8],
-    parameters: &Parameters,
-    landmarks: &[Landmark],
-) -> Result<(), Gone> {
-    let header = Header { software: SOFTWARE, parameters, capacities: Localizer::CAPACITIES };
+async fn greet(socket: &mut TcpSocket<'_>, frame: &mut [u8], beginning: Beginning) -> Result<(), Gone> {
+    let Beginning { parameters, capacities, landmarks } = beginning;
+    let header = Header { software: SOFTWARE, parameters, capacities };
     let mut sequence = 0;
     let first = encode(&Record::Header(header), sequence, frame).map_err(|_| Gone)?;
     send(socket, frame.get(..first).unwrap_or_default()).await?;

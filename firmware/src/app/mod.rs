@@ -1,5 +1,6 @@
 //! What the vehicle does, on any board.
 
+pub mod announced_flash;
 pub mod bus;
 pub mod can_port;
 pub mod capacities;

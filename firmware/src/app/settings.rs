@@ -6,21 +6,19 @@ use agv_settings::service::Controller;
 use agv_settings::store::{LANDMARKS, Store};
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
-use static_cell::ConstStaticCell;
 
-use super::capacities::HAS_SLAM;
 use super::exchange;
 use super::log_stream::SOFTWARE;
 
-static MAP: ConstStaticCell<Vec<Landmark, LANDMARKS>> = ConstStaticCell::new(Vec::new());
+/// The map as the flash keeps it.
+pub type KeptMap = Vec<Landmark, LANDMARKS>;
 
 /// Reads settings and map, and makes what the service port speaks of. What is wrong is logged; the settings that cannot
-/// be read are the default ones.
+/// be read are the default ones. `has_slots` says whether there is room for `maps.slam`.
 #[must_use]
 #[inline(never)]
-pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
+pub fn read<F: NorFlash>(flash: F, map: &'static mut KeptMap, panic: &'static str, has_slots: bool) -> Controller<F> {
     let mut settings = Settings::default();
-    let map = MAP.take();
     let mut store = Store::new(flash);
     let mut key = None;
     if let Some(store) = &mut store {
@@ -52,7 +50,7 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
         }
         key = store.key();
     }
-    if settings.parameters.maps.slam && !HAS_SLAM {
+    if settings.parameters.maps.slam && !has_slots {
         exchange::set_settings_sound(false);
         defmt::error!("settings: maps.slam is switched off, because this image has no room for it");
         settings.parameters.maps.slam = false;
@@ -63,7 +61,7 @@ pub fn read<F: NorFlash>(flash: F, panic: &'static str) -> Controller<F> {
     Controller { software: SOFTWARE, settings, store, landmarks: map, key, starts: 0, nonces: 0, panic, map: None }
 }
 
-/// Counts this start. When the page is full, this takes as long as a page of flash takes to erase: so nothing waits for it.
+/// Counts this start. When the page is full, this takes as long as a page of flash takes to erase.
 pub fn count_start<F: NorFlash>(controller: &mut Controller<F>) {
     if let Some(store) = &mut controller.store {
         controller.starts = store.count_start().unwrap_or(0);

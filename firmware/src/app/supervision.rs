@@ -1,9 +1,12 @@
 //! Whether every task still runs: the watchdog is fed only then.
+#![allow(unsafe_code, reason = "memory that outlives a restart has a section of its own")]
 
 use embassy_time::{Duration, Instant, Ticker};
-use portable_atomic::Ordering;
+use portable_atomic::{AtomicU32, Ordering};
 
-use crate::board::retained::SEEN;
+/// The tasks that have run since the watchdog was fed: after it has bitten, what had stood still is missing here.
+#[unsafe(link_section = ".retained")]
+static SEEN: AtomicU32 = AtomicU32::new(0);
 
 /// What must run. Each is a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

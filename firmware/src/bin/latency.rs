@@ -8,17 +8,16 @@ use core::fmt::Write;
 use core::panic::PanicInfo;
 
 use agv_controller::BusEvent;
-use agv_core::localizer::{Event, OutputPredictor, Parameters};
+use agv_core::localizer::{self, Event, OutputPredictor, Parameters};
 use agv_core::measurement::{EncoderSample, Scan, Time};
 use agv_core::record::Record;
-use agv_firmware::app::capacities::Localizer;
-use agv_firmware::app::exchange;
-use agv_firmware::app::localize::Localization;
 use agv_firmware::app::log_stream::{LONGEST, LogWriter};
+use agv_firmware::app::{exchange, localize};
 use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
 use agv_firmware::board::an500::log_file::LogBuffer;
 use agv_firmware::board::an500::{panic, time_driver, uart};
+use agv_firmware::board::{Board, Current};
 use agv_settings::Settings;
 use cortex_m_semihosting::{debug, hprintln};
 use defmt_semihosting as _;
@@ -33,6 +32,10 @@ fn on_panic(info: &PanicInfo) -> ! {
 }
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
+
+type Capacities = <Current as Board>::Capacities;
+type Localizer = localizer::Localizer<Capacities>;
+type Localization = localize::Localization<Capacities>;
 
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();

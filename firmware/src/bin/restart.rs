@@ -7,8 +7,8 @@
 use core::panic::PanicInfo;
 
 use agv_firmware::board::an500::host_file::HostFile;
-use agv_firmware::board::an500::watchdog::Watchdog;
-use agv_firmware::board::{current as board, retained};
+use agv_firmware::board::an500::watchdog::ApbWatchdog;
+use agv_firmware::board::{self, retained};
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
@@ -34,7 +34,7 @@ fn main() -> ! {
     if written.is_err() {
         debug::exit(debug::EXIT_FAILURE);
     }
-    Watchdog::new().unleash();
+    ApbWatchdog::new().unleash();
     loop {
         cortex_m::asm::nop();
     }

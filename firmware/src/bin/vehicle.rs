@@ -5,18 +5,18 @@
 use core::panic::PanicInfo;
 
 use agv_controller::Troubles;
-use agv_core::localizer::Parameters;
-use agv_firmware::app::capacities::Localizer;
+use agv_core::localizer::{self, Parameters};
+use agv_firmware::app::announced_flash::AnnouncedFlash;
+use agv_firmware::app::capacities::has_slots;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
-use agv_firmware::app::localize::Localization;
-use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogWriter};
+use agv_firmware::app::log_stream::{Beginning, LONGEST, LogMemory, LogWriter};
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
+use agv_firmware::app::settings::KeptMap;
 use agv_firmware::app::supervision::Supervisor;
 use agv_firmware::app::throttle::Throttle;
-use agv_firmware::app::{bus, exchange, laser, log_stream, service, settings, shared_settings, supervision};
-use agv_firmware::board::current::{self as board, Board, Can, Ethernet, Flash, Watchdog};
-use agv_firmware::board::{RestartCause, retained, stack};
+use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, shared_settings, supervision};
+use agv_firmware::board::{self, Board, Current, Parts, RestartCause, Watchdog, retained, stack};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
 use agv_wire::nav350::Revolution;
@@ -38,11 +38,17 @@ defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
 /// Connections of the service port.
 const CONNECTIONS: usize = 2;
 
+type Can = <Current as Board>::Can;
+type Ethernet = <Current as Board>::Ethernet;
+type Flash = AnnouncedFlash<<Current as Board>::Flash>;
+type Capacities = <Current as Board>::Capacities;
+type Localizer = localizer::Localizer<Capacities>;
+type Localization = localize::Localization<Capacities>;
+
 static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
 static SETTINGS: StaticCell<Settings> = StaticCell::new();
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 static LOCALIZATION: StaticCell<Localization> = StaticCell::new();
-static REVOLUTIONS: ConstStaticCell<[Revolution; 1]> = ConstStaticCell::new([Revolution::new()]);
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
 static LASER: StaticCell<LaserMemory> = StaticCell::new();
 static LOG: ConstStaticCell<LogMemory> = ConstStaticCell::new(LogMemory::new());
@@ -50,6 +56,20 @@ static FRAME: ConstStaticCell<[u8; LONGEST]> = ConstStaticCell::new([0; LONGEST]
 static SERVICES: ConstStaticCell<[ServiceMemory; CONNECTIONS]> =
     ConstStaticCell::new([const { ServiceMemory::new() }; CONNECTIONS]);
 static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
+
+/// Large values apart from the localiser, in whichever memory the board has for them. A cell without a value is all zero, which is
+/// what that memory begins with.
+#[allow(unsafe_code, reason = "the section is that of the boards' memory for such values")]
+mod large {
+    use agv_firmware::app::settings::KeptMap;
+    use agv_wire::nav350::Revolution;
+    use static_cell::StaticCell;
+
+    #[unsafe(link_section = ".large")]
+    pub static MAP: StaticCell<KeptMap> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static REVOLUTIONS: StaticCell<[Revolution; 1]> = StaticCell::new();
+}
 
 /// What all tasks of the network know.
 #[derive(Clone, Copy)]
@@ -66,7 +86,7 @@ async fn bus_task(
     controller: &'static SharedController<Flash>,
     troubles: Troubles,
 ) -> ! {
-    bus::run(can, settings, controller, troubles).await
+    bus::run(Current::NAME, can, settings, controller, troubles).await
 }
 
 #[embassy_executor::task]
@@ -92,7 +112,8 @@ async fn laser_task(stack: Stack<'static>, revolutions: exchange::RevolutionSend
 #[embassy_executor::task]
 async fn log_task(stack: Stack<'static>, shared: Shared) -> ! {
     let Shared { settings, landmarks, .. } = shared;
-    log_stream::run(stack, LOG.take(), settings.network.log_port, &settings.parameters, landmarks).await
+    let beginning = Beginning { parameters: &settings.parameters, capacities: Localizer::CAPACITIES, landmarks };
+    log_stream::run(stack, LOG.take(), settings.network.log_port, beginning).await
 }
 
 #[embassy_executor::task(pool_size = CONNECTIONS)]
@@ -114,7 +135,7 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
         dns_servers: heapless::Vec::new(),
     });
     let resources = RESOURCES.init_with(StackResources::new);
-    let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, board::seed());
+    let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, Current::seed());
     spawner.spawn(watch_task().expect("the task runs once"));
     spawner.spawn(save_task(shared.controller).expect("the task runs once"));
     spawner.spawn(network_task(runner).expect("the task runs once"));
@@ -129,7 +150,7 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
 struct Vehicle {
     localization: &'static mut Localization,
     revolutions: RevolutionReceiver,
-    watchdog: Watchdog,
+    watchdog: <Current as Board>::Watchdog,
     supervisor: Supervisor,
 }
 
@@ -167,10 +188,14 @@ fn failure(cause: RestartCause) -> &'static str {
 #[inline(never)]
 fn start() -> Vehicle {
     let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let Board { can, ethernet, flash, watchdog, restart_cause, troubles } = board::start(core);
+    let Parts { can, ethernet, flash, watchdog, restart_cause, troubles } = Current::start(core);
     let failure = failure(restart_cause);
     let supervisor = Supervisor::start();
-    let controller = settings::read(flash, failure);
+    let flash = AnnouncedFlash::new(flash, !Current::RUNS_WHILE_FLASH_WORKS);
+    let mut controller = settings::read(flash, large::MAP.init_with(KeptMap::new), failure, has_slots::<Capacities>());
+    if !Current::RUNS_WHILE_FLASH_WORKS {
+        settings::count_start(&mut controller);
+    }
     let landmarks = controller.landmarks;
     let (settings, controller) = share(controller);
     let localizer = build_localizer(&settings.parameters);
@@ -178,7 +203,7 @@ fn start() -> Vehicle {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
         exchange::set_settings_sound(false);
     }
-    let channel = CHANNEL.init_with(|| Channel::new(REVOLUTIONS.take()));
+    let channel = CHANNEL.init_with(|| Channel::new(large::REVOLUTIONS.init_with(|| [Revolution::new()])));
     let (sender, revolutions) = channel.split();
     let log = LogWriter::new(FRAME.take(), landmarks.len());
     let localization = build_localization(localizer, settings, log);
@@ -188,13 +213,17 @@ fn start() -> Vehicle {
         is_board_damaged: troubles.are_there(),
         are_settings_lost: !exchange::are_settings_sound(),
     };
-    let can = can.start(settings.bit_rate);
-    board::bus_tasks().spawn(bus_task(can, settings, controller, troubles).expect("the task runs once"));
+    let can = Current::take_part(can, settings.bit_rate);
+    Current::bus_tasks().spawn(bus_task(can, settings, controller, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
-    // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for.
+    // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for. That may
+    // take as long as a page takes to erase: so nothing else waits for it where the processor goes on meanwhile, and where it
+    // does not, it is done before the bus hears anything.
     let mut counted = controller.try_lock().expect("nobody else knows the controller");
-    board::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
-    settings::count_start(&mut counted);
+    Current::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
+    if Current::RUNS_WHILE_FLASH_WORKS {
+        settings::count_start(&mut counted);
+    }
     drop(counted);
     Vehicle { localization, revolutions, watchdog, supervisor }
 }
@@ -202,6 +231,9 @@ fn start() -> Vehicle {
 #[inline(never)]
 fn run(vehicle: Vehicle) -> ! {
     let Vehicle { localization, mut revolutions, mut watchdog, mut supervisor } = vehicle;
+    // What builds the large values goes deeper than what runs then: each is told apart.
+    defmt::info!("stack at the start: {} of {} bytes", stack::deepest(), stack::reserved());
+    stack::paint();
     let mut deepest = 0;
     loop {
         let is_busy = localization.step(&mut revolutions);
@@ -210,7 +242,7 @@ fn run(vehicle: Vehicle) -> ! {
             let depth = stack::deepest();
             if depth > deepest {
                 deepest = depth;
-                defmt::info!("stack: {} of {} bytes", deepest, stack::RESERVED);
+                defmt::info!("stack: {} of {} bytes", deepest, stack::reserved());
             }
         }
         if is_busy {

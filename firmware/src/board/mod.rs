@@ -1,21 +1,96 @@
 //! Boards: pins, clocks, peripherals, memory.
 //!
-//! Each board has the same names for the program that runs on all of them: `start` gives its CAN port, Ethernet controller,
-//! flash and watchdog, which runs, `seed` a number for the network, `bus_tasks` and `network_tasks` spawn tasks above the localiser, `restart` starts again.
+//! A board is a folder with a type that implements [`Board`], and a line here. Its `memory.x`, which `build.rs` gives to
+//! the linker, says where the stack is and how much of its end is out of reach (`_stack_start`, `_stack_end`,
+//! `_stack_guard`), where large values go (`.large`), and what outlives a restart (`.retained`).
 
 #[cfg(feature = "an500")]
 pub mod an500;
-#[cfg(feature = "an500")]
-pub use an500 as current;
+#[cfg(feature = "h723")]
+mod h723;
 #[cfg(feature = "h743")]
-pub mod h743;
-#[cfg(feature = "h743")]
-pub use h743 as current;
+mod h743;
+pub mod large;
 pub mod retained;
 pub mod stack;
+#[cfg(feature = "stm32h7")]
+mod stm32h7;
+
+#[cfg(feature = "an500")]
+pub use an500::An500 as Current;
+#[cfg(feature = "h723")]
+pub use h723::Nucleo as Current;
+#[cfg(feature = "h743")]
+pub use h743::Nucleo as Current;
+
+use agv_core::localizer::Capacities;
+use embassy_executor::SendSpawner;
+use embassy_net_driver::Driver;
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::app::can_port::CanPort;
 
 /// The watchdog bites when it was not fed for so long, us: longer than a page of flash takes to erase.
 pub const WATCHDOG_PERIOD: u32 = 8_000_000;
+
+/// A board, as the program sees it.
+pub trait Board: Sized + 'static {
+    /// What it is called on the bus.
+    const NAME: &'static str;
+    /// Whether the processor goes on while the settings' flash is erased or written. It stands still if the program is in the
+    /// same bank.
+    const RUNS_WHILE_FLASH_WORKS: bool;
+
+    /// How much there is room for.
+    type Capacities: Capacities + 'static;
+    /// The bus before its bit rate is known.
+    type CanParts;
+    /// The bus.
+    type Can: CanPort + 'static;
+    /// The network.
+    type Ethernet: Driver + 'static;
+    /// Where settings are kept: at least two pages.
+    type Flash: NorFlash + 'static;
+    /// The watchdog.
+    type Watchdog: Watchdog;
+
+    /// Starts everything but the tasks. The watchdog comes first, as what hangs behind it ends in a restart.
+    fn start(core: cortex_m::Peripherals) -> Parts<Self>;
+
+    /// Takes part in the bus of that many kbit/s. Call once.
+    fn take_part(can: Self::CanParts, bit_rate: u16) -> Self::Can;
+
+    /// A number for the network that nobody foresees.
+    fn seed() -> u64;
+
+    /// Starts the tasks of the bus, below the drivers and above all other tasks. Call once.
+    fn bus_tasks() -> SendSpawner;
+
+    /// Starts the tasks of the network, below those of the bus and above the loop. Call once.
+    fn network_tasks() -> SendSpawner;
+}
+
+/// What restarts the board when it is not fed for [`WATCHDOG_PERIOD`].
+pub trait Watchdog {
+    /// Feeds it.
+    fn feed(&mut self);
+}
+
+/// What a board has.
+pub struct Parts<B: Board> {
+    /// The bus, which begins when its bit rate is known.
+    pub can: B::CanParts,
+    /// The network.
+    pub ethernet: B::Ethernet,
+    /// Where settings are kept.
+    pub flash: B::Flash,
+    /// The watchdog, which runs.
+    pub watchdog: B::Watchdog,
+    /// Why the program has started.
+    pub restart_cause: RestartCause,
+    /// What does not work.
+    pub troubles: Troubles,
+}
 
 /// Why the program has started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,4 +123,9 @@ impl Troubles {
     pub fn are_there(&self) -> bool {
         *self != Self::NONE
     }
+}
+
+/// Starts again.
+pub fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
 }

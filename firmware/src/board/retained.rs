@@ -9,8 +9,6 @@ use core::cell::UnsafeCell;
 use core::fmt::{self, Display, Write};
 use core::mem::MaybeUninit;
 
-use portable_atomic::AtomicU32;
-
 /// Longest message, bytes.
 const LONGEST: usize = 400;
 const MAGIC: u32 = 0x5041_4E43;
@@ -32,10 +30,6 @@ unsafe impl Sync for Retained {}
 
 #[unsafe(link_section = ".retained")]
 static RETAINED: Retained = Retained(UnsafeCell::new(MaybeUninit::uninit()));
-
-/// The tasks that have run since the watchdog was fed: after it has bitten, what had stood still is missing here.
-#[unsafe(link_section = ".retained")]
-pub static SEEN: AtomicU32 = AtomicU32::new(0);
 
 fn message() -> *mut Message {
     RETAINED.0.get().cast()

@@ -1,27 +1,46 @@
 //! How much of the stack was ever used: it is painted at the start.
-#![allow(unsafe_code, reason = "the stack has no owner")]
+#![allow(unsafe_code, reason = "the stack has no owner, and its place is known to the linker")]
 
-pub use super::current::{STACK_GUARD as GUARD, STACK_TOP as TOP};
-
-/// What is reserved for the stack, bytes: the tightly coupled data memory of the STM32H743.
-pub const RESERVED: usize = 128 * 1024;
+unsafe extern "C" {
+    static _stack_start: u8;
+    static _stack_end: u8;
+    static _stack_guard: u8;
+}
 
 const PAINT: u32 = 0xC0DE_57AC;
 
-/// The lowest word that is reserved. From there on [`GUARD`] bytes are out of reach.
-pub fn bottom() -> *mut u32 {
-    (TOP as usize - RESERVED) as *mut u32
+/// Where the stack begins: behind its highest word.
+fn top() -> usize {
+    (&raw const _stack_start) as usize
+}
+
+/// The lowest address that is reserved. From there on [`guard`] bytes are out of reach.
+#[must_use]
+pub fn bottom() -> usize {
+    (&raw const _stack_end) as usize
+}
+
+/// Bytes at the end of the stack that nobody may touch.
+#[must_use]
+pub fn guard() -> usize {
+    (&raw const _stack_guard) as usize
+}
+
+/// What is reserved for the stack, bytes.
+#[must_use]
+pub fn reserved() -> usize {
+    top() - bottom()
 }
 
 /// The lowest word that may be used.
 fn lowest() -> *mut u32 {
-    bottom().wrapping_byte_add(GUARD)
+    (bottom() + guard()) as *mut u32
 }
 
 /// Whether so many bytes from an address on are memory of the stack that may be used.
 #[must_use]
 pub fn holds(address: usize, length: usize) -> bool {
-    address >= lowest() as usize && address.saturating_add(length) <= TOP as usize
+    address >= lowest() as usize && address.saturating_add(length) <= top()
 }
 
 /// Paints what is not in use.
@@ -43,11 +62,9 @@ pub fn paint() {
 #[must_use]
 pub fn deepest() -> usize {
     let mut word = lowest();
-    let mut untouched = GUARD;
     // SAFETY: the reserved stack is memory that may be read.
-    while untouched < RESERVED && unsafe { word.read_volatile() } == PAINT {
-        untouched += 4;
+    while (word as usize) < top() && unsafe { word.read_volatile() } == PAINT {
         word = word.wrapping_add(1);
     }
-    RESERVED - untouched
+    top() - word as usize
 }

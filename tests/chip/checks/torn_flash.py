@@ -2,7 +2,7 @@
 
 from bench import check_sound, describe, start
 from emulated_chip.clock import MILLISECOND, SECOND
-from emulated_chip.flash import Flash, PowerCut
+from emulated_chip.flash import PowerCut
 from stored_settings import FIRST_PAGE, NODE_17, fill, starts, write
 
 # Starts in which power goes at each of the words that a start programs.
@@ -19,7 +19,7 @@ def node_of(chip):
 
 def survives_torn_words(bench):
     """Power goes at each flash word that a start programs, at several starts in a row; the chip starts each time."""
-    flash = Flash(bench.description.memory["BANK_2"][1])
+    flash = bench.flash()
     write(flash, FIRST_PAGE, NODE_17)
     torn = 0
     for number in range(1, WORDS + 1 if not bench.is_long else 40):
@@ -45,7 +45,7 @@ def survives_a_cut_while_a_page_is_moved(bench):
     if bench.is_long:
         cuts = [("program", at) for at in range(1, 12)] + [("erase", 1)]
     for kind, at in cuts:
-        flash = Flash(bench.description.memory["BANK_2"][1])
+        flash = bench.flash()
         number = fill(flash, FIRST_PAGE, NODE_17)
         chip = bench.chip(settings=flash)
         chip.cut = PowerCut(at, kind)
@@ -86,7 +86,7 @@ def survives_an_erase_cut_short(bench):
 def writes_after_an_error(bench):
     """An error of the flash is left over: what is written after it is written."""
     chip = bench.chip()
-    chip.peripherals["FLASH"].banks[1].fail("PGSERR")
+    chip.settings_bank().fail("PGSERR")
     start(chip)
     chip.run_for(50 * MILLISECOND)
     check_sound(chip)

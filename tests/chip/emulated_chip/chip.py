@@ -31,13 +31,6 @@ from .watchdog import TYPICAL, Watchdog
 
 PRIVATE_BUS, PRIVATE_SIZE = 0xE000_0000, 0x0010_0000
 SYSTEM_MEMORY, SYSTEM_SIZE = 0x1FF0_0000, 0x2_0000
-# Clocks of RAM that are off after a reset (8.7.42; 2.4).
-RAM_CLOCKS = {
-    "SRAM1": ("AHB2ENR", "SRAM1EN"),
-    "SRAM2": ("AHB2ENR", "SRAM2EN"),
-    "SRAM3": ("AHB2ENR", "SRAM3EN"),
-    "BKPSRAM": ("AHB4ENR", "BKPSRAMEN"),
-}
 BACKUP_RAM = (0x3880_0000, 4096)
 # Words of correction bits: 64 bits in AXI SRAM and ITCM, 32 elsewhere (chapter 3, RAMECC).
 WIDE = ("AXISRAM", "ITCM")
@@ -46,7 +39,7 @@ NO_DMA = ("ITCM", "DTCM")
 
 
 class Chip:
-    def __init__(self, image, description, hook, *, lsi=TYPICAL, revision="V", bit_rate=500_000, settings=None):
+    def __init__(self, image, description, hook, *, lsi=TYPICAL, revision=None, bit_rate=500_000, settings=None):
         self.image = image
         self.description = description
         self.processor = Processor(self, hook)
@@ -59,6 +52,7 @@ class Chip:
         self.has_power = True
         self.sleeps = 0
         self._reset_cause = None
+        self._stalled_until = 0
         self._forbidden = []
         self.exceptions = Exceptions(self)
         self.system = SystemControl(self)
@@ -72,9 +66,10 @@ class Chip:
 
     def _build_peripherals(self, lsi, revision, settings):
         interrupts = self.description.interrupts
-        base, size = self.description.memory["BANK_1"]
-        self.settings_flash = settings or Flash(self.description.memory["BANK_2"][1])
-        banks = [(base, Flash(size)), (self.description.memory["BANK_2"][0], self.settings_flash)]
+        places, with_settings = self.description.banks(), self.description.settings_bank()
+        self.settings_flash = settings or Flash(places[with_settings][1])
+        flashes = [self.settings_flash if number == with_settings else Flash(size) for number, (_, size) in enumerate(places)]
+        banks = [(base, flash) for (base, _), flash in zip(places, flashes)]
         fdcan = Fdcan(self, (interrupts["FDCAN1_IT0"], interrupts["FDCAN1_IT1"]), self.can_bus)
         self.can_bus.nodes.append(fdcan)
         self.peripherals = {
@@ -88,21 +83,26 @@ class Chip:
             "FDCANRAM": MessageRam(fdcan),
             "ETH": Ethernet(self, interrupts["ETH"], self.phy),
             "RNG": RandomNumbers(self),
-            "DBGMCU": DebugUnit(self, revision),
+            "DBGMCU": DebugUnit(self, revision or self.description.variant.newest),
             "AXI": RegisterFile(self, "axi"),
         }
         for port in "ABCDEFGHIJK":
-            self.peripherals[f"GPIO{port}"] = Gpio(self, port)
+            if f"GPIO{port}" in self.description.peripherals:
+                self.peripherals[f"GPIO{port}"] = Gpio(self, port)
 
     def _build_memory(self):
         self.rams = {}
         regions = {name: place for name, place in self.description.memory.items() if not name.startswith("BANK")}
         regions["BKPSRAM"] = BACKUP_RAM
         for name, (base, size) in regions.items():
-            self.rams[name] = Ram(self, name, base, size, RAM_CLOCKS.get(name), 8 if name in WIDE else 4)
-        base, size = self.description.memory["BANK_1"]
-        self.program = ProgramFlash(self, base, size, self.image.segments)
-        self.data_flash = DataFlash(self, self.description.memory["BANK_2"][0], self.settings_flash)
+            self.rams[name] = Ram(self, name, base, size, self.description.variant.clocks.get(name), 8 if name in WIDE else 4)
+        places, with_settings = self.description.banks(), self.description.settings_bank()
+        base, size = places[0]
+        data_base = places[with_settings][0]
+        # The program's part of a bank that it shares with the settings ends where those begin.
+        first = self.description.variant.settings - base if with_settings == 0 else 0
+        self.program = ProgramFlash(self, base, first or size, self.image.segments)
+        self.data_flash = DataFlash(self, data_base, self.settings_flash, first)
         self.processor.engine.mem_map(SYSTEM_MEMORY, SYSTEM_SIZE)
         unique = random.Random(7).randbytes(12)
         self.processor.engine.mem_write(self.description.base("UID"), unique)
@@ -130,6 +130,7 @@ class Chip:
     def _reset(self, cause):
         """Everything starts again; RAM keeps what was in it, but for dirty lines of the cache."""
         self._reset_cause = None
+        self._stalled_until = 0
         for line, before in self.cache.written_lines.lost().items():
             self.ram_at(line).put(line, before)
         self.cache.reset()
@@ -174,6 +175,10 @@ class Chip:
                 continue
             if stop and stop():
                 return
+            if self.clock.now() < self._stalled_until:
+                due = self.clock.next_due()
+                self.clock.sleep_until(min(time, self._stalled_until, due or self._stalled_until))
+                continue
             self.exceptions.take()
             due = self.clock.next_due()
             horizon = time if due is None else min(due, time)
@@ -187,6 +192,16 @@ class Chip:
 
     def run_for(self, duration, stop=None):
         self.run_until(self.clock.now() + duration, stop)
+
+    def settings_bank(self):
+        """The bank of flash that has the settings."""
+        return self.peripherals["FLASH"].banks[self.description.settings_bank()]
+
+    def stall_until(self, time):
+        """The processor stands still until then, from the end of this block of code on: what it reads next waits (RM0468,
+        4.3.6)."""
+        self._stalled_until = time
+        self.clock.interrupt()
 
     def end(self, finding):
         self.findings.append(finding)

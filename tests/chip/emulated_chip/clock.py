@@ -81,6 +81,10 @@ class Clock:
         """The processor polls something that changes then: what it would run meanwhile is not run. Other events come first."""
         due = self.next_due()
         self.sleep_until(time if due is None else min(time, due))
+        self.interrupt()
+
+    def interrupt(self):
+        """Ends the processor's run behind this block of code."""
         self._progress.limit = self._progress.halfwords
 
     def cycles_until(self, time):

@@ -2,6 +2,8 @@
 
 import json
 
+from .variant import VARIANTS
+
 
 class Register:
     def __init__(self, offset, fields):
@@ -24,7 +26,12 @@ class Description:
     def __init__(self, path):
         with open(path) as file:
             raw = json.load(file)
-        self.memory = {region["name"]: (region["address"], region["size"]) for region in raw["memory"]}
+        self.name = raw["name"]
+        self.variant = VARIANTS[self.name]
+        self.memory = {}
+        for region in raw["memory"]:
+            name = self.variant.renamed.get(region["name"], region["name"])
+            self.memory[name] = (region["address"], region["size"])
         self.interrupts = raw["interrupts"]
         self.peripherals = {one["name"]: one for one in raw["peripherals"]}
         self._kinds = {
@@ -38,6 +45,15 @@ class Description:
     def registers(self, kind):
         """All registers of a kind of peripheral, by their names; none if the description has no such kind."""
         return self._kinds.get(kind, {})
+
+    def banks(self):
+        """First address and bytes of each bank of flash."""
+        return [place for name, place in sorted(self.memory.items()) if name.startswith("BANK")]
+
+    def settings_bank(self):
+        """Which of them has the settings."""
+        holds = lambda place: place[0] <= self.variant.settings < place[0] + place[1]
+        return next(number for number, place in enumerate(self.banks()) if holds(place))
 
     def base(self, name):
         return self.peripherals[name]["address"]

@@ -113,6 +113,9 @@ class Bank:
     def _begin(self, times):
         parallelism = self.interface.get(self.name("CR"), "PSIZE")
         self.busy_until = self.interface.chip.clock.now() + times[parallelism]
+        if self.number == 0:
+            # The program is here.
+            self.interface.chip.stall_until(self.busy_until)
 
     def _put(self, word, data):
         self.flash.bytes[word : word + WORD] = data

@@ -62,19 +62,20 @@ class ProgramFlash:
 
 
 class DataFlash:
-    """The other bank, through the data cache if it may hold it. Pages in which a word has a double error are apart: an
+    """A bank from an offset on, through the data cache if it may hold it. Pages in which a word has a double error are apart: an
     access to them stops the processor before it, so that a bus fault has its exact place."""
 
-    def __init__(self, chip, base, flash):
+    def __init__(self, chip, base, flash, first=0):
         self.chip = chip
         self.base = base
         self.flash = flash
+        self.first = first
         self.size = len(flash.bytes)
         self.reads = 0
         self.open_page = None
         self._apart = {}
         self._cached = {}
-        for page in range(0, self.size, PAGE):
+        for page in range(first, self.size, PAGE):
             self._map(page)
 
     def _map(self, page):
@@ -89,7 +90,7 @@ class DataFlash:
         )
 
     def covers(self, address):
-        return self.base <= address < self.base + self.size
+        return self.base + self.first <= address < self.base + self.size
 
     def _is_cached(self, offset):
         """Whether the cache may hold an offset; protection is of whole sectors here."""

@@ -27,6 +27,9 @@ class Power(RegisterFile):
 
     def scale(self):
         """Voltage scale, 0 for the highest (6.6.2)."""
+        if not self.chip.description.variant.has_overdrive:
+            # RM0468, 6.8.6.
+            return {0: 0, 1: 3, 2: 2, 3: 1}[self.get("D3CR", "VOS")]
         selected = {1: 3, 2: 2, 3: 1}.get(self.get("D3CR", "VOS"), 3)
         has_overdrive = self.chip.peripherals["SYSCFG"].get("PWRCR", "ODEN")
         return 0 if selected == 1 and has_overdrive else selected

@@ -16,12 +16,22 @@ const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
 pub struct Board {
     /// Feature of the firmware that chooses it.
     pub feature: &'static str,
+    /// Its chip, if it is a real one: as `stm32-metapac` names it, and as `probe-rs` does.
+    pub chip: Option<Chip>,
     /// Binaries that are built for it.
     pub images: &'static [&'static str],
     /// Most flash of an image, bytes.
     pub flash: u64,
     /// Its RAM.
     pub ram: &'static [Region],
+}
+
+/// What others call a chip.
+pub struct Chip {
+    /// `stm32-metapac`.
+    pub metadata: &'static str,
+    /// `probe-rs`.
+    pub probe: &'static str,
 }
 
 /// A part of memory.
@@ -41,29 +51,53 @@ impl Region {
     }
 }
 
-/// The emulated board, in as much RAM as the vehicle's had for everything.
+/// The emulated board, with what the vehicle's has: its flash, and its RAM in domains D1 and D2 together.
 pub const AN500: Board = Board {
     feature: "an500",
+    chip: None,
     images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
-    flash: 512 * 1024,
-    ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 368 * 1024 }],
+    flash: H743.flash,
+    ram: &[Region {
+        name: "RAM",
+        addresses: 0x2000_0000..0x2040_0000,
+        budget: H743.ram[0].budget + H743.ram[1].budget,
+    }],
 };
 
 /// The vehicle's board, a Nucleo-H743ZI. The stack has the DTCM for itself, and the program the first bank of flash, of which a
 /// tenth is left.
 pub const H743: Board = Board {
     feature: "h743",
+    chip: Some(Chip { metadata: "stm32h743zi", probe: "STM32H743ZITx" }),
     images: &["vehicle"],
     flash: 1024 * 1024 / 10 * 9,
     ram: &[
         Region::of_chip("AXI", 0x2400_0000, 512 * 1024),
-        Region::of_chip("D2", 0x3000_0000, 128 * 1024),
+        Region::of_chip("D2", 0x3000_0000, 256 * 1024),
         Region::of_chip("D3", 0x3800_0000, 64 * 1024),
     ],
 };
 
+/// Bytes of the H723's DTCM that are the stack's: large values are before it.
+const H723_STACK: u64 = 76 * 1024;
+
+/// A smaller board, a Nucleo-H723ZG, as the option bytes of the factory divide its memory. The program has six of the eight pages
+/// of its only bank of flash.
+pub const H723: Board = Board {
+    feature: "h723",
+    chip: Some(Chip { metadata: "stm32h723zg", probe: "STM32H723ZGTx" }),
+    images: &["vehicle"],
+    flash: 768 * 1024 / 10 * 9,
+    ram: &[
+        Region::of_chip("AXI", 0x2400_0000, 320 * 1024),
+        Region::of_chip("D2", 0x3000_0000, 16 * 1024),
+        Region::of_chip("D3", 0x3800_0000, 16 * 1024),
+        Region::of_chip("DTCM", 0x2000_0000, 128 * 1024 - H723_STACK),
+    ],
+};
+
 /// All boards.
-pub const BOARDS: [&Board; 2] = [&AN500, &H743];
+pub const BOARDS: [&Board; 3] = [&AN500, &H743, &H723];
 
 /// Where cargo builds for all boards, so that what they share is built once.
 pub fn build_folder() -> PathBuf {
@@ -77,6 +111,19 @@ impl Board {
             bail!("{name} is no image of {}; there are {}", self.feature, self.images.join(", "));
         }
         Ok(repository().join("target/firmware").join(self.feature).join(IMAGES).join(name))
+    }
+
+    /// The board with that feature.
+    pub fn named(feature: &str) -> anyhow::Result<&'static Self> {
+        let found = BOARDS.into_iter().find(|board| board.feature == feature);
+        found.with_context(|| {
+            format!("there is no board {feature}; there are {}", BOARDS.map(|one| one.feature).join(", "))
+        })
+    }
+
+    /// Its chip.
+    pub fn chip(&self) -> anyhow::Result<&Chip> {
+        self.chip.as_ref().with_context(|| format!("{} is no real board", self.feature))
     }
 
     /// Puts the images that were built last where they do not meet those of the other boards, which have the same names.

@@ -10,7 +10,7 @@ use std::process::Command;
 use anyhow::{Context, bail};
 
 use crate::repository;
-use image::{AN500, BOARDS, Board};
+use image::{AN500, BOARDS, Board, H743};
 
 /// Build the firmware, run it in emulation, say how large it is, flash it
 #[derive(clap::Args)]
@@ -21,8 +21,12 @@ pub struct Firmware {
 
 #[derive(clap::Subcommand)]
 enum Action {
-    /// Build the images of every board.
-    Build,
+    /// Build the images of every board, or of one.
+    Build {
+        /// Feature of the board: an500, h743 or h723.
+        #[arg(long)]
+        board: Option<String>,
+    },
     /// Run an image of the emulated board in this folder, with this folder's files.
     Run {
         /// Name of the image.
@@ -31,16 +35,20 @@ enum Action {
         #[arg(long)]
         icount: bool,
     },
-    /// Flash, RAM and stack of every image, against its budget.
-    Size,
+    /// Flash and RAM of every image, against its budget.
+    Size {
+        /// Only the vehicle's images of real boards, as the book has them.
+        #[arg(long)]
+        table: bool,
+    },
     /// Flash an image to a vehicle's board, through probe-rs.
     Flash {
         /// Name of the image.
         #[arg(default_value = "vehicle")]
         image: String,
-        /// With room for `maps.slam`, which takes 138 kB more RAM.
-        #[arg(long)]
-        slam: bool,
+        /// Feature of the board: h743 or h723.
+        #[arg(long, default_value = H743.feature)]
+        board: String,
     },
 }
 
@@ -48,23 +56,24 @@ impl Firmware {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         match self.action {
-            Action::Build => build(),
+            Action::Build { board: None } => build(),
+            Action::Build { board: Some(board) } => build_board(Board::named(&board)?),
             Action::Run { image, icount } => {
-                build_board(&AN500, &[])?;
+                build_board(&AN500)?;
                 emulate(&image, icount)
             }
-            Action::Size => {
+            Action::Size { table } => {
                 build()?;
-                size::print()
+                if table { size::print_table() } else { size::print() }
             }
-            Action::Flash { image, slam } => flash(&image, slam),
+            Action::Flash { image, board } => flash(&image, Board::named(&board)?),
         }
     }
 }
 
 /// Builds the images of every board, and what no image uses but every board could.
 pub fn build() -> anyhow::Result<()> {
-    BOARDS.iter().try_for_each(|board| build_board(board, &[]))?;
+    BOARDS.iter().try_for_each(|board| build_board(board))?;
     build_lidar3d()
 }
 
@@ -81,14 +90,14 @@ fn build_lidar3d() -> anyhow::Result<()> {
 
 /// The vehicle's image for the emulated board, built.
 pub fn emulated_vehicle() -> anyhow::Result<PathBuf> {
-    build_board(&AN500, &[])?;
+    build_board(&AN500)?;
     AN500.image("vehicle")
 }
 
-/// The image that is flashed to the vehicle's board, built.
-pub fn flashed_vehicle() -> anyhow::Result<PathBuf> {
-    build_board(&image::H743, &[])?;
-    image::H743.image("vehicle")
+/// The vehicle's image that is flashed to a board, built.
+pub fn flashed_vehicle(board: &Board) -> anyhow::Result<PathBuf> {
+    build_board(board)?;
+    board.image("vehicle")
 }
 
 /// Fails if an image is larger than its budget.
@@ -96,7 +105,7 @@ pub fn check_sizes() -> anyhow::Result<()> {
     size::print()
 }
 
-fn build_board(board: &Board, options: &[&str]) -> anyhow::Result<()> {
+fn build_board(board: &Board) -> anyhow::Result<()> {
     if board.images.is_empty() {
         return Ok(());
     }
@@ -104,9 +113,6 @@ fn build_board(board: &Board, options: &[&str]) -> anyhow::Result<()> {
     cargo.args(["build", "--package", "agv-firmware", "--profile", "firmware"]);
     cargo.args(["--target", image::TARGET, "--features", board.feature, "--target-dir"]);
     cargo.arg(image::build_folder());
-    for option in options {
-        cargo.args(["--features", option]);
-    }
     for image in board.images {
         cargo.args(["--bin", image]);
     }
@@ -128,11 +134,11 @@ fn emulate(name: &str, icount: bool) -> anyhow::Result<()> {
     if status.success() { Ok(()) } else { bail!("{name} failed") }
 }
 
-fn flash(name: &str, has_slam: bool) -> anyhow::Result<()> {
-    let board = &image::H743;
-    build_board(board, if has_slam { &["slam"] } else { &[] })?;
+fn flash(name: &str, board: &Board) -> anyhow::Result<()> {
+    let chip = board.chip()?;
+    build_board(board)?;
     let mut probe = Command::new("probe-rs");
-    probe.args(["download", "--chip", "STM32H743ZITx"]).arg(board.image(name)?).current_dir(repository());
+    probe.args(["download", "--chip", chip.probe]).arg(board.image(name)?).current_dir(repository());
     let status = probe.status().context("probe-rs cannot be started; cargo install probe-rs-tools")?;
     if status.success() { Ok(()) } else { bail!("{name} was not flashed") }
 }

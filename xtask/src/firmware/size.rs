@@ -38,6 +38,22 @@ pub fn print() -> anyhow::Result<()> {
     if too_large.is_empty() { Ok(()) } else { bail!("too large: {}", too_large.join(", ")) }
 }
 
+/// Prints what the vehicle's image takes of each real board, as a table for the book.
+///
+/// # Errors
+/// If an image is missing, or has something where there is no memory.
+pub fn print_table() -> anyhow::Result<()> {
+    println!("| board | memory | image | at most |\n|---|---|---|---|");
+    for board in BOARDS.into_iter().filter(|board| board.chip.is_some()) {
+        let size = read(&board.image("vehicle")?, board)?;
+        println!("| {} | flash | {} | {} |", board.feature, size.flash, board.flash);
+        for (region, used) in board.ram.iter().zip(&size.ram) {
+            println!("| {} | {} | {used} | {} |", board.feature, region.name, region.budget);
+        }
+    }
+    Ok(())
+}
+
 fn in_regions(board: &Board, bytes: &[u64]) -> String {
     let parts: Vec<String> =
         board.ram.iter().zip(bytes).map(|(region, bytes)| format!("{} {bytes:>7}", region.name)).collect();

@@ -12,78 +12,67 @@ pub mod time_driver;
 pub mod uart;
 pub mod watchdog;
 
-pub use flash::FileFlash as Flash;
-pub use lan9118::Lan9118 as Ethernet;
-pub use uart::SlcanPort as Can;
-pub use watchdog::Watchdog;
-
-use super::{RestartCause, Troubles};
+use agv_core::localizer::SlamCapacities;
 use defmt_semihosting as _;
 use embassy_executor::SendSpawner;
+
+use super::{Board, Parts, RestartCause, Troubles, large};
+use flash::FileFlash;
 use interrupts::{BUS_TASKS, Interrupt, NETWORK_TASKS};
+use lan9118::Lan9118;
+use uart::SlcanPort;
+use watchdog::ApbWatchdog;
 
-/// What the board has.
-pub struct Board {
-    /// The bus: SLCAN on the first serial line, as there is no CAN.
-    pub can: Can,
-    /// Ethernet.
-    pub ethernet: Ethernet,
-    /// Where settings are kept.
-    pub flash: Flash,
-    /// The watchdog, which runs.
-    pub watchdog: Watchdog,
-    /// Why the program has started.
-    pub restart_cause: RestartCause,
-    /// What does not work.
-    pub troubles: Troubles,
-}
+/// The board, with room for what the vehicle's board has room for.
+pub struct An500;
 
-/// What the board is called on the bus.
-pub const NAME: &str = "MPS2 AN500";
-/// Where the stack begins.
-pub const STACK_TOP: u32 = 0x2040_0000;
-/// Bytes at its end that nobody may touch.
-pub const STACK_GUARD: usize = 0;
+impl Board for An500 {
+    const NAME: &'static str = "MPS2 AN500";
+    const RUNS_WHILE_FLASH_WORKS: bool = true;
 
-/// Starts everything but the tasks.
-#[must_use]
-pub fn start(mut core: cortex_m::Peripherals) -> Board {
-    let mut watchdog = Watchdog::new();
-    watchdog.unleash();
-    time_driver::start();
-    uart::start();
-    // Before its interrupt is let through, which it holds active until it is set up.
-    let ethernet = Ethernet::start([2, 0, 0, 0, 0, 1]);
-    interrupts::enable(&mut core.NVIC);
-    Board {
-        can: uart::SlcanPort,
-        ethernet,
-        flash: Flash::open(),
-        watchdog,
-        restart_cause: RestartCause::Other,
-        troubles: Troubles::NONE,
+    type Capacities = SlamCapacities;
+    type CanParts = SlcanPort;
+    type Can = SlcanPort;
+    type Ethernet = Lan9118;
+    type Flash = FileFlash;
+    type Watchdog = ApbWatchdog;
+
+    #[allow(unsafe_code, reason = "memory that the linker knows is to be cleared once")]
+    fn start(mut core: cortex_m::Peripherals) -> Parts<Self> {
+        let mut watchdog = ApbWatchdog::new();
+        watchdog.unleash();
+        // SAFETY: this function is called once, as it takes the peripherals, and no large value is used yet.
+        unsafe { large::clear() };
+        time_driver::start();
+        uart::start();
+        // Before its interrupt is let through, which it holds active until it is set up.
+        let ethernet = Lan9118::start([2, 0, 0, 0, 0, 1]);
+        interrupts::enable(&mut core.NVIC);
+        Parts {
+            can: SlcanPort,
+            ethernet,
+            flash: FileFlash::open(),
+            watchdog,
+            restart_cause: RestartCause::Other,
+            troubles: Troubles::NONE,
+        }
     }
-}
 
-/// The same in every run, so that runs can be repeated.
-#[must_use]
-pub const fn seed() -> u64 {
-    0x5eed
-}
+    /// Its bit rate is a matter of the adapter.
+    fn take_part(can: SlcanPort, _bit_rate: u16) -> SlcanPort {
+        can
+    }
 
-/// Starts the tasks of the bus. Call once.
-#[must_use]
-pub fn bus_tasks() -> SendSpawner {
-    BUS_TASKS.start(Interrupt::BusTasks)
-}
+    /// The same in every run, so that runs can be repeated.
+    fn seed() -> u64 {
+        0x5eed
+    }
 
-/// Starts the tasks of the network. Call once.
-#[must_use]
-pub fn network_tasks() -> SendSpawner {
-    NETWORK_TASKS.start(Interrupt::NetworkTasks)
-}
+    fn bus_tasks() -> SendSpawner {
+        BUS_TASKS.start(Interrupt::BusTasks)
+    }
 
-/// Starts again.
-pub fn restart() -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
+    fn network_tasks() -> SendSpawner {
+        NETWORK_TASKS.start(Interrupt::NetworkTasks)
+    }
 }

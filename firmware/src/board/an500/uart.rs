@@ -119,14 +119,6 @@ impl State {
 /// The bus of the board.
 pub struct SlcanPort;
 
-impl SlcanPort {
-    /// Takes part in the bus. Its bit rate is a matter of the adapter.
-    #[must_use]
-    pub fn start(self, _bit_rate: u16) -> Self {
-        self
-    }
-}
-
 impl CanPort for SlcanPort {
     async fn receive(&mut self) -> (Frame, Time) {
         poll_fn(|context| {

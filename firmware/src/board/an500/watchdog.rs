@@ -2,7 +2,7 @@
 #![allow(unsafe_code, reason = "registers are at fixed addresses")]
 
 use super::registers::write;
-use crate::board::WATCHDOG_PERIOD;
+use crate::board::{WATCHDOG_PERIOD, Watchdog};
 
 const BASE: usize = 0x4000_8000;
 const LOAD: usize = 0x00;
@@ -17,9 +17,9 @@ const ENABLE: u32 = 0b11;
 const TICKS_A_MICROSECOND: u32 = 25;
 
 /// The watchdog.
-pub struct Watchdog(());
+pub struct ApbWatchdog(());
 
-impl Watchdog {
+impl ApbWatchdog {
     /// The watchdog, not started. Call once.
     #[must_use]
     pub const fn new() -> Self {
@@ -35,15 +35,16 @@ impl Watchdog {
             write(BASE, CONTROL, ENABLE);
         }
     }
+}
 
-    /// Feeds it.
-    pub fn feed(&mut self) {
+impl Watchdog for ApbWatchdog {
+    fn feed(&mut self) {
         // SAFETY: this is a register of a watchdog that only this driver uses.
         unsafe { write(BASE, CLEAR, 1) };
     }
 }
 
-impl Default for Watchdog {
+impl Default for ApbWatchdog {
     fn default() -> Self {
         Self::new()
     }

@@ -29,6 +29,9 @@ pub enum VehicleError {
     /// The log stream fails.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// The emulated chip runs no more.
+    #[error("the emulated chip has stopped: {0}")]
+    Chip(String),
     /// The controller does not localise though it was told where it is.
     #[error("the controller does not localise: {0:?}")]
     NotLocalised(Option<Mode>),

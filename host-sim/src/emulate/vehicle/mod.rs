@@ -3,6 +3,7 @@
 //! The vehicle stands until the controller is told where it is and localises; then it drives. What the controller says on
 //! its bus is kept, and held against the truth afterwards: the firmware never sees that.
 
+mod chip;
 mod error;
 mod network;
 mod pose_errors;
@@ -20,6 +21,7 @@ use agv_settings::Settings;
 use agv_settings::store::KEY;
 use agv_wire::nav350::SensorFrame;
 
+pub use chip::{InChip, drive_in_chip};
 pub use error::VehicleError;
 pub use pose_errors::{Errors, errors};
 pub use watch::{BusTrouble, HeardEmergency, HeardPose, Watch};

@@ -25,13 +25,13 @@ use crate::serve::nav350::Nav350;
 /// Standard deviations of the pose that the controller is told, m and rad.
 const START_DEVIATIONS: [f64; 2] = [0.05, 0.02];
 /// How long the controller may take to localise.
-const PATIENCE: Duration = Duration::from_secs(60);
+pub(super) const PATIENCE: Duration = Duration::from_secs(60);
 /// Most frames of other nodes at once.
 const LONGEST_BURST: f64 = 20.0;
 /// How long the vehicle stands when everything is ready.
-const LEAD: Duration = Duration::from_millis(500);
+pub(super) const LEAD: Duration = Duration::from_millis(500);
 /// How long the controller may take to answer that it knows where it is, before it is told again.
-const BETWEEN_ORDERS: Duration = Duration::from_millis(500);
+pub(super) const BETWEEN_ORDERS: Duration = Duration::from_millis(500);
 
 /// What is known beforehand, and what others see of it.
 pub(super) struct Stage<'a> {
@@ -68,7 +68,7 @@ struct Play<'a> {
     sent: u32,
 }
 
-const FIRST_NODE: NodeId = match NodeId::new(1) {
+pub(super) const FIRST_NODE: NodeId = match NodeId::new(1) {
     Some(node) => node,
     None => panic!("1 is a node"),
 };
@@ -144,16 +144,21 @@ impl Stage<'_> {
         self.heard().poses.last().map(|heard| heard.pose.mode)
     }
 
-    fn initial_pose(&self, controller: NodeId, counter: u8) -> [Frame; 2] {
+    fn pose(&self) -> Pose {
         let driven = self.heard().begin.map_or(0.0, |begin| begin.elapsed().as_secs_f64());
-        let Pose { x, y, theta } = truth_at(&self.recording.truth, self.first.offset(driven)).unwrap_or_default();
-        let [position_deviation, heading_deviation] = START_DEVIATIONS;
-        [
-            Content::InitialPosition { x, y },
-            Content::InitialHeading { heading: theta, position_deviation, heading_deviation },
-        ]
-        .map(|content| content.encode(controller, counter))
+        truth_at(&self.recording.truth, self.first.offset(driven)).unwrap_or_default()
     }
+}
+
+/// What tells the controller that it is at a pose, as well as somebody who looks at it knows.
+pub(super) fn initial_pose(pose: Pose, controller: NodeId, counter: u8) -> [Frame; 2] {
+    let Pose { x, y, theta } = pose;
+    let [position_deviation, heading_deviation] = START_DEVIATIONS;
+    [
+        Content::InitialPosition { x, y },
+        Content::InitialHeading { heading: theta, position_deviation, heading_deviation },
+    ]
+    .map(|content| content.encode(controller, counter))
 }
 
 impl Play<'_> {
@@ -248,7 +253,7 @@ impl Play<'_> {
     /// Tells the controller where it is.
     fn tell_pose(&mut self) -> Result<(), BoardError> {
         self.orders = (self.orders + 1) % 16;
-        for frame in self.stage.initial_pose(self.controller, self.orders) {
+        for frame in initial_pose(self.stage.pose(), self.controller, self.orders) {
             self.send(&frame)?;
         }
         Ok(())

@@ -37,9 +37,11 @@ pub enum ErrorKind {
     Overload,
     /// An initial pose was refused: the vehicle moves, or the bus may not give one.
     PoseRefused,
+    /// The processor stands still from now on, for as long as a page of flash takes to erase: nothing is sent meanwhile.
+    Pause,
 }
 
-const KINDS: [ErrorKind; 12] = [
+const KINDS: [ErrorKind; 13] = [
     ErrorKind::Board,
     ErrorKind::Panicked,
     ErrorKind::SettingsLost,
@@ -52,6 +54,7 @@ const KINDS: [ErrorKind; 12] = [
     ErrorKind::Lost,
     ErrorKind::Overload,
     ErrorKind::PoseRefused,
+    ErrorKind::Pause,
 ];
 
 impl ErrorKind {
@@ -71,6 +74,7 @@ impl ErrorKind {
             Self::Lost => 0xFF01,
             Self::Overload => 0xFF02,
             Self::PoseRefused => 0xFF03,
+            Self::Pause => 0xFF04,
         }
     }
 

@@ -11,7 +11,7 @@ use agv_core::measurement::{
     SpeedSample, Time, WheelSample,
 };
 use agv_core::record::{MAX_FRAME, Output, Record, encode};
-use agv_firmware::app::capacities::Localizer;
+use agv_firmware::board::{Board, Current};
 use agv_settings::Settings;
 
 use super::any;
@@ -23,13 +23,18 @@ static OBSERVATIONS: [ReflectorObservation; 300] =
 static LANDMARKS: [Landmark; 100] =
     [Landmark { id: 0, kind: LandmarkKind::Reflector, x: 0.0, y: 0.0, deviation: 0.0 }; 100];
 
-/// A localiser with room for landmarks in its state, as images with the feature `slam` have it.
-type SlamLocalizer = localizer::Localizer;
+/// The localiser of the largest board.
+type Localizer = localizer::Localizer<<Current as Board>::Capacities>;
+/// That of a board without room for landmarks in the state.
+type SmallLocalizer = localizer::Localizer<localizer::VehicleCapacities>;
+/// That of a replay, which has room for contours, too.
+type WholeLocalizer = localizer::Localizer;
 
-/// The localisers of an image with the feature `slam` and of one without.
+/// All localisers, and what is around the first.
 pub struct Localization {
     localization: agv_controller::Localization<Localizer>,
-    slam: SlamLocalizer,
+    small: SmallLocalizer,
+    whole: WholeLocalizer,
     frame: [u8; MAX_FRAME],
 }
 
@@ -69,7 +74,8 @@ impl Localization {
         let parameters = settings.parameters;
         Self {
             localization: agv_controller::Localization::new(Localizer::new(parameters), &settings),
-            slam: SlamLocalizer::new(parameters),
+            small: SmallLocalizer::new(parameters),
+            whole: WholeLocalizer::new(parameters),
             frame: [0; MAX_FRAME],
         }
     }
@@ -94,8 +100,8 @@ impl Localization {
         black_box(localization.told());
         black_box(localization.search(|record| log(frame, record)));
         black_box(localization.estimate());
-        let outputs = self.slam.handle(&event);
-        let _ = black_box(encode(&Record::Output(Output::from(outputs)), any(0), &mut self.frame));
+        log(&mut self.frame, &Record::Output(Output::from(self.small.handle(&event))));
+        log(&mut self.frame, &Record::Output(Output::from(self.whole.handle(&event))));
     }
 }
 

@@ -5,7 +5,7 @@ use core::arch::naked_asm;
 
 use cortex_m_rt::exception;
 
-use crate::board::{current, retained, stack};
+use crate::board::{restart, retained, stack};
 
 /// CFSR, HFSR, MMFAR and BFAR of the processor: what a fault is, and where (ARMv7-M ARM, B3.2.15 to B3.2.18).
 const CFSR: *const u32 = 0xE000_ED28 as *const u32;
@@ -20,15 +20,14 @@ const LINK: usize = 5;
 const PROGRAM_COUNTER: usize = 6;
 
 /// A fault, with the stack as it is: if it has come to its end, its memory is used again from its beginning, as nothing
-/// returns from here.
+/// returns from here. Below `_stack_lowest_of_faults` there is no room to tell of it.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn HardFault() -> ! {
     naked_asm!(
         "mrs r0, msp",
-        "movw r1, #:lower16:{lowest}",
-        "movt r1, #:upper16:{lowest}",
-        "ldr r1, [r1]",
+        "movw r1, #:lower16:_stack_lowest_of_faults",
+        "movt r1, #:upper16:_stack_lowest_of_faults",
         "cmp r0, r1",
         "bhs 1f",
         "movw r1, #:lower16:_stack_start",
@@ -37,13 +36,9 @@ unsafe extern "C" fn HardFault() -> ! {
         "isb",
         "1:",
         "b {tell}",
-        lowest = sym LOWEST_STACK,
         tell = sym tell,
     )
 }
-
-/// Below this address there is no room to tell of a fault.
-static LOWEST_STACK: u32 = stack::TOP - stack::RESERVED as u32 + stack::GUARD as u32 + 2048;
 
 /// Keeps what is known of a fault whose frame is there, and restarts.
 unsafe extern "C" fn tell(frame: *const u32) -> ! {
@@ -68,12 +63,12 @@ unsafe extern "C" fn tell(frame: *const u32) -> ! {
     retained::keep(&format_args!(
         "fault: CFSR {cause:#010x}, HFSR {hard:#010x}, address {address:#010x}, PC {counter:#010x}, LR {link:#010x}"
     ));
-    current::restart()
+    restart()
 }
 
 /// An exception that nothing was to raise.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     retained::keep(&format_args!("an interrupt that nobody handles: {number}"));
-    current::restart()
+    restart()
 }

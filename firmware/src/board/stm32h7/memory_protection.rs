@@ -4,6 +4,7 @@
 
 use cortex_m::peripheral::MPU;
 
+use super::flash;
 use crate::board::stack;
 
 /// CCR of the processor: data bus faults are ignored while FAULTMASK is set, and in the handler of faults (ARMv7-M ARM,
@@ -22,36 +23,30 @@ const NOT_CACHED: u32 = 0b001 << 19 | 1 << 18;
 const DEVICE: u32 = 1 << 16;
 
 /// A part of memory.
-struct Region {
-    base: u32,
+pub struct Region {
+    /// Its first address.
+    pub base: u32,
     /// Bytes: a power of two, of which the base is a multiple.
-    size: u32,
-    attributes: u32,
-}
-
-fn regions() -> [Region; 4] {
-    [
-        // SRAM1 of domain D2, where the Ethernet's DMA reads and writes.
-        Region { base: 0x3000_0000, size: 128 * 1024, attributes: NEVER_RUN | FULL_ACCESS | NOT_CACHED },
-        // SRAM4 of domain D3: what is kept over a reset, which throws lines of the cache away.
-        Region { base: 0x3800_0000, size: 64 * 1024, attributes: NEVER_RUN | FULL_ACCESS | NOT_CACHED },
-        // The settings' flash: after it was written, the cache would go on to give what was there before.
-        Region { base: 0x081C_0000, size: 256 * 1024, attributes: NEVER_RUN | FULL_ACCESS | DEVICE },
-        Region { base: stack::bottom() as u32, size: stack::GUARD as u32, attributes: NEVER_RUN | NO_ACCESS },
-    ]
+    pub size: u32,
 }
 
 /// Sets all of it up, and that words of flash with a double error can be read. Before the caches are on.
-pub fn enable(mpu: &mut MPU) {
+///
+/// The settings' flash is device memory: after it was written, the cache would go on to give what was there before.
+pub fn enable(mpu: &mut MPU, not_cached: &[Region]) {
+    let settings = Region { base: flash::first_address() as u32, size: flash::length() as u32 };
+    let guard = Region { base: stack::bottom() as u32, size: stack::guard() as u32 };
+    let apart = [(&settings, FULL_ACCESS | DEVICE), (&guard, NO_ACCESS)];
+    let regions = not_cached.iter().map(|region| (region, FULL_ACCESS | NOT_CACHED)).chain(apart);
     // SAFETY: nothing refers to these parts of memory yet: neither the Ethernet nor the settings have started, and the
     // stack has not come to its end.
     unsafe {
         CCR.write_volatile(CCR.read_volatile() | BFHFNMIGN);
         mpu.ctrl.write(0);
-        for (region, number) in regions().iter().zip(0..) {
+        for ((region, attributes), number) in regions.zip(0..) {
             mpu.rnr.write(number);
             mpu.rbar.write(region.base);
-            mpu.rasr.write(region.attributes | (region.size.trailing_zeros() - 1) << 1 | ENABLE);
+            mpu.rasr.write(NEVER_RUN | attributes | (region.size.trailing_zeros() - 1) << 1 | ENABLE);
         }
         mpu.ctrl.write(ENABLE_WITH_DEFAULT_MAP);
     }

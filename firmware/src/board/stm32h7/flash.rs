@@ -1,5 +1,5 @@
-//! The settings' flash: the last two pages of the second bank (RM0433, chapter 4). The program is in the first one, and
-//! goes on while this one is written or erased.
+//! The settings' flash: the last two pages of a bank (RM0433, chapter 4). A program in another bank goes on while this one is
+//! written or erased; one in the same bank stands still, as whoever reads a bank that works waits.
 //!
 //! A loss of power while a word is programmed or a page erased leaves words with a double error, and reading one is a bus
 //! fault. So words are read while such faults are ignored, and a word with a double error reads as zeros, which no checksum
@@ -7,14 +7,17 @@
 #![allow(unsafe_code, reason = "flash is memory at addresses that the linker says, and its faults are the processor's")]
 
 use core::arch::asm;
+use core::marker::PhantomData;
 
 use embassy_stm32::Peri;
 use embassy_stm32::pac::FLASH as REGISTERS;
-use embassy_stm32::pac::flash::Bank;
+use embassy_stm32::pac::flash::Bank as BankRegisters;
 use embassy_stm32::peripherals::FLASH;
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
+
+use super::Chip;
 
 unsafe extern "C" {
     static _settings_start: u8;
@@ -23,8 +26,32 @@ unsafe extern "C" {
 
 /// Where the first bank begins, bytes.
 const FLASH_START: usize = 0x0800_0000;
-/// Offset of the second bank, bytes.
+/// Bytes of a bank in the memory map.
 const BANK: usize = 0x10_0000;
+/// A bank of flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bank {
+    /// The one that the program is in.
+    First,
+    /// The other one.
+    Second,
+}
+
+impl Bank {
+    /// Whether the program is there.
+    pub const fn has_program(self) -> bool {
+        matches!(self, Self::First)
+    }
+
+    fn registers(self) -> BankRegisters {
+        REGISTERS.bank(self as usize)
+    }
+
+    const fn start(self) -> usize {
+        FLASH_START + self as usize * BANK
+    }
+}
+
 /// Bytes of a page.
 const PAGE: usize = 128 * 1024;
 /// Bytes of a word, which is programmed at once and once only.
@@ -58,17 +85,17 @@ impl NorFlashError for FlashError {
 type FlashWord = [u32; WORD / 4];
 
 /// The pages.
-pub struct SettingsFlash(Peri<'static, FLASH>);
+pub struct SettingsFlash<C>(Peri<'static, FLASH>, PhantomData<C>);
 
-impl SettingsFlash {
+impl<C: Chip> SettingsFlash<C> {
     /// The pages of the chip's flash; those whose erasure was cut short are erased.
     #[must_use]
     pub fn open(flash: Peri<'static, FLASH>) -> Self {
-        let mut pages = Self(flash);
+        let mut pages = Self(flash, PhantomData);
         for page in 0..pages.capacity() / PAGE {
             let (mut torn, mut written) = (0_usize, 0_usize);
             for offset in (page * PAGE..(page + 1) * PAGE).step_by(WORD) {
-                match read_word(offset) {
+                match read_word(C::SETTINGS, offset) {
                     None => torn += 1,
                     Some(word) => written += usize::from(word != [u32::MAX; WORD / 4]),
                 }
@@ -81,17 +108,23 @@ impl SettingsFlash {
     }
 }
 
-/// The address of an offset in the pages.
-fn address(offset: usize) -> usize {
-    FLASH_START + (&raw const _settings_start) as usize + offset
+/// Where the pages begin.
+pub fn first_address() -> usize {
+    FLASH_START + (&raw const _settings_start) as usize
 }
 
-fn bank() -> Bank {
-    REGISTERS.bank(1)
+/// Bytes of all pages.
+pub fn length() -> usize {
+    (&raw const _settings_length) as usize
+}
+
+/// The address of an offset in the pages.
+fn address(offset: usize) -> usize {
+    first_address() + offset
 }
 
 /// Reads the word at an offset. None if it has a double error.
-fn read_word(offset: usize) -> Option<FlashWord> {
+fn read_word(bank: Bank, offset: usize) -> Option<FlashWord> {
     let place = address(offset) as *const u32;
     let mut word = [0; WORD / 4];
     // SAFETY: the address is a whole word within the pages. Nothing else runs while faults are masked, which lasts for
@@ -102,9 +135,9 @@ fn read_word(offset: usize) -> Option<FlashWord> {
             *part = place.add(number).read_volatile();
         }
         asm!("dsb", "isb", options(nostack));
-        let has_error = bank().sr().read().dbeccerr();
+        let has_error = bank.registers().sr().read().dbeccerr();
         if has_error {
-            clear_errors();
+            clear_errors(bank);
             CFSR.write_volatile(BUS_FAULTS);
         }
         asm!("cpsie f", options(nostack));
@@ -114,20 +147,20 @@ fn read_word(offset: usize) -> Option<FlashWord> {
 }
 
 /// Errors stay until they are cleared, in a register of their own, and keep everything else from being done.
-fn clear_errors() {
+fn clear_errors(bank: Bank) {
     // Every flag that the status has.
-    bank().ccr().write(|flags| flags.0 = 0x1FEF_0000);
+    bank.registers().ccr().write(|flags| flags.0 = 0x1FEF_0000);
 }
 
 /// Does something with the bank unlocked.
-fn unlocked(work: impl FnOnce(Bank)) -> Result<(), FlashError> {
-    let bank = bank();
+fn unlocked(which: Bank, work: impl FnOnce(BankRegisters)) -> Result<(), FlashError> {
+    let bank = which.registers();
     if bank.cr().read().lock() {
         for key in KEYS {
             bank.keyr().write_value(key);
         }
     }
-    clear_errors();
+    clear_errors(which);
     work(bank);
     cortex_m::asm::dsb();
     // The watchdog knows how long this may take.
@@ -135,7 +168,7 @@ fn unlocked(work: impl FnOnce(Bank)) -> Result<(), FlashError> {
     let status = bank.sr().read();
     let has_failed =
         status.wrperr() || status.pgserr() || status.strberr() || status.incerr() || status.operr() || status.wbne();
-    clear_errors();
+    clear_errors(which);
     bank.cr().write(|control| {
         control.set_psize(PARALLELISM);
         control.set_lock(true);
@@ -143,11 +176,11 @@ fn unlocked(work: impl FnOnce(Bank)) -> Result<(), FlashError> {
     if has_failed { Err(FlashError::Refused) } else { Ok(()) }
 }
 
-impl ErrorType for SettingsFlash {
+impl<C: Chip> ErrorType for SettingsFlash<C> {
     type Error = FlashError;
 }
 
-impl ReadNorFlash for SettingsFlash {
+impl<C: Chip> ReadNorFlash for SettingsFlash<C> {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
@@ -156,7 +189,7 @@ impl ReadNorFlash for SettingsFlash {
         let mut rest = bytes;
         while !rest.is_empty() {
             let skipped = offset % WORD;
-            let word = read_word(offset - skipped).unwrap_or_default();
+            let word = read_word(C::SETTINGS, offset - skipped).unwrap_or_default();
             let count = rest.len().min(WORD - skipped);
             let (now, later) = rest.split_at_mut(count);
             let read = word.iter().flat_map(|part| part.to_le_bytes()).skip(skipped);
@@ -168,19 +201,19 @@ impl ReadNorFlash for SettingsFlash {
     }
 
     fn capacity(&self) -> usize {
-        (&raw const _settings_length) as usize
+        length()
     }
 }
 
-impl NorFlash for SettingsFlash {
+impl<C: Chip> NorFlash for SettingsFlash<C> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = PAGE;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         check_erase(self, from, to).map_err(FlashError::Place)?;
         for offset in (from as usize..to as usize).step_by(PAGE) {
-            let page = (address(offset) - FLASH_START - BANK) / PAGE;
-            unlocked(|bank| {
+            let page = (address(offset) - C::SETTINGS.start()) / PAGE;
+            unlocked(C::SETTINGS, |bank| {
                 bank.cr().write(|control| {
                     control.set_psize(PARALLELISM);
                     control.set_ser(true);
@@ -199,7 +232,7 @@ impl NorFlash for SettingsFlash {
             for (part, bytes) in word.iter_mut().zip(bytes.as_chunks().0) {
                 *part = u32::from_le_bytes(*bytes);
             }
-            unlocked(|bank| {
+            unlocked(C::SETTINGS, |bank| {
                 bank.cr().write(|control| {
                     control.set_psize(PARALLELISM);
                     control.set_pg(true);
@@ -210,7 +243,7 @@ impl NorFlash for SettingsFlash {
                     unsafe { (address(offset) as *mut u32).add(number).write_volatile(*part) };
                 }
             })?;
-            if read_word(offset) != Some(word) {
+            if read_word(C::SETTINGS, offset) != Some(word) {
                 return Err(FlashError::Refused);
             }
         }

@@ -3,7 +3,7 @@
 use embassy_stm32::pac::IWDG1;
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};
 
-use crate::board::WATCHDOG_PERIOD;
+use crate::board::{WATCHDOG_PERIOD, Watchdog};
 
 /// Nominal frequency of the oscillator, Hz.
 const OSCILLATOR: u32 = 32_000;
@@ -12,9 +12,9 @@ const RELOAD: u32 = WATCHDOG_PERIOD / 1000 * (OSCILLATOR / 1000) / DIVISOR - 1;
 const _: () = assert!(RELOAD < 1 << 12, "the counter has twelve bits");
 
 /// The watchdog, which runs.
-pub struct Watchdog(());
+pub struct IndependentWatchdog(());
 
-impl Watchdog {
+impl IndependentWatchdog {
     /// Starts it: from now on it must be fed. The first thing that the program does.
     #[must_use]
     pub fn unleash() -> Self {
@@ -28,9 +28,10 @@ impl Watchdog {
         watchdog.feed();
         watchdog
     }
+}
 
-    /// Feeds it.
-    pub fn feed(&mut self) {
+impl Watchdog for IndependentWatchdog {
+    fn feed(&mut self) {
         IWDG1.kr().write(|key| key.set_key(Key::RESET));
     }
 }

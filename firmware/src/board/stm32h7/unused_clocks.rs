@@ -1,17 +1,9 @@
-//! Clocks of memories that are off after a reset, and of parts that nobody uses (RM0433, 8.7.40 to 8.7.47).
+//! Clocks of parts that nobody uses (RM0433, 8.7.40 to 8.7.47), in every chip of the family.
 
 use embassy_stm32::pac::RCC;
 
-/// Switches on the RAM of the Ethernet. Without it the first store there is a bus fault.
-pub fn enable() {
-    RCC.ahb2enr().modify(|enabled| enabled.set_sram1en(true));
-    // The clock runs two cycles after the store (RM0433, 8.5.10): this waits for longer.
-    let _ = RCC.ahb2enr().read();
-    cortex_m::asm::dsb();
-}
-
 /// Switches off what the released library switches on for whoever may come.
-pub fn disable_unused() {
+pub fn disable() {
     RCC.ahb1enr().modify(|enabled| {
         enabled.set_dma1en(false);
         enabled.set_dma2en(false);

@@ -1,0 +1,20 @@
+//! Memory for large values beside that of all other statics, which would not hold them.
+//!
+//! It is no `.bss`, as its clock may be off when that is cleared: a board clears it when it starts.
+#![allow(unsafe_code, reason = "the memory is known to the linker")]
+
+unsafe extern "C" {
+    static mut _large_start: u32;
+    static mut _large_end: u32;
+}
+
+/// Makes zeros of all of it.
+///
+/// # Safety
+/// To be called once, before anybody uses what is there. All zero must be a valid beginning of every static there, as it is
+/// of a `StaticCell`.
+pub unsafe fn clear() {
+    let (start, end) = (&raw mut _large_start, &raw mut _large_end);
+    // SAFETY: the linker has put both on whole words, and nobody uses what is between them yet.
+    unsafe { start.write_bytes(0, end.addr().saturating_sub(start.addr()) / size_of::<u32>()) };
+}
