@@ -13,7 +13,7 @@ use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::sdo::{AbortCode, ObjectDictionary};
 use heapless::Vec;
 
-use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
+use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, add};
 use super::gyro::Gyro;
 use super::localization::Estimate;
 use super::progress::{Progress, SentPose, Told};
@@ -261,8 +261,9 @@ impl Bus {
     /// Identifiers of the frames that mean something here though no node of [`Self::nodes`] says them.
     #[must_use]
     pub fn other_frames(&self) -> Vec<Id, OTHERS> {
-        // There is room for all.
-        self.encoders.own_frames().into_iter().chain(self.gyro.id()).collect()
+        let mut others = Vec::new();
+        self.encoders.own_frames().into_iter().chain(self.gyro.id()).for_each(|id| add(&mut others, Some(id)));
+        others
     }
 
     /// The nodes whose frames mean something here: the controller, its encoders, and those whose heartbeats are watched.

@@ -101,19 +101,29 @@ const FIRST: NodeId = match NodeId::new(1) {
 #[must_use]
 pub fn channels(nodes: &EncoderNodes, parameters: &Parameters) -> Vec<ChannelSettings, MOST_COUNTERS> {
     let counters = parameters.vehicle.counters();
+    let mut channels = Vec::new();
     if counters.is_empty() {
-        let unknown = [Counted::Turn, Counted::Steering].into_iter().enumerate();
-        return unknown.filter_map(|(number, counted)| channel(nodes, number, counted, None, UNKNOWN)).collect();
+        for (number, counted) in [Counted::Turn, Counted::Steering].into_iter().enumerate() {
+            add(&mut channels, channel(nodes, number, counted, None, UNKNOWN));
+        }
     }
-    let known = counters.iter().enumerate().filter_map(|(number, counter)| {
+    for (number, counter) in counters.iter().enumerate() {
         let Counter { counted, range, scale, .. } = *counter;
         let (fastest, braking) = match counted {
             Counted::Turn => (parameters.limits.fastest, BRAKING),
             Counted::Steering => STEERING,
         };
-        channel(nodes, number, counted, Some(range), (fastest / scale.abs(), braking / scale.abs()))
-    });
-    known.collect()
+        let limits = (fastest / scale.abs(), braking / scale.abs());
+        add(&mut channels, channel(nodes, number, counted, Some(range), limits));
+    }
+    channels
+}
+
+/// Adds what there is; nobody adds more than there is room for.
+pub(super) fn add<T, const ROOM: usize>(to: &mut Vec<T, ROOM>, what: Option<T>) {
+    if let Some(what) = what {
+        let _ = to.push(what);
+    }
 }
 
 /// The encoder of that number, whose fastest motion (ticks/s) and hardest braking (ticks/s^2) are given.

@@ -7,7 +7,7 @@ use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::motion_frames::{IncrementReports, MotionFrames, SpeedReports};
 use heapless::Vec;
 
-use super::encoders::{BusEvent, EncoderNodes};
+use super::encoders::{BusEvent, EncoderNodes, add};
 
 /// Silences after which a report is late and missing, in periods: those of encoders
 /// ([`agv_wire::can::plausibility::PlausibilityLimits::every`]).
@@ -44,10 +44,12 @@ impl OwnReports {
 
     /// Identifiers of their frames.
     pub fn ids(&self) -> Vec<Id, 2> {
+        let mut ids = Vec::new();
         match &self.reports {
-            Reports::Speed(_) => self.frames.speed_ids().into_iter().collect(),
-            Reports::Increments(_) => core::iter::once(self.frames.increment_id()).collect(),
+            Reports::Speed(_) => self.frames.speed_ids().into_iter().for_each(|id| add(&mut ids, Some(id))),
+            Reports::Increments(_) => add(&mut ids, Some(self.frames.increment_id())),
         }
+        ids
     }
 
     /// Takes a frame that came at `heard`.

@@ -35,6 +35,7 @@ mod pose_output;
 mod prediction;
 mod public_items;
 mod record;
+mod redundancy_check;
 mod reflector_detection;
 mod reflector_search;
 mod second_laser;

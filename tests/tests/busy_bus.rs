@@ -301,7 +301,12 @@ fn drive_on(recording: &Recording, rate: f64, load: f64, seconds: f64) {
             if who != CONTROLLER {
                 let faults = group.poll_faults(end);
                 heard.faults.extend(faults);
-                let sample = group.handle(&frame, end);
+                let counts = group.handle(&frame, end);
+                let sample = counts.map(|Counts { time, counts: [drive, steering, ..] }| EncoderSample {
+                    time,
+                    drive,
+                    steering,
+                });
                 let (answer, order) =
                     (controller.handle(&frame, end, None, &mut WithoutSettings, Ok(())), orders.handle(&frame, end));
                 assert!(answer.is_none() && order.is_none(), "{frame:?} is taken for {answer:?} {order:?}");

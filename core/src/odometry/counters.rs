@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{CounterRange, Tricycle, Vehicle, WheelBased};
+use super::{AngleEncoder, CounterRange, Tricycle, Vehicle, WheelBased};
 use crate::measurement::{WheelReading, WheelSample};
 
 /// No vehicle reports more counters.
@@ -35,17 +35,18 @@ impl Vehicle {
     /// steering angle. None of a vehicle that reports something else.
     #[must_use]
     pub fn counters(&self) -> Vec<Counter, MOST_COUNTERS> {
+        let mut counters = Vec::new();
+        // None of the vehicles has more than there is room for.
+        let mut add = |counter| _ = counters.push(counter);
         match self {
-            Self::Tricycle(Tricycle { drive_scale, drive_range, steering_scale, steering_range, .. }) => {
-                let turn = Counter { wheel: 0, counted: Counted::Turn, range: *drive_range, scale: *drive_scale };
-                let steering =
-                    Counter { wheel: 0, counted: Counted::Steering, range: *steering_range, scale: *steering_scale };
-                [turn, steering].into_iter().collect()
+            Self::Tricycle(tricycle) => {
+                let Tricycle { drive_scale, drive_range, steering_scale, steering_range, .. } = *tricycle;
+                add(Counter { wheel: 0, counted: Counted::Turn, range: drive_range, scale: drive_scale });
+                add(Counter { wheel: 0, counted: Counted::Steering, range: steering_range, scale: steering_scale });
             }
             Self::Wheels(vehicle) => {
-                let wheels = vehicle.wheels();
-                let of = |(number, wheel): (usize, &super::Wheel)| {
-                    let counter = |counted, encoder: super::AngleEncoder, factor| Counter {
+                for (number, wheel) in vehicle.wheels().as_ref().iter().enumerate() {
+                    let counter = |counted, encoder: AngleEncoder, factor| Counter {
                         wheel: number,
                         counted,
                         range: encoder.range,
@@ -53,13 +54,12 @@ impl Vehicle {
                     };
                     let turn = wheel.turn.map(|encoder| counter(Counted::Turn, encoder, wheel.radius));
                     let steering = wheel.steering.map(|encoder| counter(Counted::Steering, encoder, 1.0));
-                    turn.into_iter().chain(steering)
-                };
-                // None of the vehicles has more.
-                wheels.as_ref().iter().enumerate().flat_map(of).take(MOST_COUNTERS).collect()
+                    turn.into_iter().chain(steering).for_each(&mut add);
+                }
             }
-            Self::Ackermann(_) | Self::Increments | Self::TricycleSpeed(_) => Vec::new(),
+            Self::Ackermann(_) | Self::Increments | Self::TricycleSpeed(_) => {}
         }
+        counters
     }
 }
 

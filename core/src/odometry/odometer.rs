@@ -165,8 +165,16 @@ impl VehicleOdometer {
     /// # Errors
     /// See [`Odometer::report`].
     pub fn wheels(&mut self, sample: &WheelSample) -> Result<Motion, OdometryError> {
+        self.wheels_with_slip(sample).map(|(motion, _)| motion)
+    }
+
+    /// The motion since the last sample of several wheels, and what redundant ones say differently of it.
+    ///
+    /// # Errors
+    /// See [`Odometer::report_with_slip`].
+    pub fn wheels_with_slip(&mut self, sample: &WheelSample) -> Result<(Motion, f64), OdometryError> {
         match self {
-            Self::Wheels(odometer) => odometer.report(sample),
+            Self::Wheels(odometer) => odometer.report_with_slip(sample),
             _ => Err(OdometryError::WrongVehicle),
         }
     }

@@ -163,12 +163,17 @@ impl EncoderGroup {
         let is_synchronous = channels
             .iter()
             .any(|channel| channel.encoder.has_master() && channel.encoder.reporting == Reporting::Synchronous);
-        Self {
-            channels: channels.iter().map(|settings| Channel::new(settings, start)).collect(),
+        let mut group = Self {
+            channels: Vec::new(),
             sync: is_synchronous.then(|| SyncProducer::new(sync_period, start)),
             waiting: None,
             told_faults: EncoderFaults::default(),
+        };
+        for settings in channels {
+            // There is room for all that are left.
+            let _ = group.channels.push(Channel::new(settings, start));
         }
+        group
     }
 
     /// Takes a frame that was received at `time`; gives a sample if it completes one.
