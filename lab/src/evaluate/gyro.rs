@@ -8,6 +8,8 @@
 //! - the 95 % mark: the smallest value that 95 % of all drives do not exceed; no drive is left out;
 //! - told: the first pose on the bus with the reason [`Reason::WheelsSlip`] after the slip began; its way is that of the truth.
 
+use std::ops::Range;
+
 use agv_core::geometry::{Pose, difference};
 use agv_core::state::Reason;
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
@@ -155,30 +157,36 @@ pub fn run(drives: u32, seed: u64, mut step: impl FnMut()) -> Result<GyroOutcome
             headings.push(heading_row(kind, &found));
         }
         for (way, shown_by) in slips_of() {
-            let mut row = SlipRow {
-                vehicle,
-                way,
-                shown_by,
-                drives: 0,
-                told: 0,
-                longest_m: 0.0,
-                worst_seed: seed,
-                beyond_level: 0,
-            };
-            for seed in seeds.clone() {
-                let (told, is_beyond) = slipping_drive(vehicle, way, shown_by, seed)?;
-                row.drives += 1;
-                row.told += usize::from(told.is_some());
-                row.beyond_level += usize::from(is_beyond);
-                if let Some(way) = told.filter(|way| *way > row.longest_m) {
-                    (row.longest_m, row.worst_seed) = (way, seed);
-                }
-                step();
-            }
-            slips.push(row);
+            slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &mut step)?);
         }
     }
     Ok(GyroOutcome { headings, slips })
+}
+
+/// Lets a wheel of a vehicle slip on drives with those seeds. `step` is called after each drive.
+///
+/// # Errors
+/// See [`GyroError`].
+pub fn slip_row(
+    vehicle: VehicleKind,
+    way: Way,
+    shown_by: ShownBy,
+    seeds: Range<u64>,
+    mut step: impl FnMut(),
+) -> Result<SlipRow, GyroError> {
+    let (mut drives, mut told, mut beyond_level) = (0, 0, 0);
+    let (mut longest_m, mut worst_seed) = (0.0, seeds.start);
+    for seed in seeds {
+        let (after, is_beyond) = slipping_drive(vehicle, way, shown_by, seed)?;
+        drives += 1;
+        told += usize::from(after.is_some());
+        beyond_level += usize::from(is_beyond);
+        if let Some(after) = after.filter(|after| *after > longest_m) {
+            (longest_m, worst_seed) = (after, seed);
+        }
+        step();
+    }
+    Ok(SlipRow { vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level })
 }
 
 const VEHICLES: [VehicleKind; 4] =
