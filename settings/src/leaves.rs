@@ -52,7 +52,7 @@ macro_rules! vehicle {
             set: |settings, value| {
                 let Value::Number(number) = value else { return false };
                 settings.vehicle.$($place)+ = number;
-                settings.parameters.vehicle = settings.vehicle.vehicle();
+                settings.take_vehicle();
                 true
             },
         }
@@ -94,7 +94,7 @@ macro_rules! counter {
                 let Value::Whole(values) = value else { return false };
                 let Some(range) = CounterRange::new(values) else { return false };
                 settings.vehicle.$($place)+ = range;
-                settings.parameters.vehicle = settings.vehicle.vehicle();
+                settings.take_vehicle();
                 true
             },
         }
@@ -236,7 +236,7 @@ pub static LEAVES: [Leaf; 148] = [
             let Value::Whole(number) = value else { return false };
             let Some(kind) = u8::try_from(number).ok().and_then(VehicleKind::of_number) else { return false };
             settings.vehicle.kind = kind;
-            settings.parameters.vehicle = settings.vehicle.vehicle();
+            settings.take_vehicle();
             true
         },
     },

@@ -15,7 +15,7 @@ use agv_core::state::{LaserHealth, Mode, Relocalization};
 use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, ServiceError};
 use agv_host_sim::recording::Recording;
-use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::scenario::{MotionReport, Scenario};
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
 use agv_settings::leaf::Value;
@@ -108,6 +108,30 @@ fn it_drives_through_the_hall() {
     println!("{lines:#?}");
     assert!(lines.iter().any(|line| line.contains("72 landmarks")), "{lines:?}");
     check_stack(&lines);
+}
+
+/// Four counters, and a vehicle whose own controller tells its speed: chosen by settings alone, in the same image.
+#[test]
+fn vehicles_of_other_kinds_drive_through_the_hall() {
+    const TEST: &str = "vehicles_of_other_kinds_drive_through_the_hall";
+    let Some((image, _alone)) = image(TEST) else { return };
+    for reports in [MotionReport::BiSteerable, MotionReport::TricycleSpeed] {
+        let mut scenario = Scenario::read(Path::new("warehouse_hall")).unwrap();
+        scenario.laser.scans = false;
+        scenario.vehicle.reports = reports;
+        let recording = simulate(&scenario).unwrap().recording;
+        let drives = (0..5).map(|_| drive(&image, &recording, 12.0, |_| ()));
+        let Some(drive) = drives.into_iter().find(|drive| drive.driven.longest_stall < LONGEST_STALL) else {
+            agv_tests::too_busy(TEST);
+            return;
+        };
+        let errors = vehicle::errors(&drive.driven, &recording).unwrap();
+        println!("{reports:?} {errors:?}");
+        assert!(errors.poses > 900 && errors.localised_share > 0.9, "{reports:?} {errors:?}");
+        assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{reports:?} {errors:?}");
+        assert!(agv_tests::faults(&drive.driven).is_empty(), "{reports:?} {:?}", drive.driven.emergencies);
+        assert_replayed(&drive, 900);
+    }
 }
 
 /// What the firmware has logged, line by line.

@@ -1,8 +1,10 @@
 //! Which nodes of a bus are a vehicle's encoders.
 
 use agv_controller::EncoderNodes;
+use agv_core::odometry::Vehicle;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::Reporting;
+use agv_wire::can::motion_frames::MotionFrames;
 
 /// Options of the commands that listen to encoders.
 #[derive(clap::Args)]
@@ -28,11 +30,13 @@ pub struct EncoderArguments {
 }
 
 impl EncoderArguments {
-    /// The nodes.
-    pub fn nodes(&self) -> EncoderNodes {
+    /// The nodes of a vehicle; one whose own controller tells speed and angle does so in the usual frames.
+    pub fn nodes(&self, vehicle: &Vehicle) -> EncoderNodes {
         let nodes = EncoderNodes::new([self.drive, self.steering, self.third, self.fourth], self.controller);
         let reporting = if self.sync { Reporting::Synchronous } else { nodes.reporting };
-        EncoderNodes { reporting, ..nodes }
+        let tells_speed = matches!(vehicle, Vehicle::Ackermann(_) | Vehicle::TricycleSpeed(_));
+        let motion_frames = tells_speed.then_some(MotionFrames::USUAL);
+        EncoderNodes { reporting, motion_frames, ..nodes }
     }
 }
 

@@ -33,6 +33,8 @@ pub struct Counter {
 impl Vehicle {
     /// The counters that the vehicle reports, wheel by wheel in the order of its kinematics, the turn of a wheel before its
     /// steering angle. None of a vehicle that reports something else.
+    // One copy: it is asked for in several places, at the start and for each sample.
+    #[inline(never)]
     #[must_use]
     pub fn counters(&self) -> Vec<Counter, MOST_COUNTERS> {
         let mut counters = Vec::new();

@@ -170,10 +170,13 @@ impl<'a> EventMaker<'a> {
         // Encoders that were switched on later were not missing before.
         let is_of_encoder =
             |frame: &Frame| self.nodes.encoders.iter().any(|node| frame.id() == transmit_pdo_id(*node, 1));
-        if is_first && self.bus == Bus::Overheard && !frame.is_some_and(is_of_encoder) {
+        // Whose own controller tells the motion is listened to in any case.
+        let tells_itself = self.nodes.motion_frames.is_some() && self.parameters.vehicle.counters().is_empty();
+        let bus = if tells_itself { Bus::Served } else { self.bus };
+        if is_first && bus == Bus::Overheard && !frame.is_some_and(is_of_encoder) {
             return;
         }
-        let encoders = self.encoders.get_or_insert_with(|| match self.bus {
+        let encoders = self.encoders.get_or_insert_with(|| match bus {
             Bus::Served => Encoders::Served(controller::Encoders::new(self.nodes, self.parameters, time)),
             Bus::Overheard => Encoders::Overheard(EncoderListener::new(&channels(self.nodes, self.parameters), time)),
         });
