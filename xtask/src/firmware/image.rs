@@ -41,11 +41,11 @@ impl Region {
     }
 }
 
-/// The emulated board, in as much RAM as the vehicle's had for everything.
+/// The emulated board, in as much RAM as the vehicle's had for everything. Its flash has 4 MB.
 pub const AN500: Board = Board {
     feature: "an500",
     images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
-    flash: 512 * 1024,
+    flash: 544 * 1024,
     ram: &[Region { name: "RAM", addresses: 0x2000_0000..0x2040_0000, budget: 368 * 1024 }],
 };
 
