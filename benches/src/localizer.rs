@@ -8,6 +8,7 @@ use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::measurement::{EncoderSample, ReflectorObservation, Reflectors, Time};
 use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
 use agv_host_sim::recording::RecordedEvent;
+use agv_lab::equipment::Equipment;
 use agv_lab::evaluate::warehouse::{Method, PATHS, prepare};
 use agv_lab::evaluate::warehouse_disturbance::Disturbance;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
@@ -84,8 +85,9 @@ fn steps(criterion: &mut Criterion) {
 
 fn scan_cycle(criterion: &mut Criterion) {
     let method = Method::ALL.iter().find(|method| method.name == "static").expect("there is a static map");
-    let recording =
-        prepare(PATHS[0].1, method, Disturbance::None, 1).expect("the standard drive can be simulated").recording;
+    let recording = prepare(PATHS[0].1, method, Disturbance::None, Equipment::default(), 1)
+        .expect("the standard drive can be simulated")
+        .recording;
     let mut localizer: Box<Localizer> = Box::new(Localizer::new(recording.parameters));
     localizer.add_landmarks(&recording.landmarks).expect("the map fits");
     // The middle of the drive: the vehicle moves, and the lane is on both sides.

@@ -3,6 +3,7 @@
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::OutputPredictor;
 use agv_core::measurement::{EncoderFaults, Time};
+use agv_core::odometry::MOST_COUNTERS;
 use agv_core::state::{LaserHealth, Mode, PoseOutput, Relocalization};
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
@@ -12,7 +13,7 @@ use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::sdo::{AbortCode, ObjectDictionary};
 use heapless::Vec;
 
-use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
+use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, add};
 use super::gyro::Gyro;
 use super::localization::Estimate;
 use super::progress::{Progress, SentPose, Told};
@@ -46,7 +47,9 @@ impl Troubles {
 const SETTING_UP: f64 = 2.0;
 
 /// Most nodes whose frames mean something here.
-const NODES: usize = 3 + CONSUMERS;
+const NODES: usize = 1 + MOST_COUNTERS + CONSUMERS;
+/// Most identifiers of frames that no such node says: two of the vehicle's own controller, and the gyro's.
+const OTHERS: usize = 3;
 
 /// What comes of a look at the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,12 +170,19 @@ impl Bus {
             match &event {
                 BusEvent::Encoders(sample) => {
                     predictor.encoders(sample);
-                    standstill.sample(sample.time, [sample.drive, 0]);
+                    standstill.sample(sample.time, [sample.drive, 0, 0, 0]);
                 }
                 BusEvent::Wheels(sample) => {
                     predictor.wheels(sample);
-                    let [first, second, ..] = sample.wheels.map(|wheel| wheel.count);
-                    standstill.sample(sample.time, [first, second]);
+                    standstill.sample(sample.time, sample.wheels.map(|wheel| wheel.count));
+                }
+                BusEvent::Speed(sample) => {
+                    predictor.speed(sample);
+                    standstill.speed(sample);
+                }
+                BusEvent::Increment(increment) => {
+                    predictor.increment(increment);
+                    standstill.increment(increment);
                 }
                 BusEvent::SetPose(_) if !*accepts_pose || !standstill.stands(heard) => {
                     return node.report(ErrorKind::PoseRefused, heard);
@@ -248,18 +258,22 @@ impl Bus {
         self.node.report(kind, now);
     }
 
-    /// Identifier of the frames that mean something here though no node of [`Self::nodes`] says them.
+    /// Identifiers of the frames that mean something here though no node of [`Self::nodes`] says them.
     #[must_use]
-    pub fn other_frames(&self) -> Option<Id> {
-        self.gyro.id()
+    pub fn other_frames(&self) -> Vec<Id, OTHERS> {
+        let mut others = Vec::new();
+        // Not by value: the end of such an iterator is not seen to be without panic.
+        self.encoders.own_frames().iter().for_each(|id| add(&mut others, Some(*id)));
+        add(&mut others, self.gyro.id());
+        others
     }
 
     /// The nodes whose frames mean something here: the controller, its encoders, and those whose heartbeats are watched.
     #[must_use]
     pub fn nodes(&self) -> Vec<NodeId, NODES> {
-        let own = [self.nodes.controller, self.nodes.drive, self.nodes.steering];
+        let encoders = self.nodes.encoders.iter().take(self.encoders.count());
         let mut nodes = Vec::new();
-        for node in own.iter().chain(&self.node.watched()) {
+        for node in core::iter::once(&self.nodes.controller).chain(encoders).chain(&self.node.watched()) {
             // There is room for all.
             let _ = nodes.push(*node);
         }

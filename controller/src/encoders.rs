@@ -1,15 +1,21 @@
-//! The encoders on the bus, and what other controllers say to the localiser there.
+//! What tells the vehicle's motion on the bus, and what other controllers say to the localiser there.
 
 use agv_core::localizer::{Event, Parameters, PoseFix};
-use agv_core::measurement::{EncoderFaults, EncoderSample, GyroSample, Time, WheelReading, WheelSample};
-use agv_core::odometry::{Differential, DrivenWheel, Tricycle, Vehicle, WheelVehicle};
+use agv_core::measurement::{
+    EncoderFaults, EncoderSample, GyroSample, MOST_WHEELS, PoseIncrement, SpeedSample, Time, WheelReading, WheelSample,
+};
+use agv_core::odometry::{Counted, Counter, CounterRange, MOST_COUNTERS, Vehicle};
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller::OrderReceiver;
 use agv_wire::can::encoder::{EncoderSettings, Profile, Reporting};
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
-use agv_wire::can::frame::Frame;
+use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup};
+use agv_wire::can::frame::{Frame, Id};
+use agv_wire::can::motion_frames::MotionFrames;
 use agv_wire::can::plausibility::PlausibilityLimits;
+use heapless::Vec;
+
+use super::own_reports::OwnReports;
 
 /// Time between SYNC messages if encoders want them, s; and between their positions then.
 const SYNC_PERIOD: f64 = 0.010;
@@ -20,35 +26,58 @@ const STEERING: (f64, f64) = (3.0, 100.0);
 /// The same of an encoder whose scale is not known, ticks/s and ticks/s^2.
 const UNKNOWN: (f64, f64) = (1e6, 1e6);
 
-/// Which nodes the encoders are, and how they report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Who tells the vehicle's motion, and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncoderNodes {
-    /// The driving wheel's encoder.
-    pub drive: NodeId,
-    /// The steering's encoder.
-    pub steering: NodeId,
+    /// The encoders, in the order of [`Vehicle::counters`]; as many as the vehicle has count.
+    pub encoders: [NodeId; MOST_COUNTERS],
+    /// What they are.
+    pub profiles: [Profile; MOST_COUNTERS],
     /// The controller, whose orders are heard.
     pub controller: NodeId,
-    /// What they are: driving wheel, steering.
-    pub profiles: [Profile; 2],
-    /// When they report.
+    /// When the encoders report, or the vehicle's own controller does.
     pub reporting: Reporting,
-    /// Whether the controller is their master; else it only listens to them.
+    /// Whether the controller is the master of the encoders; else it only listens to them.
     pub are_managed: bool,
+    /// Where the vehicle's own controller says how it moves. Without it two encoders are heard of a vehicle that reports no
+    /// counters: what they say can be recorded.
+    pub motion_frames: Option<MotionFrames>,
 }
 
 impl EncoderNodes {
+    /// Encoders of CiA 406 that the controller is the master of, and that report every 10 ms.
+    #[must_use]
+    pub const fn new(encoders: [NodeId; MOST_COUNTERS], controller: NodeId) -> Self {
+        Self {
+            encoders,
+            profiles: [Profile::Encoder; MOST_COUNTERS],
+            controller,
+            reporting: Reporting::Timer { period: 10 },
+            are_managed: true,
+            motion_frames: None,
+        }
+    }
+
     /// Those of a vehicle that is set up.
     #[must_use]
     pub fn of(settings: &Settings) -> Self {
         let nodes = settings.nodes;
         Self {
-            drive: node(nodes.drive),
-            steering: node(nodes.steering),
+            encoders: nodes.encoders.map(|encoder| node(encoder.node)),
+            profiles: nodes.encoders.map(|encoder| profile(encoder.profile)),
             controller: node(nodes.controller),
-            profiles: [nodes.drive_profile, nodes.steering_profile].map(profile),
             reporting: Reporting::Timer { period: settings.encoder_period },
             are_managed: nodes.is_master,
+            motion_frames: Some(settings.motion_frames),
+        }
+    }
+
+    /// Time between reports, s.
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        match self.reporting {
+            Reporting::Timer { period } | Reporting::Polled { period } => 1e-3 * f64::from(period),
+            Reporting::Synchronous => SYNC_PERIOD,
         }
     }
 }
@@ -68,54 +97,56 @@ const FIRST: NodeId = match NodeId::new(1) {
     None => panic!("1 is a node"),
 };
 
-/// Settings of the driving wheel's and the steering's encoder, with limits that fit the vehicle.
+/// Settings of the encoders, with limits that fit the vehicle; of driving wheel and steering if it reports no counters.
 #[must_use]
-pub fn channels(nodes: &EncoderNodes, parameters: &Parameters) -> [ChannelSettings; 2] {
-    let mut channels = limited(nodes, parameters);
-    for (channel, profile) in channels.iter_mut().zip(nodes.profiles) {
-        channel.encoder.profile = profile;
-        channel.encoder.is_managed = nodes.are_managed;
-        // Nobody knows how often another master lets them tell that they are there; that they report is watched.
-        if !channel.encoder.has_master() {
-            channel.encoder.heartbeat = 0;
+pub fn channels(nodes: &EncoderNodes, parameters: &Parameters) -> Vec<ChannelSettings, MOST_COUNTERS> {
+    let counters = parameters.vehicle.counters();
+    let mut channels = Vec::new();
+    if counters.is_empty() {
+        for (number, counted) in [Counted::Turn, Counted::Steering].into_iter().enumerate() {
+            add(&mut channels, channel(nodes, number, counted, None, UNKNOWN));
         }
+    }
+    for (number, counter) in counters.iter().enumerate() {
+        let Counter { counted, range, scale, .. } = *counter;
+        let (fastest, braking) = match counted {
+            Counted::Turn => (parameters.limits.fastest, BRAKING),
+            Counted::Steering => STEERING,
+        };
+        let limits = (fastest / scale.abs(), braking / scale.abs());
+        add(&mut channels, channel(nodes, number, counted, Some(range), limits));
     }
     channels
 }
 
-/// The same of encoders that this controller is the master of.
-fn limited(nodes: &EncoderNodes, parameters: &Parameters) -> [ChannelSettings; 2] {
-    let period = match nodes.reporting {
-        Reporting::Timer { period } | Reporting::Polled { period } => 1e-3 * f64::from(period),
-        Reporting::Synchronous => SYNC_PERIOD,
-    };
-    let channel = |node, range, (fastest, braking): (f64, f64), scale: f64| ChannelSettings {
-        encoder: EncoderSettings { reporting: nodes.reporting, range, ..EncoderSettings::new(node) },
-        limits: PlausibilityLimits::every(period, fastest / scale.abs(), braking / scale.abs()),
-    };
-    let drive = (parameters.limits.fastest, BRAKING);
-    if let Some(Differential { left, right, .. }) = differential(parameters) {
-        let of =
-            |node, wheel: &DrivenWheel| channel(node, Some(wheel.turn.range), drive, wheel.radius * wheel.turn.scale);
-        return [of(nodes.drive, left), of(nodes.steering, right)];
+/// Adds what there is; nobody adds more than there is room for.
+pub(super) fn add<T, const ROOM: usize>(to: &mut Vec<T, ROOM>, what: Option<T>) {
+    if let Some(what) = what {
+        let _ = to.push(what);
     }
-    let Vehicle::Tricycle(Tricycle { drive_scale, steering_scale, drive_range, steering_range, .. }) =
-        parameters.vehicle
-    else {
-        return [channel(nodes.drive, None, UNKNOWN, 1.0), channel(nodes.steering, None, UNKNOWN, 1.0)];
-    };
-    [
-        channel(nodes.drive, Some(drive_range), drive, drive_scale),
-        channel(nodes.steering, Some(steering_range), STEERING, steering_scale),
-    ]
 }
 
-/// The two driven wheels of the parameters, if it is such a vehicle: its encoders are the pair, left and right.
-const fn differential(parameters: &Parameters) -> Option<&Differential> {
-    match &parameters.vehicle {
-        Vehicle::Wheels(WheelVehicle::Differential(vehicle)) => Some(vehicle),
-        _ => None,
+/// The encoder of that number, whose fastest motion (ticks/s) and hardest braking (ticks/s^2) are given.
+fn channel(
+    nodes: &EncoderNodes,
+    number: usize,
+    counted: Counted,
+    range: Option<CounterRange>,
+    (fastest, braking): (f64, f64),
+) -> Option<ChannelSettings> {
+    let (node, profile) = (*nodes.encoders.get(number)?, *nodes.profiles.get(number)?);
+    let mut encoder = EncoderSettings {
+        reporting: nodes.reporting,
+        range,
+        profile,
+        is_managed: nodes.are_managed,
+        ..EncoderSettings::new(node)
+    };
+    // Nobody knows how often another master lets them tell that they are there; that they report is watched.
+    if !encoder.has_master() {
+        encoder.heartbeat = 0;
     }
+    Some(ChannelSettings { encoder, limits: PlausibilityLimits::every(nodes.period(), fastest, braking), counted })
 }
 
 /// What the bus tells the localiser.
@@ -125,6 +156,10 @@ pub enum BusEvent {
     Encoders(EncoderSample),
     /// Counters of several wheels.
     Wheels(WheelSample),
+    /// Speed and steering angle.
+    Speed(SpeedSample),
+    /// How far the vehicle has moved.
+    Increment(PoseIncrement),
     /// What is wrong with them.
     EncoderFaults(EncoderFaults),
     /// A rate of the gyro.
@@ -140,11 +175,28 @@ impl BusEvent {
         match *self {
             Self::Encoders(sample) => Event::Encoders(sample),
             Self::Wheels(sample) => Event::Wheels(sample),
+            Self::Speed(sample) => Event::Speed(sample),
+            Self::Increment(increment) => Event::Increment(increment),
             Self::EncoderFaults(faults) => Event::EncoderFaults(faults),
             Self::Gyro(sample) => Event::Gyro(sample),
             Self::SetPose(fix) => Event::SetPose(fix),
         }
     }
+}
+
+/// What the counters of a vehicle say, as its localiser takes it.
+#[must_use]
+pub fn counted(vehicle: &Vehicle, counts: &Counts) -> BusEvent {
+    let Counts { time, counts } = *counts;
+    let Vehicle::Wheels(_) = vehicle else {
+        let [drive, steering, ..] = counts;
+        return BusEvent::Encoders(EncoderSample { time, drive, steering });
+    };
+    let mut sample = WheelSample { time, wheels: [WheelReading::default(); MOST_WHEELS] };
+    for (counter, count) in vehicle.counters().iter().zip(counts) {
+        sample.set_count(counter, count);
+    }
+    BusEvent::Wheels(sample)
 }
 
 /// What comes of a look at the bus.
@@ -156,25 +208,32 @@ pub enum EncoderOutput {
     Event(BusEvent),
 }
 
-/// Sets the encoders up, watches them, and makes events of what they and other controllers say. What comes out depends on
-/// the calls alone, so a record of them gives the same events again.
+/// Who tells the motion.
+#[allow(clippy::large_enum_variant, reason = "there is no allocator, and there is one of them")]
+#[derive(Clone, Debug)]
+enum Source {
+    Counters(EncoderGroup),
+    Own(OwnReports),
+}
+
+/// Sets the encoders up, watches them, and makes events of what they, or the vehicle's own controller, and other controllers say.
+/// What comes out depends on the calls alone, so a record of them gives the same events again.
 #[derive(Clone, Debug)]
 pub struct Encoders {
-    pair: EncoderPair,
+    source: Source,
+    vehicle: Vehicle,
     orders: OrderReceiver,
-    has_two_wheels: bool,
 }
 
 impl Encoders {
     /// Encoders that have not been heard before `start`.
     #[must_use]
     pub fn new(nodes: &EncoderNodes, parameters: &Parameters, start: Time) -> Self {
-        let [drive, steering] = channels(nodes, parameters);
-        Self {
-            pair: EncoderPair::new(&drive, &steering, SYNC_PERIOD, start),
-            orders: OrderReceiver::new(nodes.controller),
-            has_two_wheels: differential(parameters).is_some(),
-        }
+        let source = match OwnReports::of(nodes, &parameters.vehicle, start) {
+            Some(reports) => Source::Own(reports),
+            None => Source::Counters(EncoderGroup::new(&channels(nodes, parameters), SYNC_PERIOD, start)),
+        };
+        Self { source, vehicle: parameters.vehicle, orders: OrderReceiver::new(nodes.controller) }
     }
 
     /// Takes a frame that came at `heard`. The localiser is told at most two things.
@@ -182,9 +241,11 @@ impl Encoders {
         if let Some(fix) = self.orders.handle(frame, heard) {
             tell(BusEvent::SetPose(fix));
         }
-        if let Some(sample) = self.pair.handle(frame, heard) {
-            tell(if self.has_two_wheels { two_wheels(&sample) } else { BusEvent::Encoders(sample) });
-        }
+        let event = match &mut self.source {
+            Source::Counters(group) => group.handle(frame, heard).map(|counts| counted(&self.vehicle, &counts)),
+            Source::Own(reports) => reports.hear(frame, heard),
+        };
+        event.into_iter().for_each(tell);
     }
 
     /// Both: looks at the bus at `now`, where a frame may have come.
@@ -197,24 +258,41 @@ impl Encoders {
 
     /// Does what is due at `now`. To be called at least every 5 ms.
     pub fn poll(&mut self, now: Time, mut take: impl FnMut(EncoderOutput)) {
-        if self.orders.is_standstill(now) {
-            self.pair.expect_standstill();
-        }
-        if let Some(faults) = self.pair.poll_faults(now) {
+        let is_standing = self.orders.is_standstill(now);
+        let faults = match &mut self.source {
+            Source::Counters(group) => {
+                if is_standing {
+                    group.expect_standstill();
+                }
+                group.poll_faults(now)
+            }
+            Source::Own(reports) => reports.poll_faults(now),
+        };
+        if let Some(faults) = faults {
             take(EncoderOutput::Event(BusEvent::EncoderFaults(faults)));
         }
-        while let Some(frame) = self.pair.poll(now) {
-            take(EncoderOutput::Send(frame));
+        if let Source::Counters(group) = &mut self.source {
+            while let Some(frame) = group.poll(now) {
+                take(EncoderOutput::Send(frame));
+            }
         }
     }
-}
 
-/// The pair of a vehicle with two driven wheels: left, and right at the same time.
-fn two_wheels(sample: &EncoderSample) -> BusEvent {
-    let wheel = |count: u32| WheelReading { count, steering: 0 };
-    let none = WheelReading::default();
-    BusEvent::Wheels(WheelSample {
-        time: sample.time,
-        wheels: [wheel(sample.drive), wheel(sample.steering), none, none],
-    })
+    /// How many of the nodes are encoders of the vehicle.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match &self.source {
+            Source::Counters(group) => group.encoders().count(),
+            Source::Own(_) => 0,
+        }
+    }
+
+    /// Identifiers of the frames of the vehicle's own controller, if it tells the motion.
+    #[must_use]
+    pub fn own_frames(&self) -> Vec<Id, 2> {
+        match &self.source {
+            Source::Counters(_) => Vec::new(),
+            Source::Own(reports) => reports.ids(),
+        }
+    }
 }

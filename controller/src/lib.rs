@@ -3,7 +3,7 @@
 //!
 //! | part | what it does | on a vehicle |
 //! |---|---|---|
-//! | [`Encoders`] | sets the encoders up, watches them, and makes events of what they and other controllers say | in the bus's task |
+//! | [`Encoders`] | sets the encoders up, watches them, and makes events of what they, or the vehicle's own controller, and other controllers say | in the bus's task |
 //! | [`Gyro`] | makes events of what a gyro says | in the bus's task |
 //! | [`Bus`] | all that the bus hears and says: [`Encoders`], [`Gyro`], the controller's own node, the pose for now | the bus's task |
 //! | [`Laser`] | the session with the laser, and whether it can be used | the network's task |
@@ -21,13 +21,14 @@ mod encoders;
 mod gyro;
 mod laser;
 mod localization;
+mod own_reports;
 mod progress;
 mod setting_objects;
 mod standstill;
 
 pub use bus::{Bus, BusOutput, MOTIONS, Troubles};
 pub use controller::{Controller, LaserOrder, TELEGRAM};
-pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels};
+pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels, counted};
 pub use gyro::Gyro;
 pub use laser::Laser;
 pub use localization::{Estimate, Localization};

@@ -49,8 +49,7 @@ fn find(object: Object) -> Result<&'static Leaf, AbortCode> {
 impl ObjectDictionary for SettingObjects<'_> {
     fn read(&self, object: Object) -> Result<ValueBytes, AbortCode> {
         let leaf = find(object)?;
-        // A vehicle of another kind has no such setting.
-        let value = leaf.get(self.settings).ok_or(AbortCode::NoData)?;
+        let value = leaf.value(self.settings);
         let bits = match value {
             Value::Number(number) => number.to_bits(),
             Value::Whole(whole) => whole,
@@ -105,13 +104,13 @@ impl ObjectDictionary for ChangeableSettings<'_> {
 
     fn writable(&self, object: Object) -> Result<usize, AbortCode> {
         let leaf = find(object)?;
-        let value = leaf.get(self.settings).ok_or(AbortCode::NoData)?;
+        let value = leaf.value(self.settings);
         data_type(leaf, value).length().ok_or(AbortCode::InternalIncompatible)
     }
 
     fn write(&mut self, object: Object, bytes: &[u8]) -> Result<(), AbortCode> {
         let leaf = find(object)?;
-        let value = value_like(leaf.get(self.settings).ok_or(AbortCode::NoData)?, bytes)?;
+        let value = value_like(leaf.value(self.settings), bytes)?;
         leaf.change(self.settings, value).map_err(|error| {
             let (least, most) = leaf.bounds;
             match (error, value) {
@@ -120,7 +119,7 @@ impl ObjectDictionary for ChangeableSettings<'_> {
                 (LeafError::Bounds, Value::Whole(whole)) if whole as f64 > most => AbortCode::ValueTooHigh,
                 (LeafError::Bounds, Value::Whole(whole)) if (whole as f64) < least => AbortCode::ValueTooLow,
                 (LeafError::Bounds | LeafError::Kind, _) => AbortCode::InvalidValue,
-                (LeafError::BusLoad, _) => AbortCode::ParameterIncompatible,
+                (LeafError::BusLoad | LeafError::Other(_), _) => AbortCode::ParameterIncompatible,
             }
         })
     }

@@ -196,7 +196,7 @@ fn every_setting_is_an_object_of_the_node() {
         bench.sent.clear();
         bench.hear(&Frame::of(standard_id(0x610), [0x40, low, high, 0, 0, 0, 0, 0]), 1);
         let first = bench.sent.last().unwrap().1.padded();
-        let expected = leaf.get(&bench.settings).unwrap();
+        let expected = leaf.value(&bench.settings);
         let bits = match expected {
             Value::Number(number) => number.to_bits(),
             Value::Whole(whole) => whole,
@@ -224,7 +224,7 @@ fn every_setting_is_an_object_of_the_node() {
 #[test]
 fn a_drive_of_cia_402_is_an_encoder_that_is_only_listened_to() {
     let mut settings = Settings::default();
-    settings.nodes.drive_profile = 402;
+    settings.nodes.encoders[0].profile = 402;
     assert_eq!(settings.check(), Ok(()));
     let mut bench = Bench::new(settings);
     bench.run(0..3000);
@@ -279,6 +279,6 @@ fn settings_are_changed_over_the_bus_if_that_is_permitted() {
     ] {
         assert_eq!(write(&mut bench, &mut changed, name, value, 1), reason, "{name} {value:?}");
     }
-    assert_eq!((changed.nodes.drive, changed.bit_rate, changed.parameters.maps.slam), (9, 500, true));
+    assert_eq!((changed.nodes.encoders[0].node, changed.bit_rate, changed.parameters.maps.slam), (9, 500, true));
     assert_eq!(changed.network.address, [192, 168, 1, 20]);
 }

@@ -186,6 +186,7 @@ fn a_known_bias_is_taken_from_the_motion_as_the_wheel_would_have_made_it() {
         let wheelbase = match vehicle {
             Vehicle::Tricycle(tricycle) => tricycle.wheelbase,
             Vehicle::Ackermann(car) => car.wheelbase,
+            Vehicle::TricycleSpeed(tricycle) => tricycle.wheelbase,
             Vehicle::Increments | Vehicle::Wheels(_) => 1.0,
         };
         for steering in [-0.4, 0.0, 0.3] {

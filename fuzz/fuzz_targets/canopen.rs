@@ -1,11 +1,11 @@
 #![no_main]
 
 use agv_core::measurement::Time;
-use agv_core::odometry::CounterRange;
+use agv_core::odometry::{Counted, CounterRange};
 use agv_wire::can::canopen::{Message, NodeId};
 use agv_wire::can::controller::{Content, OrderReceiver, PoseReceiver};
 use agv_wire::can::encoder::{EncoderSettings, Reporting};
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::encoder_group::{ChannelSettings, EncoderGroup};
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::sdo::{Request, Response};
 use agv_wire::can::plausibility::PlausibilityLimits;
@@ -49,26 +49,31 @@ fn decode(frame: &Frame) {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    let channel = |number, reporting| ChannelSettings {
+    let channel = |number, reporting, counted| ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(node(number)) },
         limits: PlausibilityLimits::every(0.01, 20_000.0, 25_000.0),
+        counted,
     };
     let mut now = Time::from_micros(1_000_000);
-    let drive = channel(1, Reporting::Synchronous);
-    let steering = channel(2, Reporting::Polled { period: 10 });
-    let mut pair = EncoderPair::new(&drive, &steering, 0.010, now);
+    let channels = [
+        channel(1, Reporting::Synchronous, Counted::Turn),
+        channel(2, Reporting::Polled { period: 10 }, Counted::Steering),
+        channel(3, Reporting::Timer { period: 10 }, Counted::Turn),
+        channel(4, Reporting::Timer { period: 10 }, Counted::Steering),
+    ];
+    let mut group = EncoderGroup::new(&channels, 0.010, now);
     let mut orders = OrderReceiver::new(node(16));
     let mut poses = PoseReceiver::new(node(16));
     for bytes in bytes.as_chunks::<FRAME>().0 {
         now = now.offset(f64::from(u16::from_le_bytes([bytes[0], bytes[1]])) * 1e-5);
         let Some(frame) = frame(bytes) else { continue };
         decode(&frame);
-        if let Some(sample) = pair.handle(&frame, now) {
+        if let Some(sample) = group.handle(&frame, now) {
             // No range is longer than the counter.
-            assert!(u64::from(sample.drive) < CounterRange::BITS_32.values());
+            assert!(sample.counts.iter().all(|count| u64::from(*count) < CounterRange::BITS_32.values()));
         }
-        let _ = (orders.handle(&frame, now), poses.handle(&frame), pair.poll_faults(now));
+        let _ = (orders.handle(&frame, now), poses.handle(&frame), group.poll_faults(now));
         // What is sent at one moment ends.
-        assert!((0..64).any(|_| pair.poll(now).is_none()));
+        assert!((0..64).any(|_| group.poll(now).is_none()));
     }
 });

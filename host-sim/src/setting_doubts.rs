@@ -14,11 +14,24 @@ pub fn doubt(name: &str, value: f64) -> Option<String> {
         "vehicle.wheelbase" if !(0.3..=6.0).contains(&value) => {
             Some(format!("{name} is {value} m; vehicles have 0.3 to 6 m. Is it in metres?"))
         }
-        "vehicle.drive_scale" if !(1e-7..=1e-2).contains(&value.abs()) => {
+        "vehicle.track" | "vehicle.arm" if !(0.1..=4.0).contains(&value) => {
+            Some(format!("{name} is {value} m; vehicles have 0.1 to 4 m. Is it in metres?"))
+        }
+        "vehicle.drive_scale"
+        | "vehicle.wheel_1_scale"
+        | "vehicle.wheel_2_scale"
+        | "vehicle.wheel_3_scale"
+        | "vehicle.wheel_4_scale"
+            if !(1e-7..=1e-2).contains(&value.abs()) =>
+        {
             Some(format!("{name} is {value} m for one tick; usual are 0.1 um to 10 mm. Is it in metres?"))
         }
         "laser.x" | "laser.y" if value.abs() > 6.0 => Some(format!("{name} is {value} m. Is it in metres?")),
-        "laser.theta" | "vehicle.steering_offset_forward" | "vehicle.steering_offset_backward" => angle(name, value),
+        "laser.theta"
+        | "vehicle.steering_offset_forward"
+        | "vehicle.steering_offset_backward"
+        | "vehicle.wheel_1_steering_offset"
+        | "vehicle.wheel_2_steering_offset" => angle(name, value),
         _ => None,
     }
 }
@@ -49,6 +62,9 @@ mod tests {
             ("vehicle.steering_offset_forward", 0.5),
             ("vehicle.drive_scale", 0.25),
             ("laser.x", 9.0),
+            ("vehicle.track", 612.0),
+            ("vehicle.wheel_3_scale", 0.1),
+            ("vehicle.wheel_2_steering_offset", 1.1),
         ] {
             assert!(doubt(name, value).is_some_and(|text| text.contains(name)), "{name} {value}");
         }

@@ -2,6 +2,7 @@
 
 mod eds;
 mod log;
+mod motion;
 mod output_file;
 mod published;
 mod report;

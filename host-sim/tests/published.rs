@@ -4,20 +4,19 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use agv_controller::{Bus, BusOutput, Localization, SentPose, Told, Troubles};
+use agv_controller::{Bus, BusOutput, EncoderNodes, Localization, SentPose, Told, Troubles};
 use agv_core::localizer::{Event, Localizer, PoseFix};
 use agv_core::measurement::Time;
 use agv_core::record::Record;
 use agv_core::state::LaserHealth;
-use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::emulate::gyro::EmulatedGyro;
+use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::log::{self, Writer};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::replay::{compare, compare_published, replay};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{START, simulate};
 use agv_settings::Settings;
-use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller_node::WithoutSettings;
 use agv_wire::can::frame::Frame;
 
@@ -57,7 +56,7 @@ impl Board {
     }
 
     /// What the bus does in a millisecond, whatever the localiser does.
-    fn step_bus(&mut self, now: Time, pair: &mut EmulatedPair, gyro: &mut Option<EmulatedGyro>) {
+    fn step_bus(&mut self, now: Time, motion: &mut EmulatedMotion, gyro: &mut Option<EmulatedGyro>) {
         if std::mem::take(&mut self.is_answered) {
             self.bus.update(&self.localization.estimate());
         }
@@ -69,14 +68,14 @@ impl Board {
             BusOutput::Published(pose) => published.push_back(pose),
             BusOutput::Save => panic!("nobody wants that"),
         };
-        frames.extend(pair.poll(now));
+        frames.extend(motion.poll(now));
         frames.extend(gyro.iter_mut().flat_map(|gyro| gyro.poll(now)));
         for frame in frames.drain(..) {
             bus.hear(&frame, now, &mut WithoutSettings, &mut take);
         }
         bus.poll(now, LaserHealth::Unknown, &mut take);
         for frame in answers {
-            frames.extend(pair.handle(&frame));
+            frames.extend(motion.handle(&frame));
         }
     }
 
@@ -106,9 +105,8 @@ impl Board {
 
 /// Drives, and gives the log of what was said.
 fn drive(recording: &Recording, path: &Path) {
-    let node = |number| NodeId::new(number).unwrap();
-    let nodes = Settings::of(recording.parameters).nodes;
-    let mut pair = EmulatedPair::new(recording, node(nodes.drive), node(nodes.steering)).unwrap().standing();
+    let nodes = EncoderNodes::of(&Settings::of(recording.parameters));
+    let mut motion = EmulatedMotion::new(recording, &nodes).unwrap().standing();
     let mut gyro = EmulatedGyro::of(recording, &Settings::of(recording.parameters).gyro_frame);
     let mut board = Board::new(recording, path);
     let begin = Time::from_micros(1_000 * BEGIN);
@@ -117,7 +115,7 @@ fn drive(recording: &Recording, path: &Path) {
     for millisecond in 1..END {
         let now = Time::from_micros(1_000 * millisecond);
         if now == begin {
-            pair.begin(now);
+            motion.begin(now);
             if let Some(gyro) = &mut gyro {
                 gyro.begin(now);
             }
@@ -129,7 +127,7 @@ fn drive(recording: &Recording, path: &Path) {
                 heading_deviation: 0.01,
             }));
         }
-        board.step_bus(now, &mut pair, &mut gyro);
+        board.step_bus(now, &mut motion, &mut gyro);
         if millisecond < busy_until {
             continue;
         }

@@ -3,6 +3,7 @@
 mod event_fuzz;
 mod faults;
 mod features;
+mod slip;
 mod tape;
 mod trust;
 mod whole_drive;

@@ -8,6 +8,7 @@ use agv_core::localizer::Reason;
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_lab::campaign::Shard;
+use agv_lab::equipment::Equipment;
 use agv_lab::trust::figures::figures;
 use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
@@ -257,13 +258,14 @@ fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
     let sound: Vec<_> = kinds.into_iter().filter(|kind| kind.name == NOTHING).collect();
     let counts: Vec<usize> = (1..=20).map(|seed| hall::draw(seed).scenario.build_world().reflectors.len()).collect();
     assert!(counts.iter().min() < counts.iter().max(), "{counts:?}");
-    let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, &|_| (), || ()).unwrap();
+    let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, Equipment::default(), &|_| (), || ()).unwrap();
     let found = figures(&rows, &kinds::read(&scenarios("trust.toml")).unwrap());
     assert_eq!((found.runs, found.panics, found.seeds), (2, 0, [1, 2]));
     assert!(found.first_claim_s[1] < 30.0 && found.nominal_mi == 0 && found.nominal_hmi == 0, "{found:?}");
     // The same run is the same row.
-    let parts =
-        [0, 1].map(|number| sweep::run(&sweep::sweep(&sound, 2, 1), Shard { number, of: 2 }, &|_| (), || ()).unwrap());
+    let parts = [0, 1].map(|number| {
+        sweep::run(&sweep::sweep(&sound, 2, 1), Shard { number, of: 2 }, Equipment::default(), &|_| (), || ()).unwrap()
+    });
     assert_eq!(parts.concat(), rows);
 }
 

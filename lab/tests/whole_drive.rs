@@ -42,14 +42,54 @@ fn drive(reports: MotionReport, has_gyro: bool, seed: u64) {
     assert_eq!(first, None, "{} remarks: nothing slips, and the gyro is sound", remarks.len());
 }
 
+/// With and without a gyro.
+fn drives(reports: MotionReport, seed: u64) {
+    drive(reports, false, seed);
+    drive(reports, true, seed);
+}
+
 #[test]
 fn a_tricycle_drives_with_and_without_a_gyro() {
-    drive(MotionReport::Encoders, false, 11);
-    drive(MotionReport::Encoders, true, 11);
+    drives(MotionReport::Encoders, 11);
+}
+
+#[test]
+fn a_tricycle_whose_own_controller_tells_its_speed_drives_with_and_without_a_gyro() {
+    drives(MotionReport::TricycleSpeed, 17);
+}
+
+#[test]
+fn a_car_whose_own_controller_tells_its_speed_drives_with_and_without_a_gyro() {
+    drives(MotionReport::Speed, 18);
+}
+
+#[test]
+fn a_vehicle_that_tells_increments_drives_with_and_without_a_gyro() {
+    drives(MotionReport::Increments, 19);
 }
 
 #[test]
 fn a_differential_vehicle_drives_with_and_without_a_gyro() {
-    drive(MotionReport::Differential, false, 12);
-    drive(MotionReport::Differential, true, 12);
+    drives(MotionReport::Differential, 12);
+}
+
+#[test]
+fn a_bi_steerable_vehicle_drives_with_and_without_a_gyro() {
+    drives(MotionReport::BiSteerable, 13);
+}
+
+#[test]
+fn a_car_with_counters_drives_with_and_without_a_gyro() {
+    drives(MotionReport::Ackermann, 14);
+}
+
+#[test]
+fn omnidirectional_vehicles_drive_with_and_without_a_gyro() {
+    drives(MotionReport::ThreeOmnidirectional, 15);
+    drives(MotionReport::Omnidirectional, 15);
+}
+
+#[test]
+fn a_mecanum_vehicle_drives_with_and_without_a_gyro() {
+    drives(MotionReport::Mecanum, 16);
 }

@@ -1,11 +1,9 @@
 //! One setting: its name, its unit, its bounds.
 
-use agv_core::localizer::Parameters;
-use agv_core::odometry::{Tricycle, Vehicle};
 use serde::{Deserialize, Serialize};
 
-use crate::Settings;
 use crate::contradiction::Cause;
+use crate::{Settings, VehicleKind};
 
 /// What a leaf holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,8 +28,12 @@ pub struct Leaf {
     pub unit: &'static str,
     /// Least and greatest value; meaningless for switches and addresses.
     pub bounds: (f64, f64),
-    /// What the settings say. None if they have no such setting, because the vehicle is of another kind.
-    pub(crate) get: fn(&Settings) -> Option<Value>,
+    /// The kinds of vehicles for which it matters.
+    pub kinds: &'static [VehicleKind],
+    /// What its whole numbers are called, from 0 on; empty if they are numbers of something.
+    pub choices: &'static [&'static str],
+    /// What the settings say.
+    pub(crate) get: fn(&Settings) -> Value,
     /// Writes a value of the right kind within its bounds; false if it is of another kind.
     pub(crate) set: fn(&mut Settings, Value) -> bool,
 }
@@ -45,13 +47,27 @@ pub enum LeafError {
     Bounds,
     /// The CAN bus would be loaded by more than 60 % of its bit rate: [`crate::bus_load`].
     BusLoad,
+    /// With the value the leaf of that key is out of its bounds, or does not go with the others.
+    Other(u16),
 }
 
 impl Leaf {
-    /// What the settings say; None if the vehicle has no such setting.
+    /// What the settings say, whether it matters or not.
+    #[must_use]
+    pub fn value(&self, settings: &Settings) -> Value {
+        (self.get)(settings)
+    }
+
+    /// Whether it matters for the kind of the vehicle.
+    #[must_use]
+    pub fn matters(&self, settings: &Settings) -> bool {
+        self.kinds.contains(&settings.vehicle.kind)
+    }
+
+    /// What the settings say; None if it does not matter for the kind of the vehicle.
     #[must_use]
     pub fn get(&self, settings: &Settings) -> Option<Value> {
-        (self.get)(settings)
+        self.matters(settings).then(|| self.value(settings))
     }
 
     /// Changes the settings.
@@ -79,33 +95,17 @@ impl Leaf {
     /// # Errors
     /// As [`Leaf::set`], and if the value does not go with the others. The settings are as before.
     pub fn change(&self, settings: &mut Settings, value: Value) -> Result<(), LeafError> {
-        let before = self.get(settings);
+        let before = self.value(settings);
         self.set(settings, value)?;
         if let Err(contradiction) = settings.check() {
-            if let Some(before) = before {
-                (self.set)(settings, before);
-            }
-            return Err(match contradiction.cause {
-                Cause::Bounds => LeafError::Bounds,
-                Cause::BusLoad => LeafError::BusLoad,
+            (self.set)(settings, before);
+            let other = Self::named(contradiction.leaf).filter(|leaf| leaf.key != self.key);
+            return Err(match (contradiction.cause, other) {
+                (Cause::BusLoad, _) => LeafError::BusLoad,
+                (Cause::Bounds, Some(other)) => LeafError::Other(other.key),
+                (Cause::Bounds, None) => LeafError::Bounds,
             });
         }
         Ok(())
-    }
-}
-
-/// The tricycle of the parameters.
-pub(crate) const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
-    match &parameters.vehicle {
-        Vehicle::Tricycle(tricycle) => Some(tricycle),
-        _ => None,
-    }
-}
-
-/// The tricycle of the parameters.
-pub(crate) const fn tricycle_mut(parameters: &mut Parameters) -> Option<&mut Tricycle> {
-    match &mut parameters.vehicle {
-        Vehicle::Tricycle(tricycle) => Some(tricycle),
-        _ => None,
     }
 }

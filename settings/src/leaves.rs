@@ -3,7 +3,9 @@
 use agv_core::localizer;
 use agv_core::odometry::CounterRange;
 
-use crate::leaf::{Leaf, Value, tricycle, tricycle_mut};
+use crate::VehicleKind::{self, Ackermann, BiSteerable, CarSpeed, Differential, Increments, Mecanum, Omni3, Omni4};
+use crate::VehicleKind::{Tricycle, TricycleSpeed};
+use crate::leaf::{Leaf, Value};
 
 /// The bounds that the core has for a number; a name that it does not know ends the compilation.
 const fn bounds(name: &str) -> (f64, f64) {
@@ -21,7 +23,9 @@ macro_rules! number {
             name: $name,
             unit: $unit,
             bounds: bounds($name),
-            get: |settings| Some(Value::Number(settings.$($field).+.into())),
+            kinds: &VehicleKind::ALL,
+            choices: &[],
+            get: |settings| Value::Number(settings.$($field).+.into()),
             set: |settings, value| {
                 let Value::Number(number) = value else { return false };
                 settings.$($field).+ = number as _;
@@ -31,21 +35,25 @@ macro_rules! number {
     };
 }
 
-/// A measure of a tricycle.
-macro_rules! tricycle_number {
-    ($key:literal, $name:literal, $unit:literal, $field:ident) => {
+/// A measure of the vehicle, with bounds of its own, or those of the core.
+macro_rules! vehicle {
+    ($key:literal, $name:literal, $unit:literal, $kinds:expr, $field:ident) => {
+        Leaf { bounds: bounds($name), ..vehicle!($key, $name, $unit, $kinds, (0.0, 0.0), [$field]) }
+    };
+    ($key:literal, $name:literal, $unit:literal, $kinds:expr, $bounds:expr, [$($place:tt)+]) => {
         Leaf {
             key: $key,
             name: $name,
             unit: $unit,
-            bounds: bounds($name),
-            get: |settings| Some(Value::Number(tricycle(&settings.parameters)?.$field)),
-            set: |settings, value| match (tricycle_mut(&mut settings.parameters), value) {
-                (Some(vehicle), Value::Number(number)) => {
-                    vehicle.$field = number;
-                    true
-                }
-                _ => false,
+            bounds: $bounds,
+            kinds: $kinds,
+            choices: &[],
+            get: |settings| Value::Number(settings.vehicle.$($place)+),
+            set: |settings, value| {
+                let Value::Number(number) = value else { return false };
+                settings.vehicle.$($place)+ = number;
+                settings.take_vehicle();
+                true
             },
         }
     };
@@ -59,7 +67,9 @@ macro_rules! mount {
             name: $name,
             unit: $unit,
             bounds: bounds($name),
-            get: |settings| Some(Value::Number(settings.parameters.lasers.first().$field)),
+            kinds: &VehicleKind::ALL,
+            choices: &[],
+            get: |settings| Value::Number(settings.parameters.lasers.first().$field),
             set: |settings, value| {
                 let Value::Number(number) = value else { return false };
                 settings.parameters.lasers.first_mut().$field = number;
@@ -69,20 +79,42 @@ macro_rules! mount {
     };
 }
 
-/// How many values a counter of a tricycle takes.
+/// How many values a counter takes.
 macro_rules! counter {
-    ($key:literal, $name:literal, $field:ident) => {
+    ($key:literal, $name:literal, $kinds:expr, [$($place:tt)+]) => {
         Leaf {
             key: $key,
             name: $name,
             unit: "",
             bounds: (2.0, 4_294_967_296.0),
-            get: |settings| Some(Value::Whole(tricycle(&settings.parameters)?.$field.values())),
-            set: |settings, value| match (tricycle_mut(&mut settings.parameters), value) {
-                (Some(vehicle), Value::Whole(values)) => {
-                    CounterRange::new(values).map(|range| vehicle.$field = range).is_some()
-                }
-                _ => false,
+            kinds: $kinds,
+            choices: &[],
+            get: |settings| Value::Whole(settings.vehicle.$($place)+.values()),
+            set: |settings, value| {
+                let Value::Whole(values) = value else { return false };
+                let Some(range) = CounterRange::new(values) else { return false };
+                settings.vehicle.$($place)+ = range;
+                settings.take_vehicle();
+                true
+            },
+        }
+    };
+}
+
+/// The node of a counter, or its profile.
+macro_rules! encoder {
+    ($key:literal, $name:literal, $kinds:expr, $bounds:expr, [$($place:tt)+]) => {
+        Leaf {
+            key: $key,
+            name: $name,
+            unit: "",
+            bounds: $bounds,
+            kinds: $kinds,
+            choices: &[],
+            get: |settings| Value::Whole(settings.nodes.encoders$($place)+.into()),
+            set: |settings, value| {
+                let Value::Whole(whole) = value else { return false };
+                whole.try_into().map(|whole| settings.nodes.encoders$($place)+ = whole).is_ok()
             },
         }
     };
@@ -102,7 +134,9 @@ macro_rules! whole {
             name: $name,
             unit: $unit,
             bounds: ($least, $most),
-            get: |settings| Some(Value::Whole(settings.$($field).+.into())),
+            kinds: &VehicleKind::ALL,
+            choices: &[],
+            get: |settings| Value::Whole(settings.$($field).+.into()),
             set: |settings, value| {
                 let Value::Whole(whole) = value else { return false };
                 whole.try_into().map(|whole| settings.$($field).+ = whole).is_ok()
@@ -119,7 +153,9 @@ macro_rules! measure {
             name: $name,
             unit: $unit,
             bounds: ($least, $most),
-            get: |settings| Some(Value::Number(settings.$($field).+)),
+            kinds: &VehicleKind::ALL,
+            choices: &[],
+            get: |settings| Value::Number(settings.$($field).+),
             set: |settings, value| {
                 let Value::Number(number) = value else { return false };
                 settings.$($field).+ = number;
@@ -136,7 +172,9 @@ macro_rules! switch {
             name: $name,
             unit: "",
             bounds: (0.0, 1.0),
-            get: |settings| Some(Value::Switch(settings.$($field).+)),
+            kinds: &VehicleKind::ALL,
+            choices: &[],
+            get: |settings| Value::Switch(settings.$($field).+),
             set: |settings, value| {
                 let Value::Switch(is_on) = value else { return false };
                 settings.$($field).+ = is_on;
@@ -153,7 +191,9 @@ macro_rules! address {
             name: $name,
             unit: "",
             bounds: (0.0, 0.0),
-            get: |settings| Some(Value::Address(settings.$($field).+)),
+            kinds: &VehicleKind::ALL,
+            choices: &[],
+            get: |settings| Value::Address(settings.$($field).+),
             set: |settings, value| {
                 let Value::Address(address) = value else { return false };
                 settings.$($field).+ = address;
@@ -163,15 +203,78 @@ macro_rules! address {
     };
 }
 
+/// The kinds with at least two, three and four driven wheels of equal standing.
+const TWO_WHEELS: &[VehicleKind] = &[Differential, BiSteerable, Ackermann, Omni3, Omni4, Mecanum];
+const THREE_WHEELS: &[VehicleKind] = &[Omni3, Omni4, Mecanum];
+const FOUR_WHEELS: &[VehicleKind] = &[Omni4, Mecanum];
+/// The kinds with at least two, three and four counters.
+const TWO_COUNTERS: &[VehicleKind] = &[Tricycle, Differential, BiSteerable, Ackermann, Omni3, Omni4, Mecanum];
+const THREE_COUNTERS: &[VehicleKind] = &[BiSteerable, Ackermann, Omni3, Omni4, Mecanum];
+const FOUR_COUNTERS: &[VehicleKind] = &[BiSteerable, Omni4, Mecanum];
+/// The kinds whose own controllers tell how they move.
+const SPEEDS: &[VehicleKind] = &[TricycleSpeed, CarSpeed];
+const FRAMES: &[VehicleKind] = &[TricycleSpeed, CarSpeed, Increments];
+
+const LENGTH: (f64, f64) = (0.05, 50.0);
+const PLACE: (f64, f64) = (-50.0, 50.0);
+const ANGLE: (f64, f64) = (-core::f64::consts::TAU, core::f64::consts::TAU);
+const SCALE: (f64, f64) = (-1.0, 1.0);
+const NODE: (f64, f64) = (1.0, 127.0);
+const PROFILE: (f64, f64) = (402.0, 406.0);
+
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 103] = [
-    tricycle_number!(100, "vehicle.wheelbase", "m", wheelbase),
-    tricycle_number!(101, "vehicle.drive_scale", "m/tick", drive_scale),
-    tricycle_number!(102, "vehicle.steering_scale", "rad/tick", steering_scale),
-    tricycle_number!(103, "vehicle.steering_offset_forward", "rad", steering_offset_forward),
-    tricycle_number!(104, "vehicle.steering_offset_backward", "rad", steering_offset_backward),
-    counter!(105, "vehicle.drive_counter_values", drive_range),
-    counter!(106, "vehicle.steering_counter_values", steering_range),
+pub static LEAVES: [Leaf; 148] = [
+    Leaf {
+        key: 107,
+        name: "vehicle.kind",
+        unit: "",
+        bounds: (0.0, (VehicleKind::ALL.len() - 1) as f64),
+        kinds: &VehicleKind::ALL,
+        choices: &VehicleKind::NAMES,
+        get: |settings| Value::Whole(settings.vehicle.kind as u64),
+        set: |settings, value| {
+            let Value::Whole(number) = value else { return false };
+            let Some(kind) = u8::try_from(number).ok().and_then(VehicleKind::of_number) else { return false };
+            settings.vehicle.kind = kind;
+            settings.take_vehicle();
+            true
+        },
+    },
+    vehicle!(100, "vehicle.wheelbase", "m", &[Tricycle, TricycleSpeed, CarSpeed, Ackermann, Mecanum], wheelbase),
+    vehicle!(108, "vehicle.track", "m", &[Differential, Ackermann, Mecanum], LENGTH, [track]),
+    vehicle!(109, "vehicle.arm", "m", &[Omni3, Omni4], LENGTH, [arm]),
+    vehicle!(110, "vehicle.first_wheel", "rad", &[Omni3, Omni4], ANGLE, [first_wheel]),
+    vehicle!(111, "vehicle.speed_wheel", "m", &[CarSpeed], PLACE, [speed_wheel]),
+    vehicle!(101, "vehicle.drive_scale", "m/tick", &[Tricycle], drive_scale),
+    vehicle!(102, "vehicle.steering_scale", "rad/tick", &[Tricycle, Ackermann], steering_scale),
+    vehicle!(
+        103,
+        "vehicle.steering_offset_forward",
+        "rad",
+        &[Tricycle, TricycleSpeed, Ackermann],
+        steering_offset_forward
+    ),
+    vehicle!(104, "vehicle.steering_offset_backward", "rad", &[Tricycle], steering_offset_backward),
+    counter!(105, "vehicle.drive_counter_values", &[Tricycle], [drive_range]),
+    counter!(106, "vehicle.steering_counter_values", &[Tricycle, Ackermann], [steering_range]),
+    vehicle!(400, "vehicle.wheel_1_scale", "m/tick", TWO_WHEELS, SCALE, [wheels[0].scale]),
+    counter!(401, "vehicle.wheel_1_counter_values", TWO_WHEELS, [wheels[0].range]),
+    vehicle!(402, "vehicle.wheel_1_x", "m", &[BiSteerable], PLACE, [wheels[0].x]),
+    vehicle!(403, "vehicle.wheel_1_y", "m", &[BiSteerable], PLACE, [wheels[0].y]),
+    vehicle!(404, "vehicle.wheel_1_steering_scale", "rad/tick", &[BiSteerable], SCALE, [wheels[0].steering_scale]),
+    counter!(405, "vehicle.wheel_1_steering_counter_values", &[BiSteerable], [wheels[0].steering_range]),
+    vehicle!(406, "vehicle.wheel_1_steering_offset", "rad", &[BiSteerable], ANGLE, [wheels[0].steering_offset]),
+    vehicle!(420, "vehicle.wheel_2_scale", "m/tick", TWO_WHEELS, SCALE, [wheels[1].scale]),
+    counter!(421, "vehicle.wheel_2_counter_values", TWO_WHEELS, [wheels[1].range]),
+    vehicle!(422, "vehicle.wheel_2_x", "m", &[BiSteerable], PLACE, [wheels[1].x]),
+    vehicle!(423, "vehicle.wheel_2_y", "m", &[BiSteerable], PLACE, [wheels[1].y]),
+    vehicle!(424, "vehicle.wheel_2_steering_scale", "rad/tick", &[BiSteerable], SCALE, [wheels[1].steering_scale]),
+    counter!(425, "vehicle.wheel_2_steering_counter_values", &[BiSteerable], [wheels[1].steering_range]),
+    vehicle!(426, "vehicle.wheel_2_steering_offset", "rad", &[BiSteerable], ANGLE, [wheels[1].steering_offset]),
+    vehicle!(440, "vehicle.wheel_3_scale", "m/tick", THREE_WHEELS, SCALE, [wheels[2].scale]),
+    counter!(441, "vehicle.wheel_3_counter_values", THREE_WHEELS, [wheels[2].range]),
+    vehicle!(460, "vehicle.wheel_4_scale", "m/tick", FOUR_WHEELS, SCALE, [wheels[3].scale]),
+    counter!(461, "vehicle.wheel_4_counter_values", FOUR_WHEELS, [wheels[3].range]),
     mount!(120, "laser.x", "m", x),
     mount!(121, "laser.y", "m", y),
     mount!(122, "laser.theta", "rad", theta),
@@ -243,8 +346,10 @@ pub static LEAVES: [Leaf; 103] = [
     number!(294, "assumed.steering", "rad", parameters.assumed.steering),
     number!(295, "assumed.turn", "", parameters.assumed.turn),
     whole!(300, "can.controller_node", "", 1.0, 95.0, nodes.controller),
-    whole!(301, "can.drive_node", "", 1.0, 127.0, nodes.drive),
-    whole!(302, "can.steering_node", "", 1.0, 127.0, nodes.steering),
+    encoder!(301, "can.drive_node", TWO_COUNTERS, NODE, [[0].node]),
+    encoder!(302, "can.steering_node", TWO_COUNTERS, NODE, [[1].node]),
+    encoder!(340, "can.third_node", THREE_COUNTERS, NODE, [[2].node]),
+    encoder!(341, "can.fourth_node", FOUR_COUNTERS, NODE, [[3].node]),
     whole!(303, "can.encoder_period", "ms", 1.0, 50.0, encoder_period),
     whole!(304, "can.vendor", "", 0.0, 4_294_967_295.0, nodes.vendor),
     switch!(305, "can.nmt_master", nodes.is_master),
@@ -252,8 +357,10 @@ pub static LEAVES: [Leaf; 103] = [
     switch!(307, "can.accept_pose", nodes.accepts_pose),
     whole!(308, "can.bit_rate", "kbit/s", 125.0, 1000.0, bit_rate),
     whole!(309, "can.publishing_period", "ms", 5.0, 1000.0, publishing_period),
-    whole!(310, "can.drive_profile", "", 402.0, 406.0, nodes.drive_profile),
-    whole!(311, "can.steering_profile", "", 402.0, 406.0, nodes.steering_profile),
+    encoder!(310, "can.drive_profile", TWO_COUNTERS, PROFILE, [[0].profile]),
+    encoder!(311, "can.steering_profile", TWO_COUNTERS, PROFILE, [[1].profile]),
+    encoder!(342, "can.third_profile", THREE_COUNTERS, PROFILE, [[2].profile]),
+    encoder!(343, "can.fourth_profile", FOUR_COUNTERS, PROFILE, [[3].profile]),
     switch!(312, "can.accept_settings", nodes.accepts_settings),
     whole!(313, "can.gyro_identifier", "", 0.0, 536_870_911.0, gyro_frame.identifier),
     switch!(314, "can.gyro_extended", gyro_frame.is_extended),
@@ -261,6 +368,39 @@ pub static LEAVES: [Leaf; 103] = [
     whole!(316, "can.gyro_length", "", 2.0, 4.0, gyro_frame.length),
     whole!(317, "can.gyro_axis", "", 1.0, 3.0, gyro_frame.axis),
     measure!(318, "can.gyro_unit", "rad/s", -1.0, 1.0, gyro_frame.unit),
+    Leaf {
+        kinds: SPEEDS,
+        ..whole!(350, "can.speed_identifier", "", 0.0, 536_870_911.0, motion_frames.speed.identifier)
+    },
+    Leaf { kinds: SPEEDS, ..whole!(351, "can.speed_first_byte", "", 0.0, 7.0, motion_frames.speed.first_byte) },
+    Leaf { kinds: SPEEDS, ..whole!(352, "can.speed_length", "", 1.0, 8.0, motion_frames.speed.length) },
+    Leaf { kinds: SPEEDS, ..measure!(353, "can.speed_unit", "m/s", -1.0, 1.0, motion_frames.speed.unit) },
+    Leaf { kinds: SPEEDS, ..measure!(354, "can.speed_offset", "m/s", -1000.0, 1000.0, motion_frames.speed.offset) },
+    Leaf {
+        kinds: SPEEDS,
+        ..whole!(355, "can.angle_identifier", "", 0.0, 536_870_911.0, motion_frames.angle.identifier)
+    },
+    Leaf { kinds: SPEEDS, ..whole!(356, "can.angle_first_byte", "", 0.0, 7.0, motion_frames.angle.first_byte) },
+    Leaf { kinds: SPEEDS, ..whole!(357, "can.angle_length", "", 1.0, 8.0, motion_frames.angle.length) },
+    Leaf { kinds: SPEEDS, ..measure!(358, "can.angle_unit", "rad", -1.0, 1.0, motion_frames.angle.unit) },
+    Leaf { kinds: SPEEDS, ..measure!(359, "can.angle_offset", "rad", -1000.0, 1000.0, motion_frames.angle.offset) },
+    Leaf {
+        kinds: &[Increments],
+        ..whole!(360, "can.increment_identifier", "", 0.0, 536_870_911.0, motion_frames.increment.identifier)
+    },
+    Leaf {
+        kinds: &[Increments],
+        ..whole!(361, "can.increment_first_byte", "", 0.0, 7.0, motion_frames.increment.first_byte)
+    },
+    Leaf { kinds: &[Increments], ..whole!(362, "can.increment_length", "", 1.0, 2.0, motion_frames.increment.length) },
+    Leaf { kinds: &[Increments], ..measure!(363, "can.increment_unit", "m", -1.0, 1.0, motion_frames.increment.unit) },
+    Leaf {
+        kinds: &[Increments],
+        ..measure!(364, "can.increment_turn_unit", "rad", -1.0, 1.0, motion_frames.increment_turn)
+    },
+    Leaf { kinds: FRAMES, ..switch!(365, "can.motion_extended", motion_frames.are_extended) },
+    Leaf { kinds: FRAMES, ..switch!(366, "can.motion_big_endian", motion_frames.are_big_endian) },
+    Leaf { kinds: FRAMES, ..switch!(367, "can.motion_signed", motion_frames.are_signed) },
     address!(320, "network.address", network.address),
     whole!(321, "network.prefix", "", 0.0, 32.0, network.prefix),
     address!(322, "network.gateway", network.gateway),

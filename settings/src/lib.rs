@@ -12,8 +12,10 @@ mod leaves;
 pub mod service;
 mod settings;
 pub mod store;
+mod vehicle;
 
 pub use bus_load::bus_load;
 pub use contradiction::{Cause, Contradiction};
 pub use leaves::LEAVES;
-pub use settings::{Network, Nodes, Settings};
+pub use settings::{EncoderNode, Network, Nodes, Settings};
+pub use vehicle::{VehicleKind, VehicleSettings, WheelSettings};

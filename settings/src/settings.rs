@@ -2,17 +2,22 @@
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
-use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_core::odometry::MOST_COUNTERS;
 use agv_wire::can::gyro::GyroFrame;
+use agv_wire::can::motion_frames::MotionFrames;
+
+use crate::vehicle::VehicleSettings;
 
 /// Everything that is set on commissioning, but for the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// What the localiser believes of its vehicle and its sensors.
+    /// What the localiser believes of its vehicle and its sensors. Its vehicle is that of [`Self::vehicle`].
     pub parameters: Parameters,
+    /// The vehicle's kind and measures.
+    pub vehicle: VehicleSettings,
     /// Who is who on the CAN bus.
     pub nodes: Nodes,
-    /// Time between positions of the encoders, ms.
+    /// Time between positions of the encoders, or between reports of the vehicle's own controller, ms.
     pub encoder_period: u16,
     /// Time between poses on the CAN bus, ms.
     pub publishing_period: u16,
@@ -20,6 +25,8 @@ pub struct Settings {
     pub bit_rate: u16,
     /// Where the rates of the gyro are on the CAN bus, if there is a gyro.
     pub gyro_frame: GyroFrame,
+    /// Where the vehicle's own controller says how it moves, if it does.
+    pub motion_frames: MotionFrames,
     /// Who is who on the network.
     pub network: Network,
     /// Whether a vehicle that does not know where it is searches its pose among the reflectors of its map.
@@ -31,14 +38,8 @@ pub struct Settings {
 pub struct Nodes {
     /// This controller.
     pub controller: u8,
-    /// The driving wheel's encoder.
-    pub drive: u8,
-    /// The steering's encoder.
-    pub steering: u8,
-    /// Profile of the driving wheel's encoder: 406, or 402 for the drive itself.
-    pub drive_profile: u16,
-    /// The same of the steering's encoder.
-    pub steering_profile: u16,
+    /// The encoders, in the order of [`agv_core::odometry::Vehicle::counters`]; as many as the vehicle has count.
+    pub encoders: [EncoderNode; MOST_COUNTERS],
     /// Who has made the vehicle's controller, as CAN in Automation numbers makers; 0 for nobody.
     pub vendor: u32,
     /// Whether this controller is the NMT master; else it starts no nodes, and only listens to the encoders.
@@ -49,6 +50,15 @@ pub struct Nodes {
     pub accepts_settings: bool,
     /// Whether a pose that comes over the bus is believed while the vehicle stands.
     pub accepts_pose: bool,
+}
+
+/// Who tells a counter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderNode {
+    /// Its node.
+    pub node: u8,
+    /// Its profile: 406 for an encoder, 402 for a drive.
+    pub profile: u16,
 }
 
 /// Addresses on the network, IPv4.
@@ -74,31 +84,27 @@ impl Default for Settings {
     /// The vehicle of the standard simulated world, and the NAV350's factory address. A vehicle that was not set up has
     /// no map either, so it never claims to know where it is.
     fn default() -> Self {
-        let vehicle = Tricycle {
-            wheelbase: 1.5,
-            drive_scale: 1e-4,
-            drive_range: CounterRange::BITS_32,
-            steering_scale: core::f64::consts::TAU / 65_536.0,
-            steering_range: CounterRange::BITS_16,
-            steering_offset_forward: 0.0,
-            steering_offset_backward: 0.0,
-        };
-        Self::of(Parameters::new(Vehicle::Tricycle(vehicle), Pose::new(0.9, 0.0, 0.0)))
+        Self::of(Parameters::new(VehicleSettings::default().vehicle(), Pose::new(0.9, 0.0, 0.0)))
     }
 }
 
 impl Settings {
+    /// Lets the localiser believe in the vehicle of [`Self::vehicle`].
+    // One copy: each of its measures has a leaf that calls it.
+    #[inline(never)]
+    pub(crate) fn take_vehicle(&mut self) {
+        self.parameters.vehicle = self.vehicle.vehicle();
+    }
+
     /// The default settings, but for the localiser's parameters.
     #[must_use]
     pub fn of(parameters: Parameters) -> Self {
         Self {
             parameters,
+            vehicle: VehicleSettings::of(&parameters.vehicle),
             nodes: Nodes {
                 controller: 16,
-                drive: 1,
-                steering: 2,
-                drive_profile: 406,
-                steering_profile: 406,
+                encoders: [1, 2, 3, 4].map(|node| EncoderNode { node, profile: 406 }),
                 vendor: 0,
                 is_master: true,
                 starts_itself: true,
@@ -109,6 +115,7 @@ impl Settings {
             publishing_period: 10,
             bit_rate: 500,
             gyro_frame: GyroFrame::USUAL,
+            motion_frames: MotionFrames::USUAL,
             network: Network {
                 address: [192, 168, 1, 20],
                 prefix: 24,

@@ -5,13 +5,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use agv_settings::leaf::Value;
-use agv_settings::{LEAVES, Settings};
+use agv_settings::leaf::{Leaf, Value};
+use agv_settings::{LEAVES, Settings, VehicleKind};
 
 const HEAD: &str = "# All settings
 
 This chapter is made from the code. A setting is read and changed by its name with `agv ctl`, and kept in flash under its key. Values
-outside the bounds are refused. Names begin with the room of the code that they are for.
+outside the bounds are refused. Names begin with the room of the code that they are for. `vehicle.kind` chooses the vehicle from a list;
+a setting with kinds of vehicles behind it counts for those alone, and `agv ctl HOST list` shows what counts.
 
 ";
 
@@ -31,19 +32,26 @@ fn table() -> String {
             room = of;
             let _ = write!(
                 text,
-                "## {room}\n\n| name | unit | default | least | greatest | key |\n|---|---|---|---|---|---|\n"
+                "## {room}\n\n| name | unit | default | least | greatest | key | of the kinds |\n|---|---|---|---|---|---|---|\n"
             );
         }
-        let value = match leaf.get(&settings).unwrap() {
+        let value = match leaf.value(&settings) {
             Value::Number(value) => number(value),
+            Value::Whole(place) if !leaf.choices.is_empty() => leaf.choices[place as usize].to_owned(),
             Value::Whole(value) => value.to_string(),
             Value::Switch(is_on) => if is_on { "on" } else { "off" }.to_owned(),
             Value::Address([a, b, c, d]) => format!("{a}.{b}.{c}.{d}"),
         };
-        let has_bounds = matches!(leaf.get(&settings), Some(Value::Number(_) | Value::Whole(_)));
+        let has_bounds = leaf.choices.is_empty() && matches!(leaf.value(&settings), Value::Number(_) | Value::Whole(_));
         let [least, most] =
             [leaf.bounds.0, leaf.bounds.1].map(|bound| if has_bounds { number(bound) } else { String::new() });
-        let _ = writeln!(text, "| `{}` | {} | {value} | {least} | {most} | {} |", leaf.name, leaf.unit, leaf.key);
+        let kinds = if leaf.kinds.len() == VehicleKind::ALL.len() {
+            leaf.choices.join(", ")
+        } else {
+            leaf.kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ")
+        };
+        let Leaf { name, unit, key, .. } = leaf;
+        let _ = writeln!(text, "| `{name}` | {unit} | {value} | {least} | {most} | {key} | {kinds} |");
         let next = LEAVES.iter().skip_while(|other| other.key != leaf.key).nth(1);
         if next.is_some_and(|next| !next.name.starts_with(&format!("{room}."))) {
             text.push('\n');

@@ -9,12 +9,13 @@ use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use agv_controller::EncoderNodes;
 use agv_core::localizer::{Event, Localizer, PoseFix};
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
-use agv_core::odometry::Vehicle;
+use agv_core::odometry::{Counted, Vehicle};
 use agv_core::state::Mode;
-use agv_host_sim::emulate::encoder_pair::EmulatedPair;
 use agv_host_sim::emulate::foreign_traffic::ForeignTraffic;
+use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::emulate::vehicle::{self, VehicleOptions, Watch};
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
@@ -25,7 +26,7 @@ use agv_wire::can::canopen::{Message, NodeId, transmit_pdo_id};
 use agv_wire::can::controller::{Health, OrderReceiver, PoseReceiver};
 use agv_wire::can::controller_node::{ControllerNode, NodeSettings, ProcessData, WithoutSettings};
 use agv_wire::can::encoder::{EncoderSettings, EncoderState};
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup};
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::plausibility::PlausibilityLimits;
 use rand_chacha::ChaCha8Rng;
@@ -216,11 +217,15 @@ struct Heard {
 fn channels(recording: &Recording) -> [ChannelSettings; 2] {
     let Vehicle::Tricycle(vehicle) = recording.parameters.vehicle else { panic!("a tricycle") };
     let (drive, steering) = (vehicle.drive_scale.abs(), vehicle.steering_scale.abs());
-    let channel = |number, fastest, braking| ChannelSettings {
+    let channel = |number, counted, fastest, braking| ChannelSettings {
         encoder: EncoderSettings::new(node(number)),
         limits: PlausibilityLimits::every(0.010, fastest, braking),
+        counted,
     };
-    [channel(1, recording.parameters.limits.fastest / drive, 2.5 / drive), channel(2, 3.0 / steering, 100.0 / steering)]
+    [
+        channel(1, Counted::Turn, recording.parameters.limits.fastest / drive, 2.5 / drive),
+        channel(2, Counted::Steering, 3.0 / steering, 100.0 / steering),
+    ]
 }
 
 fn kind(frame: &Frame) -> &'static str {
@@ -239,10 +244,10 @@ fn kind(frame: &Frame) -> &'static str {
 fn drive_on(recording: &Recording, rate: f64, load: f64, seconds: f64) {
     let (start, step) = (Time::from_micros(1_000_000), 20e-6);
     let own = [1, 2, 16].map(node);
-    let [drive, steering] = channels(recording);
-    let mut encoders = EmulatedPair::new(recording, own[0], own[1]).unwrap();
+    let nodes = EncoderNodes::new([1, 2, 3, 4].map(node), own[2]);
+    let mut encoders = EmulatedMotion::new(recording, &nodes).unwrap();
     let mut foreign = ForeignTraffic::new(3, &own);
-    let mut pair = EncoderPair::new(&drive, &steering, 0.010, start);
+    let mut group = EncoderGroup::new(&channels(recording), 0.010, start);
     let mut controller = ControllerNode::new(NodeSettings::new(own[2]), start);
     let mut orders = OrderReceiver::new(own[2]);
     let limits = recording.parameters.alert_limits;
@@ -271,8 +276,8 @@ fn drive_on(recording: &Recording, rate: f64, load: f64, seconds: f64) {
             bus.queue(who, frame, now);
         }
         if tick % 50 == 0 {
-            heard.faults.extend(pair.poll_faults(now));
-            let asked = std::iter::from_fn(|| pair.poll(now).or_else(|| controller.poll(now)));
+            heard.faults.extend(group.poll_faults(now));
+            let asked = std::iter::from_fn(|| group.poll(now).or_else(|| controller.poll(now)));
             let mut frames: Vec<Frame> = asked.collect();
             let process = ProcessData { pose: localizer.outputs().pose, health: Health::default(), limits };
             let published = controller.publish(now, &process);
@@ -294,9 +299,14 @@ fn drive_on(recording: &Recording, rate: f64, load: f64, seconds: f64) {
         }
         while let Some((who, Waiting { frame, .. }, end)) = bus.advance(now) {
             if who != CONTROLLER {
-                let faults = pair.poll_faults(end);
+                let faults = group.poll_faults(end);
                 heard.faults.extend(faults);
-                let sample = pair.handle(&frame, end);
+                let counts = group.handle(&frame, end);
+                let sample = counts.map(|Counts { time, counts: [drive, steering, ..] }| EncoderSample {
+                    time,
+                    drive,
+                    steering,
+                });
                 let (answer, order) =
                     (controller.handle(&frame, end, None, &mut WithoutSettings, Ok(())), orders.handle(&frame, end));
                 assert!(answer.is_none() && order.is_none(), "{frame:?} is taken for {answer:?} {order:?}");
@@ -324,10 +334,10 @@ fn drive_on(recording: &Recording, rate: f64, load: f64, seconds: f64) {
                 assert_eq!(pose.health, Health::default());
             }
         }
-        if heard.ready.is_none() && pair.states() == [EncoderState::Reporting; 2] {
+        if heard.ready.is_none() && group.states().all(|state| state == EncoderState::Reporting) {
             heard.ready = Some(now);
         }
-        assert!(heard.ready.is_none() || pair.states() == [EncoderState::Reporting; 2]);
+        assert!(heard.ready.is_none() || group.states().all(|state| state == EncoderState::Reporting));
         assert!(tick == 0 || controller.is_operational());
     }
     check(&heard, &bus, &expected, rate, load, seconds, start);

@@ -9,6 +9,7 @@ use agv_host_sim::replay::replay;
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
 use agv_host_sim::simulate::simulate;
+use agv_lab::equipment::Equipment;
 use agv_lab::evaluate::carpark::{self, Knowledge, Noise};
 use agv_lab::evaluate::slam::OfficeDrive;
 use agv_lab::evaluate::warehouse::{Map, Method, PATHS, experiment};
@@ -56,7 +57,7 @@ fn worst(name: &str, runs: u64) -> (f64, f64, f64) {
     let method = Method::ALL.iter().find(|method| method.name == name).unwrap();
     let mut worst = (0.0_f64, 0.0_f64, 1.0_f64);
     for path in PATHS {
-        let outcome = experiment(path, method, Disturbance::None, 1..1 + runs, || ()).unwrap();
+        let outcome = experiment(path, method, (Disturbance::None, Equipment::default()), 1..1 + runs, || ()).unwrap();
         println!("{outcome:?}");
         worst =
             (worst.0.max(outcome.position_mm.p95), worst.1.max(outcome.heading_deg.p95), worst.2.min(outcome.ok_share));
@@ -113,7 +114,7 @@ fn it_goes_into_the_storage_and_out_again_without_a_jump() {
 fn moved_pallets_are_no_reason_to_be_five_centimetres_off() {
     let method = Method::ALL.iter().find(|method| method.name == "static and slam").unwrap();
     for path in PATHS {
-        let outcome = experiment(path, method, Disturbance::MovedPallets, 1..5, || ()).unwrap();
+        let outcome = experiment(path, method, (Disturbance::MovedPallets, Equipment::default()), 1..5, || ()).unwrap();
         println!("{outcome:?}");
         assert!(outcome.position_mm.max < 10.0 && outcome.heading_deg.max < 0.05, "{outcome:?}");
     }

@@ -31,7 +31,7 @@ const WORK: [&str; 14] = [
     "17motion_correction",
     "12start_finder",
     "11relocalizer",
-    "12encoder_pair",
+    "13encoder_group",
     "15controller_node",
     "5slcan",
     "7session",

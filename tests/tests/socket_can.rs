@@ -12,14 +12,14 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use agv_core::measurement::Time;
-use agv_core::odometry::CounterRange;
+use agv_core::odometry::{Counted, CounterRange};
 use agv_host_sim::bus::{Bus, SocketCanBus};
 use agv_host_sim::emulate::encoder::EmulatedEncoder;
 use agv_host_sim::import::candump::{Line, parse_line};
 use agv_tests::{is_on_path, skip};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::EncoderSettings;
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::encoder_group::{ChannelSettings, EncoderGroup};
 use agv_wire::can::frame::{AnyFrame, FdFrame, Frame, extended_id, standard_id};
 use agv_wire::can::plausibility::PlausibilityLimits;
 
@@ -207,26 +207,28 @@ fn encoders_are_set_up_and_read(interface: &str) {
         // Only values are judged: a busy machine may be late by any time.
         let patient =
             PlausibilityLimits { late_after: 60.0, missing_after: 60.0, ..PlausibilityLimits::every(0.010, 1e6, 1e6) };
-        let channel = |number| ChannelSettings {
+        let channel = |number, counted| ChannelSettings {
             encoder: EncoderSettings { answer_timeout: 2.0, heartbeat: 0, ..EncoderSettings::new(node(number)) },
             limits: patient,
+            counted,
         };
-        let mut pair = EncoderPair::new(&channel(1), &channel(2), 0.01, now());
+        let channels = [channel(1, Counted::Turn), channel(2, Counted::Steering)];
+        let mut group = EncoderGroup::new(&channels, 0.01, now());
         let mut bus = SocketCanBus::open(interface).unwrap();
         let mut samples = 0;
         while samples < 20 && start.elapsed() < PATIENCE {
-            while let Some(frame) = pair.poll(now()) {
+            while let Some(frame) = group.poll(now()) {
                 bus.send(&frame.into()).unwrap();
             }
             let Some(frame) = bus.receive(Instant::now() + Duration::from_millis(1)).unwrap() else { continue };
-            if let Some(sample) = frame.classic().and_then(|frame| pair.handle(frame, now())) {
-                assert_eq!((sample.drive, sample.steering), (123_456, 16_777_215));
+            if let Some(sample) = frame.classic().and_then(|frame| group.handle(frame, now())) {
+                assert_eq!(sample.counts, [123_456, 16_777_215, 0, 0]);
                 samples += 1;
             }
         }
         is_over.store(true, Ordering::Relaxed);
         assert_eq!(samples, 20);
-        for encoder in pair.encoders() {
+        for encoder in group.encoders() {
             assert_eq!(encoder.identity().map(|identity| identity.range), Some(CounterRange::BITS_24));
         }
     });

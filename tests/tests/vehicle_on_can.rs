@@ -8,10 +8,11 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use agv_controller::EncoderNodes;
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
 use agv_host_sim::bus::{Bus, BusError, SocketCanBus};
-use agv_host_sim::emulate::encoder_pair::EmulatedPair;
+use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::emulate::vehicle::settings_like;
 use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line};
 use agv_host_sim::provision::flash_image;
@@ -145,7 +146,8 @@ fn inside(interface: &str, folder: &Path) {
     let log = std::fs::File::create(folder.join("candump.log")).unwrap();
     let mut candump = Command::new("candump").args(["-L", interface]).stdout(log).spawn().unwrap();
     let node = |number| NodeId::new(number).unwrap();
-    let mut pair = EmulatedPair::new(&drive(), node(1), node(2)).unwrap().standing();
+    let nodes = EncoderNodes::new([1, 2, 3, 4].map(node), controller());
+    let mut motion = EmulatedMotion::new(&drive(), &nodes).unwrap().standing();
     let mut bus = SocketCanBus::open(interface).unwrap();
     let mut receiver = PoseReceiver::new(controller());
     let start = Instant::now();
@@ -158,13 +160,13 @@ fn inside(interface: &str, folder: &Path) {
     let has_driven = |pose: &PublishedPose, least: f64| (least..5.0).contains(&way(pose));
     while begun.is_none() || !poses.last().is_some_and(|pose| has_driven(pose, 1.5)) {
         assert!(start.elapsed() < Duration::from_secs(100), "{:?}", poses.last());
-        for frame in pair.poll(now()) {
+        for frame in motion.poll(now()) {
             send(&mut bus, &frame.into());
         }
         if let Some(frame) = bus.receive(Instant::now() + Duration::from_millis(2)).unwrap()
             && let Some(frame) = frame.classic()
         {
-            for answer in pair.handle(frame) {
+            for answer in motion.handle(frame) {
                 send(&mut bus, &answer.into());
             }
             poses.extend(receiver.handle(frame));
@@ -172,9 +174,9 @@ fn inside(interface: &str, folder: &Path) {
         let is_placed = poses.last().is_some_and(|pose| (pose.pose.x - START.x).abs() < 0.01);
         if begun.is_none() && is_placed {
             begun = Some(Instant::now());
-            pair.begin(now());
+            motion.begin(now());
         } else if begun.is_none()
-            && pair.are_operational()
+            && motion.are_operational()
             && told.is_none_or(|told| told.elapsed() > Duration::from_secs(2))
         {
             told = Some(Instant::now());
@@ -184,7 +186,7 @@ fn inside(interface: &str, folder: &Path) {
     // The other program is behind us, and its output is behind it.
     while !heard(folder).is_some_and(|pose| has_driven(&pose, 1.2)) {
         assert!(start.elapsed() < Duration::from_secs(120), "candump has not heard that the vehicle moves");
-        for frame in pair.poll(now()) {
+        for frame in motion.poll(now()) {
             send(&mut bus, &frame.into());
         }
         let _ = bus.receive(Instant::now() + Duration::from_millis(2));

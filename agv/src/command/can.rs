@@ -3,17 +3,20 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use agv_core::measurement::{EncoderSample, Time};
+use agv_controller::EncoderNodes;
+use agv_core::measurement::Time;
+use agv_core::odometry::{Counted, MOST_COUNTERS};
 use agv_host_sim::bus::{self, Bus};
-use agv_host_sim::emulate::encoder_pair::EmulatedPair;
+use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::import::candump;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_settings::Settings;
 use agv_wire::can::canopen::{Message, NodeId};
 use agv_wire::can::controller::{Content, PoseReceiver, PublishedPose};
-use agv_wire::can::encoder::{EncoderSettings, Reporting};
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::encoder::{EncoderSettings, Profile, Reporting};
+use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup};
 use agv_wire::can::frame::{AnyFrame, Frame};
 use agv_wire::can::plausibility::PlausibilityLimits;
 use agv_wire::can::sdo::{Object, Request, Response};
@@ -102,7 +105,7 @@ struct Pose {
     seconds: Option<f64>,
 }
 
-/// Be two encoders whose counters follow a simulated drive or a log
+/// Be what tells the motion of a vehicle, encoders, drives or its own controller, in a simulated drive or a log
 #[derive(clap::Args)]
 struct ServeEncoders {
     /// The bus
@@ -113,12 +116,12 @@ struct ServeEncoders {
     /// Log to play
     #[arg(long)]
     log: Option<PathBuf>,
-    /// Node of the driving wheel's encoder
-    #[arg(long, default_value = "1", value_parser = node)]
-    drive: NodeId,
-    /// Node of the steering's encoder
-    #[arg(long, default_value = "2", value_parser = node)]
-    steering: NodeId,
+    /// Nodes of the counters, in the order in which the vehicle has them
+    #[arg(long, value_delimiter = ',', num_args = 1..=4, default_value = "1,2,3,4", value_parser = node)]
+    nodes: Vec<NodeId>,
+    /// Be drives of CiA 402 that tell their positions, not encoders of CiA 406
+    #[arg(long)]
+    drives: bool,
     /// Stop after so many seconds; else at the end of the drive
     #[arg(long)]
     seconds: Option<f64>,
@@ -237,38 +240,41 @@ impl Encoders {
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         let reporting = if self.sync { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
-        let channel = |node| ChannelSettings {
+        let channel = |node, counted| ChannelSettings {
             encoder: EncoderSettings { reporting, ..EncoderSettings::new(node) },
             limits: PlausibilityLimits::every(0.010, self.fastest, self.braking),
+            counted,
         };
-        let mut pair = EncoderPair::new(&channel(self.drive), &channel(self.steering), 0.010, clock.now());
+        let channels = [channel(self.drive, Counted::Turn), channel(self.steering, Counted::Steering)];
+        let mut group = EncoderGroup::new(&channels, 0.010, clock.now());
         let mut known = None;
         while !clock.is_over() {
-            while let Some(frame) = pair.poll(clock.now()) {
+            while let Some(frame) = group.poll(clock.now()) {
                 bus.send(&frame.into())?;
             }
             if let Some(frame) = clock.receive(&mut *bus, STEP)?
-                && let Some(sample) = frame.classic().and_then(|frame| pair.handle(frame, clock.now()))
+                && let Some(sample) = frame.classic().and_then(|frame| group.handle(frame, clock.now()))
             {
+                let Counts { time, counts: [drive, steering, ..] } = sample;
+                let time = time.seconds();
                 if as_json {
-                    let EncoderSample { time, drive, steering } = sample;
-                    println!("{}", json!({ "time_s": time.seconds(), "drive": drive, "steering": steering }));
+                    println!("{}", json!({ "time_s": time, "drive": drive, "steering": steering }));
                 } else {
-                    let time = sample.time.seconds();
-                    println!("{time:12.6}  drive {:10}  steering {:10}", sample.drive, sample.steering);
+                    println!("{time:12.6}  drive {drive:10}  steering {steering:10}");
                 }
             }
             let now = clock.now();
-            let faults = pair.faults(now);
-            let state = (pair.states(), [faults.drive, faults.steering]);
-            if known.replace(state) != Some(state) {
-                let (states, faults) = state;
+            let faults = group.faults(now);
+            let state = (group.states().collect::<Vec<_>>(), [faults.drive, faults.steering]);
+            if known.as_ref() != Some(&state) {
+                let (states, faults) = &state;
                 if as_json {
-                    let states = states.map(|state| format!("{state:?}"));
+                    let states: Vec<_> = states.iter().map(|state| format!("{state:?}")).collect();
                     println!("{}", json!({ "time_s": now.seconds(), "states": states, "faults": faults }));
                 } else {
                     println!("{:12.6}  states {states:?}, faults {:?} {:?}", now.seconds(), faults[0], faults[1]);
                 }
+                known = Some(state);
             }
         }
         Ok(())
@@ -332,25 +338,33 @@ fn pose_json(pose: &PublishedPose) -> serde_json::Value {
 impl ServeEncoders {
     fn run(self) -> anyhow::Result<()> {
         let recording = self.recording()?;
-        let mut pair = EmulatedPair::new(&recording, self.drive, self.steering)?;
+        let mut motion = EmulatedMotion::new(&recording, &self.encoder_nodes())?;
         let mut bus = bus::open(&self.bus)?;
         let clock = Clock::new(self.seconds)?;
         while !clock.is_over() {
             let now = clock.now();
             // Without a stated time the program ends with the drive.
-            let is_done = pair.start().is_some_and(|start| now.since(start) > pair.duration());
+            let is_done = motion.start().is_some_and(|start| now.since(start) > motion.duration());
             if self.seconds.is_none() && is_done {
                 break;
             }
-            for frame in pair.poll(now) {
+            for frame in motion.poll(now) {
                 bus.send(&frame.into())?;
             }
             let Some(frame) = clock.receive(&mut *bus, STEP)? else { continue };
-            for answer in frame.classic().map(|frame| pair.handle(frame)).unwrap_or_default() {
+            for answer in frame.classic().map(|frame| motion.handle(frame)).unwrap_or_default() {
                 bus.send(&answer.into())?;
             }
         }
         Ok(())
+    }
+
+    fn encoder_nodes(&self) -> EncoderNodes {
+        let usual = EncoderNodes::of(&Settings::default());
+        let mut encoders = usual.encoders;
+        encoders.iter_mut().zip(&self.nodes).for_each(|(node, given)| *node = *given);
+        let profile = if self.drives { Profile::Drive } else { Profile::Encoder };
+        EncoderNodes { encoders, profiles: [profile; MOST_COUNTERS], ..usual }
     }
 
     fn recording(&self) -> anyhow::Result<Recording> {

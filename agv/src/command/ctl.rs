@@ -8,14 +8,14 @@ use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, ServiceError, Setting};
 use agv_host_sim::link::with_port;
 use agv_host_sim::setting_doubts::doubt;
-use agv_settings::leaf::Value;
+use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::Refusal;
 use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::output::{note, print_rows};
 use super::progress;
-use super::setting_text::{named, parse_value, show};
+use super::setting_text::{named, parse_value, show, show_setting, word};
 
 const HELP: &str = "\
 Reading needs nothing; changing needs the controller's key (64 hexadecimal digits in a file) and a vehicle that stands.
@@ -24,7 +24,8 @@ Settings take effect with the next start, if they were stored.
 Examples:
   agv ctl 192.168.1.20 version
   agv ctl 192.168.1.20 list
-  agv ctl 192.168.1.20 --key agv.key set vehicle.wheelbase 1.482
+  agv ctl 192.168.1.20 --key agv.key set vehicle.kind differential
+  agv ctl 192.168.1.20 --key agv.key set vehicle.track 0.612
   agv ctl 192.168.1.20 --key agv.key apply vehicle.toml
   agv ctl 192.168.1.20 --key agv.key map upload hall.imk
   agv ctl 192.168.1.20 --key agv.key store
@@ -63,7 +64,7 @@ enum Action {
     Set {
         /// Its name.
         name: String,
-        /// A number, true or false, or an IPv4 address.
+        /// A number, true or false, an IPv4 address, or a word of a list.
         value: String,
     },
     /// Change the settings that a file of the vehicle's parameters states, show what changes, and keep them in flash.
@@ -144,7 +145,7 @@ fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {
             .map(|setting| {
                 let value = match setting.value {
                     Value::Number(number) => json!(number),
-                    Value::Whole(whole) => json!(whole),
+                    Value::Whole(whole) => word(&setting.name, setting.value).map_or(json!(whole), |word| json!(word)),
                     Value::Switch(is_on) => json!(is_on),
                     Value::Address(_) => json!(show(setting.value)),
                 };
@@ -154,17 +155,31 @@ fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {
         println!("{}", serde_json::to_string_pretty(&object)?);
     } else {
         let row = |setting: &Setting| {
-            [setting.name.clone(), format!("{} {}", show(setting.value), setting.unit).trim_end().to_owned()]
+            [setting.name.clone(), {
+                let value = show_setting(&setting.name, setting.value);
+                format!("{value} {}", setting.unit).trim_end().to_owned()
+            }]
         };
         print_rows(&settings.iter().map(row).collect::<Vec<_>>());
     }
     Ok(())
 }
 
+/// The kinds of vehicles that have a setting.
+fn kinds(leaf: &Leaf) -> String {
+    leaf.kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ")
+}
+
 /// A setting of a controller; what comes near the name is suggested if there is none.
 fn get(client: &mut Client, name: &str) -> anyhow::Result<Setting> {
     match client.get(name) {
         Err(ServiceError::Refused(Refusal::Name)) if let Err(error) = named(name) => Err(error),
+        Err(error @ ServiceError::OtherKind) => Err(match Leaf::named(name) {
+            Some(leaf) => {
+                anyhow::anyhow!("{name} is a setting of vehicles of the kinds {}; vehicle.kind is another", kinds(leaf))
+            }
+            None => error.into(),
+        }),
         outcome => Ok(outcome?),
     }
 }

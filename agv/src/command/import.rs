@@ -150,7 +150,8 @@ impl Import {
     fn import_raw(&self, progress: &ProgressBar, bytes: Vec<RawBytes>) -> anyhow::Result<()> {
         progress.set_message(format!("writing {}", self.output.display()));
         let mut drive = like::drive_like(self.like.as_deref())?;
-        if !raw::means_something(&drive, &bytes, &self.encoders.nodes()) {
+        let nodes = self.encoders.nodes(&drive.parameters.vehicle);
+        if !raw::means_something(&drive, &bytes, &nodes) {
             let like = if self.like.is_none() { "state the vehicle with --like LOG, and " } else { "" };
             bail!(
                 "{}: no position of two encoders and no revolution of a laser is in it; {like}the nodes with --drive and \
@@ -158,7 +159,7 @@ impl Import {
                 self.input.display()
             );
         }
-        raw::write(&self.output, &mut drive, &bytes, &self.encoders.nodes())?;
+        raw::write(&self.output, &mut drive, &bytes, &nodes)?;
         progress.finish_and_clear();
         Summary::of(&drive).print(self.json)
     }
@@ -206,7 +207,9 @@ impl Import {
     }
 
     fn raw_drive(&self) -> anyhow::Result<Recording> {
-        let (recording, damages) = raw::read_drive(&self.input, &self.encoders.nodes())?;
+        let (like, _) = log::read(&self.input)?;
+        let nodes = self.encoders.nodes(&like.parameters.vehicle);
+        let (recording, damages) = raw::read_drive(&self.input, &nodes)?;
         for damage in &damages {
             note(&format!("agv: {}: {damage}", self.input.display()));
         }

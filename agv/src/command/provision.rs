@@ -13,7 +13,7 @@ use serde_json::json;
 use super::ctl::read_key;
 use super::output::{note, print_rows};
 use super::setting_arguments::SettingArguments;
-use super::setting_text::show;
+use super::setting_text::show_setting;
 
 const HELP: &str = "\
 The image is for the last two pages of the controller's flash, 0x081C0000 on the STM32H743 and 0x080C0000 on the STM32H723:
@@ -90,8 +90,9 @@ fn changed(settings: &Settings) -> Vec<[String; 2]> {
     let usual = Settings::default();
     let row = |leaf: &Leaf| {
         let value = leaf.get(settings)?;
-        (leaf.get(&usual) != Some(value))
-            .then(|| [leaf.name.to_owned(), format!("{} {}", show(value), leaf.unit).trim_end().to_owned()])
+        (leaf.get(&usual) != Some(value)).then(|| {
+            [leaf.name.to_owned(), format!("{} {}", show_setting(leaf.name, value), leaf.unit).trim_end().to_owned()]
+        })
     };
     LEAVES.iter().filter_map(row).collect()
 }

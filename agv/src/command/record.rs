@@ -187,7 +187,7 @@ impl Record {
         recorder: &Recorder,
     ) -> Result<CanSummary, LiveError> {
         let Some(name) = &self.can else { return Ok(CanSummary::default()) };
-        let nodes = self.encoders.nodes();
+        let nodes = self.encoders.nodes(&parameters.vehicle);
         live::record_can(|| bus::open(name), &nodes, parameters, clock, limits, is_stopped, recorder)
     }
 

@@ -5,7 +5,7 @@ use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::{Leaf, LeafError, Value};
 use agv_settings::{Cause, Contradiction, Settings, bus_load};
 use agv_wire::can::bit_timing::BIT_RATES;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 
 use super::output::note;
 use super::setting_text::{named, parse_value, show_number};
@@ -29,9 +29,23 @@ impl SettingArguments {
         &self.set
     }
 
+    /// The settings that are given.
+    fn leaves(&self) -> impl Iterator<Item = &'static Leaf> {
+        self.set.iter().filter_map(|text| Leaf::named(text.split_once('=')?.0))
+    }
+
     /// Changes settings.
     pub fn change(&self, settings: &mut Settings) -> anyhow::Result<()> {
         self.set.iter().try_for_each(|text| change(settings, text))?;
+        // In any order: the kind of the vehicle may come last.
+        for leaf in self.leaves() {
+            ensure!(
+                leaf.matters(settings),
+                "{} is no setting of a vehicle of the kind {}",
+                leaf.name,
+                settings.vehicle.kind.name()
+            );
+        }
         match settings.check() {
             Err(Contradiction { cause: Cause::BusLoad, .. }) => bail!(
                 "the CAN bus would be loaded by {:.0} % of its bit rate, more than 60 %; it needs a longer \
@@ -40,6 +54,9 @@ impl SettingArguments {
             ),
             Err(Contradiction { leaf: leaf @ "can.bit_rate", .. }) => {
                 bail!("{leaf} must be one of {BIT_RATES:?} kbit/s, not {}", settings.bit_rate)
+            }
+            Err(Contradiction { leaf, .. }) if leaf.starts_with("can.") || leaf.starts_with("vehicle.wheel_") => {
+                bail!("{leaf} does not go with the other settings")
             }
             // What the localiser believes is looked at where it is used.
             _ => Ok(()),
@@ -50,8 +67,7 @@ impl SettingArguments {
     pub fn apply(&self, parameters: &mut Parameters) -> anyhow::Result<()> {
         let mut settings = Settings::of(*parameters);
         self.change(&mut settings)?;
-        let names = self.set.iter().filter_map(|text| Leaf::named(text.split_once('=')?.0));
-        for leaf in names {
+        for leaf in self.leaves() {
             if let Some(Value::Number(value)) = leaf.get(&settings)
                 && let Some(doubt) = doubt(leaf.name, value)
             {
@@ -67,13 +83,12 @@ impl SettingArguments {
 fn change(settings: &mut Settings, text: &str) -> anyhow::Result<()> {
     let (name, value) = text.split_once('=').with_context(|| format!("{text} is not NAME=VALUE"))?;
     let leaf = named(name)?;
-    let like = leaf.get(settings).with_context(|| format!("the vehicle has no setting {name}"))?;
-    match leaf.set(settings, parse_value(name, value, like)?) {
+    match leaf.set(settings, parse_value(name, value, leaf.value(settings))?) {
         Ok(()) => Ok(()),
         Err(LeafError::Bounds) => {
             let [least, most] = [leaf.bounds.0, leaf.bounds.1].map(show_number);
             bail!("{name} must be from {least} to {most} {}, not {value}", leaf.unit)
         }
-        Err(LeafError::Kind | LeafError::BusLoad) => bail!("{value} is no value of {name}"),
+        Err(LeafError::Kind | LeafError::BusLoad | LeafError::Other(_)) => bail!("{value} is no value of {name}"),
     }
 }

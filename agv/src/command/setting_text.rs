@@ -16,6 +16,12 @@ pub fn named(name: &str) -> anyhow::Result<&'static Leaf> {
 
 /// A value as it is written on a command line or in a file, for a leaf that holds `like`.
 pub fn parse_value(name: &str, text: &str, like: Value) -> anyhow::Result<Value> {
+    let choices = Leaf::named(name).map_or(&[][..], |leaf| leaf.choices);
+    if !choices.is_empty() {
+        let place = choices.iter().position(|choice| *choice == text);
+        let place = place.with_context(|| format!("{name} must be one of {}, not '{text}'", choices.join(", ")))?;
+        return Ok(Value::Whole(place as u64));
+    }
     let value = match like {
         Value::Number(_) => text.parse().ok().map(Value::Number),
         Value::Whole(_) => text.parse().ok().map(Value::Whole),
@@ -29,6 +35,17 @@ pub fn parse_value(name: &str, text: &str, like: Value) -> anyhow::Result<Value>
         Value::Address(_) => "an address such as 192.168.1.10",
     };
     value.with_context(|| format!("{name} must be {wanted}, not '{text}'"))
+}
+
+/// A value of the setting of that name with all its digits, or the word for it.
+pub fn show_setting(name: &str, value: Value) -> String {
+    word(name, value).map_or_else(|| show(value), str::to_owned)
+}
+
+/// The word for a value of the setting of that name, if its values have words.
+pub fn word(name: &str, value: Value) -> Option<&'static str> {
+    let Value::Whole(number) = value else { return None };
+    Leaf::named(name)?.choices.get(usize::try_from(number).ok()?).copied()
 }
 
 /// A value with all its digits.

@@ -1,12 +1,13 @@
 //! Lines as `candump` writes them.
 
 use agv_core::measurement::Time;
+use agv_core::odometry::Counted;
 use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line, read, screen_line};
 use agv_host_sim::link::encoder_listener::EncoderListener;
 use agv_tests::recordings;
 use agv_wire::can::canopen::{Message, NodeId};
 use agv_wire::can::encoder::EncoderSettings;
-use agv_wire::can::encoder_pair::ChannelSettings;
+use agv_wire::can::encoder_group::ChannelSettings;
 use agv_wire::can::frame::{FdFrame, Frame, extended_id, standard_id};
 use agv_wire::can::plausibility::PlausibilityLimits;
 use agv_wire::can::sdo::{Object, Response, Value};
@@ -92,12 +93,13 @@ fn a_recorded_drive_unit_decodes() {
 
 #[test]
 fn encoders_are_read_from_a_log_without_their_setup() {
-    let channel = |number| ChannelSettings {
+    let channel = |number, counted| ChannelSettings {
         encoder: EncoderSettings {
             range: agv_core::odometry::CounterRange::new(1 << 24),
             ..EncoderSettings::new(NodeId::new(number).unwrap())
         },
         limits: PlausibilityLimits::every(0.010, 1e6, 1e6),
+        counted,
     };
     let mut frames = Vec::new();
     for step in 0..50u32 {
@@ -109,7 +111,8 @@ fn encoders_are_read_from_a_log_without_their_setup() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("candump.log");
     std::fs::write(&path, text.join("\n")).unwrap();
-    let mut listener = EncoderListener::new(&channel(1), &channel(2), Time::from_seconds(5.0));
+    let channels = [channel(1, Counted::Turn), channel(2, Counted::Steering)];
+    let mut listener = EncoderListener::new(&channels, Time::from_seconds(5.0));
     let frames = read(&path).unwrap();
     let heard = frames.iter().map(|seen| listener.hear(seen.frame.classic().unwrap(), seen.time.unwrap()));
     let samples: Vec<_> = heard
@@ -120,7 +123,7 @@ fn encoders_are_read_from_a_log_without_their_setup() {
         .collect();
     assert_eq!(samples.len(), 50);
     for (step, sample) in (0..).zip(samples) {
-        assert_eq!((sample.drive, sample.steering), (1000 * step, 9 + step));
+        assert_eq!(sample.counts, [1000 * step, 9 + step, 0, 0]);
         assert_eq!(sample.time.micros(), 5_000_000 + 10_000 * u64::from(step));
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use agv_core::measurement::{EncoderSample, Time};
-use agv_core::odometry::{CounterRange, Vehicle};
+use agv_core::odometry::{Counted, CounterRange, Vehicle};
 use agv_host_sim::bus::{Bus, InProcessBus, InProcessNode};
 use agv_host_sim::emulate::encoder::EmulatedEncoder;
 use agv_host_sim::simulate::random::{Random, Stream};
@@ -12,7 +12,7 @@ use agv_host_sim::simulate::scenario::{Scenario, believed_parameters};
 use agv_host_sim::simulate::{odometer, vehicle};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair};
+use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup};
 use agv_wire::can::plausibility::PlausibilityLimits;
 
 /// The counters of a simulated drive, one sample every 10 ms, and their ranges.
@@ -28,10 +28,11 @@ fn simulated() -> (Vec<EncoderSample>, CounterRange, CounterRange) {
     (samples, tricycle.drive_range, tricycle.steering_range)
 }
 
-fn channel(number: u8, reporting: Reporting, fastest: f64, braking: f64) -> ChannelSettings {
+fn channel(number: u8, counted: Counted, reporting: Reporting, fastest: f64, braking: f64) -> ChannelSettings {
     ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
         limits: PlausibilityLimits::every(0.010, fastest, braking),
+        counted,
     }
 }
 
@@ -45,9 +46,11 @@ fn drive_over_the_bus(reporting: Reporting) {
     assert!(truth.len() > 1000);
     // The steering counter has its own idea of a revolution: no limits for it.
     let tick = |range: CounterRange| range.values() as f64;
-    let mut pair = EncoderPair::new(
-        &channel(1, reporting, 0.1 * tick(drive_range), 0.1 * tick(drive_range)),
-        &channel(2, reporting, 4.0 * tick(steering_range), 1e3 * tick(steering_range)),
+    let mut group = EncoderGroup::new(
+        &[
+            channel(1, Counted::Turn, reporting, 0.1 * tick(drive_range), 0.1 * tick(drive_range)),
+            channel(2, Counted::Steering, reporting, 4.0 * tick(steering_range), 1e3 * tick(steering_range)),
+        ],
         0.010,
         Time::from_micros(900_000),
     );
@@ -70,7 +73,7 @@ fn drive_over_the_bus(reporting: Reporting) {
         }
         // Setup needs several questions and answers; virtual time does not pass meanwhile.
         for _ in 0..4 {
-            while let Some(frame) = pair.poll(now) {
+            while let Some(frame) = group.poll(now) {
                 master.send(&frame.into()).unwrap();
             }
             for encoder in &mut encoders {
@@ -86,13 +89,18 @@ fn drive_over_the_bus(reporting: Reporting) {
                 }
             }
             for frame in drain(&mut master) {
-                samples.extend(pair.handle(&frame, now));
+                let counts = group.handle(&frame, now);
+                samples.extend(counts.map(|Counts { time, counts: [drive, steering, ..] }| EncoderSample {
+                    time,
+                    drive,
+                    steering,
+                }));
             }
         }
-        alarms += u32::from(now > Time::from_seconds(1.3) && pair.faults(now).any());
+        alarms += u32::from(now > Time::from_seconds(1.3) && group.faults(now).any());
         now = now.offset(0.001);
     }
-    assert_eq!(pair.states(), [EncoderState::Reporting; 2]);
+    assert_eq!(group.states().collect::<Vec<_>>(), [EncoderState::Reporting; 2]);
     assert_eq!(alarms, 0);
     let first = truth.iter().position(|sample| sample.time >= Time::from_seconds(1.3)).unwrap();
     let compared: Vec<EncoderSample> =

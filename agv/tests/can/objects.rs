@@ -67,7 +67,7 @@ fn estimate() -> Estimate {
 fn settings() -> Settings {
     let mut settings = Settings::default();
     settings.nodes.vendor = 0x1A2;
-    settings.nodes.drive = 5;
+    settings.nodes.encoders[0].node = 5;
     settings.parameters.limits.fastest = 1.25;
     settings.network.gateway = [10, 0, 0, 254];
     settings
@@ -127,7 +127,7 @@ fn another_master_reads_every_object() {
     };
     for leaf in &LEAVES {
         let found = value(object_of(leaf).index, 0);
-        match leaf.get(&settings()).unwrap() {
+        match leaf.value(&settings()) {
             Setting::Number(number) => {
                 assert_eq!(found.as_str().unwrap().parse(), Ok(number), "{}", leaf.name);
             }

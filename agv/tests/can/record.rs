@@ -10,7 +10,7 @@ use agv_core::measurement::{EncoderFault, EncoderFaults};
 use agv_core::odometry::{Tricycle, Vehicle};
 use agv_core::record::{Item, Record};
 use agv_host_sim::bus::{Bus, BusError, InProcessBus, InProcessNode};
-use agv_host_sim::emulate::encoder_pair::EmulatedPair;
+use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::export;
 use agv_host_sim::import::{candump, raw};
 use agv_host_sim::link::clock::Clock;
@@ -20,7 +20,7 @@ use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::encoder::{Profile, Reporting};
+use agv_wire::can::encoder::Reporting;
 use agv_wire::can::frame::AnyFrame;
 
 fn node(number: u8) -> NodeId {
@@ -29,14 +29,7 @@ fn node(number: u8) -> NodeId {
 
 fn nodes(is_synchronous: bool) -> EncoderNodes {
     let reporting = if is_synchronous { Reporting::Synchronous } else { Reporting::Timer { period: 10 } };
-    EncoderNodes {
-        drive: node(1),
-        steering: node(2),
-        controller: node(16),
-        reporting,
-        are_managed: true,
-        profiles: [Profile::Encoder; 2],
-    }
+    EncoderNodes { reporting, ..EncoderNodes::new([1, 2, 3, 4].map(node), node(16)) }
 }
 
 fn recording() -> Recording {
@@ -50,14 +43,20 @@ fn recording() -> Recording {
 }
 
 /// Plays the drive on a bus until `is_silent`, then goes on without a word.
-fn serve(mut bus: InProcessNode, mut pair: EmulatedPair, clock: Clock, is_silent: &AtomicBool, is_over: &AtomicBool) {
+fn serve(
+    mut bus: InProcessNode,
+    mut motion: EmulatedMotion,
+    clock: Clock,
+    is_silent: &AtomicBool,
+    is_over: &AtomicBool,
+) {
     while !is_over.load(Ordering::Relaxed) {
         let frame = bus.receive(Instant::now() + Duration::from_millis(1)).unwrap();
         if is_silent.load(Ordering::Relaxed) {
             continue;
         }
-        let answers = frame.as_ref().and_then(AnyFrame::classic).map(|frame| pair.handle(frame)).unwrap_or_default();
-        for frame in answers.into_iter().chain(pair.poll(clock.now())) {
+        let answers = frame.as_ref().and_then(AnyFrame::classic).map(|frame| motion.handle(frame)).unwrap_or_default();
+        for frame in answers.into_iter().chain(motion.poll(clock.now())) {
             bus.send(&frame.into()).unwrap();
         }
     }
@@ -87,12 +86,12 @@ impl Bus for Unplugged {
 fn record(path: &Path, recording: &Recording, is_synchronous: bool, frames_a_bus: usize, seconds: f64) -> CanSummary {
     let clock = Clock::new(1.0);
     let wire = InProcessBus::new();
-    let pair = EmulatedPair::new(recording, node(1), node(2)).unwrap();
+    let motion = EmulatedMotion::new(recording, &nodes(is_synchronous)).unwrap();
     let recorder = Recorder::new(Writer::begin(path, &recording.parameters, &recording.landmarks).unwrap());
     let (is_silent, is_over, never) = (AtomicBool::new(false), AtomicBool::new(false), AtomicBool::new(false));
     let devices = wire.join();
     let summary = std::thread::scope(|scope| {
-        scope.spawn(|| serve(devices, pair, clock, &is_silent, &is_over));
+        scope.spawn(|| serve(devices, motion, clock, &is_silent, &is_over));
         let record = |until: f64| {
             let open = || -> Result<Box<dyn Bus>, BusError> {
                 Ok(Box::new(Unplugged { bus: wire.join(), rest: frames_a_bus }))

@@ -126,14 +126,8 @@ fn scans_and_frames_that_never_come_are_waited_for_only_so_long() {
     let bus = InProcessBus::new();
     let begin = clock.now();
     let limits = Limits { until: begin.offset(1e6), first: begin.offset(30.0) };
-    let nodes = agv_controller::EncoderNodes {
-        drive: agv_wire::can::canopen::NodeId::new(1).unwrap(),
-        steering: agv_wire::can::canopen::NodeId::new(2).unwrap(),
-        controller: agv_wire::can::canopen::NodeId::new(16).unwrap(),
-        reporting: agv_wire::can::encoder::Reporting::Timer { period: 10 },
-        are_managed: true,
-        profiles: [agv_wire::can::encoder::Profile::Encoder; 2],
-    };
+    let node = |number| agv_wire::can::canopen::NodeId::new(number).unwrap();
+    let nodes = agv_controller::EncoderNodes::new([1, 2, 3, 4].map(node), node(16));
     let parameters = Parameters::new(Vehicle::Increments, Pose::default());
     let open = || Ok(Box::new(bus.join()) as Box<dyn agv_host_sim::bus::Bus>);
     let summary = live::record_can(open, &nodes, &parameters, clock, &limits, &is_stopped, &recorder).unwrap();

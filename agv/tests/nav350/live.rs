@@ -23,21 +23,17 @@ use agv_host_sim::simulate::block_storage::{BlockStorage, ReflectorPlacement};
 use agv_host_sim::simulate::scenario::{Scenario, WorldOptions};
 use agv_host_sim::simulate::simulate;
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::encoder::{Profile, Reporting};
 use agv_wire::cola::{Deframed, Deframer, Dialect};
 use agv_wire::nav350::{Answer, Configuration, MethodResult, NavigationData, SensorFrame};
 
-const NODES: EncoderNodes = match (NodeId::new(1), NodeId::new(2), NodeId::new(16)) {
-    (Some(drive), Some(steering), Some(controller)) => EncoderNodes {
-        drive,
-        steering,
-        controller,
-        reporting: Reporting::Timer { period: 10 },
-        are_managed: true,
-        profiles: [Profile::Encoder; 2],
-    },
-    _ => panic!(),
-};
+const fn node(number: u8) -> NodeId {
+    match NodeId::new(number) {
+        Some(node) => node,
+        None => panic!(),
+    }
+}
+
+const NODES: EncoderNodes = EncoderNodes::new([node(1), node(2), node(3), node(4)], node(16));
 
 /// Two seconds of the fast clock.
 const STALL: Duration = Duration::from_millis(250);

@@ -6,6 +6,7 @@
 //! | [`InnovationMonitor`] | how many observations fit, and how well | a wrong pose, or a map that looks alike |
 //! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
+//! | [`RedundancyCheck`] | what redundant wheels say differently | a wheel that slips |
 //! | [`TurnCheck`] | turns by wheels and by a gyro | a wheel that slips, a gyro that is wrong |
 //! | [`MountingCheck`] | corrections with the motion since the last one | a laser mounted elsewhere, an odometry of another scale |
 //!
@@ -15,6 +16,7 @@ mod alert_limits;
 mod innovation_monitor;
 mod jump_check;
 mod mounting_check;
+mod redundancy_check;
 pub mod separation;
 mod slip_check;
 mod turn_check;
@@ -23,6 +25,7 @@ pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
 pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
 pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
 pub use mounting_check::{MountingCheck, Suspect};
+pub use redundancy_check::{RedundancyCheck, WheelErrors};
 pub use slip_check::SlipCheck;
 pub use turn_check::{GyroFault, LastingErrors, TurnCheck};
 
@@ -43,6 +46,8 @@ pub struct Integrity {
     mounting: MountingCheck,
     /// Of a vehicle with a gyro.
     pub turns: TurnCheck,
+    /// Of a vehicle with more wheels than it needs.
+    pub redundancy: RedundancyCheck,
 }
 
 /// A pose that replaces one which was contradicted.
@@ -66,6 +71,7 @@ impl Integrity {
             jumps: JumpCheck::new(),
             mounting: MountingCheck::new(),
             turns: TurnCheck::new(),
+            redundancy: RedundancyCheck::new(),
         }
     }
 

@@ -33,7 +33,16 @@ const SMALL: f64 = 1e-9;
 const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     match &parameters.vehicle {
         Vehicle::Tricycle(tricycle) => Some(tricycle),
-        Vehicle::Ackermann(_) | Vehicle::Increments | Vehicle::Wheels(_) => None,
+        _ => None,
+    }
+}
+
+/// What is added to the steering angle, of the vehicles whose controllers tell one.
+const fn steering_offset(parameters: &Parameters) -> Option<f64> {
+    match &parameters.vehicle {
+        Vehicle::Tricycle(tricycle) => Some(tricycle.steering_offset_forward),
+        Vehicle::TricycleSpeed(tricycle) => Some(tricycle.steering_offset),
+        _ => None,
     }
 }
 
@@ -42,6 +51,7 @@ const fn wheelbase(parameters: &Parameters) -> Option<f64> {
     match &parameters.vehicle {
         Vehicle::Tricycle(tricycle) => Some(tricycle.wheelbase),
         Vehicle::Ackermann(car) => Some(car.wheelbase),
+        Vehicle::TricycleSpeed(tricycle) => Some(tricycle.wheelbase),
         Vehicle::Increments | Vehicle::Wheels(_) => None,
     }
 }
@@ -60,12 +70,7 @@ const BOUNDS: [Bound; 59] = [
         most: 1.0,
         get: |parameters| Some(tricycle(parameters)?.steering_scale),
     },
-    Bound {
-        leaf: "vehicle.steering_offset_forward",
-        least: -TURN,
-        most: TURN,
-        get: |parameters| Some(tricycle(parameters)?.steering_offset_forward),
-    },
+    Bound { leaf: "vehicle.steering_offset_forward", least: -TURN, most: TURN, get: steering_offset },
     Bound {
         leaf: "vehicle.steering_offset_backward",
         least: -TURN,

@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::contours::ToldByContours;
 use super::evidence::DistanceSince;
 use super::slam::Slam;
-use super::supervisor::{Support, remark_on_turns, supervise};
+use super::supervisor::{Support, remark_on_motion, supervise};
 use super::{
     Capacities, ContourCapacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason,
     StatedCapacities,
@@ -13,7 +13,7 @@ use super::{
 use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::separation::SolutionSeparation;
-use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, is_sure};
+use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, WheelErrors, is_sure};
 use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
 use crate::odometry::{Coasting, GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
@@ -216,8 +216,9 @@ impl<C: Capacities> Localizer<C> {
                 self.move_by(increment.time, motion);
             }
             Event::Wheels(sample) => {
-                let motion = self.odometer.wheels(sample);
-                self.move_by(sample.time, motion);
+                let found = self.odometer.wheels_with_slip(sample);
+                self.compare_wheels(&found);
+                self.move_by(sample.time, found.map(|(motion, _)| motion));
             }
             Event::Gyro(sample) => self.turn_rate(sample),
             Event::Reflectors(seen) => self.reflectors_of(seen),
@@ -389,6 +390,16 @@ impl<C: Capacities> Localizer<C> {
         let is_first = last.mode == Mode::NotLocalised;
         let distance = if is_first { 0.0 } else { libm::hypot(pose.x - last.pose.x, pose.y - last.pose.y) };
         last.count_reset(distance);
+    }
+
+    /// Lets the check of redundant wheels take a motion, and what of it does not fit.
+    #[inline(never)]
+    fn compare_wheels(&mut self, found: &Result<(Motion, f64), OdometryError>) {
+        let check = &mut self.integrity.redundancy;
+        let Ok((motion, slip)) = found else { return check.clear() };
+        let Parameters { assumed, odometry_noise, .. } = &self.parameters;
+        let lasting = libm::hypot(assumed.scale, assumed.steering);
+        check.travel(motion, *slip, &WheelErrors { slip: odometry_noise.slip, lasting });
     }
 
     fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
@@ -620,8 +631,8 @@ impl<C: Capacities> Localizer<C> {
             by_features: distance.feature <= limits.dead_reckoning_from,
         };
         let outage = self.outage.map(|outage| outage.reason);
-        let turns = if self.gyro.is_some() { remark_on_turns(&self.integrity, timeline.now()) } else { None };
-        let (mode, reason) = supervise(self.lost, outage, turns, support, &self.integrity);
+        let motion = remark_on_motion(&self.integrity, self.gyro.is_some(), timeline.now());
+        let (mode, reason) = supervise(self.lost, outage, motion, support, &self.integrity);
         self.outputs.pose = PoseOutput {
             time: timeline.now(),
             pose: state.pose,

@@ -10,7 +10,7 @@ use nalgebra::Matrix3;
 use super::Parameters;
 use crate::filter::Ekf;
 use crate::integrity::separation::fault_free;
-use crate::measurement::{EncoderFaults, EncoderSample, GyroSample, Time, WheelSample};
+use crate::measurement::{EncoderFaults, EncoderSample, GyroSample, PoseIncrement, SpeedSample, Time, WheelSample};
 use crate::odometry::{GyroErrors, GyroTurns, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::state::{Mode, PoseOutput, ProtectionLevel, Reason};
 
@@ -97,6 +97,18 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
     /// The same of the encoders of several wheels.
     pub fn wheels(&mut self, sample: &WheelSample) {
         let motion = self.odometer.wheels(sample);
+        self.travel(motion);
+    }
+
+    /// The same of speed and steering angle.
+    pub fn speed(&mut self, sample: &SpeedSample) {
+        let motion = self.odometer.speed(sample);
+        self.travel(motion);
+    }
+
+    /// The same of a motion that the vehicle has integrated itself.
+    pub fn increment(&mut self, increment: &PoseIncrement) {
+        let motion = self.odometer.increment(increment);
         self.travel(motion);
     }
 

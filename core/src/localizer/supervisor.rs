@@ -13,19 +13,20 @@ pub(super) struct Support {
     pub by_features: bool,
 }
 
-/// What a gyro and the wheels say of each other, of a vehicle with a gyro.
-pub(super) fn remark_on_turns(integrity: &Integrity, now: Time) -> Option<Reason> {
+/// What a gyro, if there is one, and the wheels say of each other.
+pub(super) fn remark_on_motion(integrity: &Integrity, has_gyro: bool, now: Time) -> Option<Reason> {
     let turns = &integrity.turns;
-    let fault = turns.fault(now).map(|_| Reason::GyroFault);
-    fault.or_else(|| turns.slips(now).then_some(Reason::WheelsSlip))
+    let fault = if has_gyro { turns.fault(now).map(|_| Reason::GyroFault) } else { None };
+    let slips = integrity.redundancy.slips(now) || (has_gyro && turns.slips(now));
+    fault.or_else(|| slips.then_some(Reason::WheelsSlip))
 }
 
-/// The mode, and why it is so. `lost` and `outage` say why there is no pose, and why there is no odometry; `turns` is what gyro and
+/// The mode, and why it is so. `lost` and `outage` say why there is no pose, and why there is no odometry; `motion` is what gyro and
 /// wheels say of each other.
 pub(super) fn supervise(
     lost: Option<Reason>,
     outage: Option<Reason>,
-    turns: Option<Reason>,
+    motion: Option<Reason>,
     support: Support,
     integrity: &Integrity,
 ) -> (Mode, Reason) {
@@ -37,9 +38,9 @@ pub(super) fn supervise(
     }
     let suspect = integrity.suspect();
     let remark = if suspect == Some(Suspect::Odometry) { Reason::OdometryDisagrees } else { Reason::None };
-    let remark = turns.unwrap_or(remark);
+    let remark = motion.unwrap_or(remark);
     match (support.by_reflectors, support.by_features) {
-        (false, false) => (Mode::DeadReckoning, turns.unwrap_or(Reason::NoLandmarks)),
+        (false, false) => (Mode::DeadReckoning, motion.unwrap_or(Reason::NoLandmarks)),
         _ if suspect == Some(Suspect::Laser) => (Mode::Degraded, Reason::LaserMoved),
         _ if integrity.innovations.is_doubtful() => (Mode::Degraded, Reason::LandmarksRejected),
         (true, true) => (Mode::Mixed, remark),

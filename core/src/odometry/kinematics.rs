@@ -53,7 +53,8 @@ pub struct Step {
     pub distance: f64,
     /// Whether it went backward.
     pub is_backward: bool,
-    /// What redundant measurements say differently: root of the sum of squares over all wheels, m. Zero without redundancy.
+    /// What redundant measurements say differently: root of the sum of squares over all wheels, m; negative if the first wheel has
+    /// told too little. Zero without redundancy.
     pub slip: f64,
 }
 

@@ -109,6 +109,8 @@ pub enum VehicleOdometer {
     Increments(Odometer<Increments>),
     /// See [`super::WheelVehicle`].
     Wheels(Odometer<super::WheelVehicle>),
+    /// See [`super::TricycleSpeed`].
+    TricycleSpeed(Odometer<super::TricycleSpeed>),
 }
 
 impl VehicleOdometer {
@@ -120,6 +122,7 @@ impl VehicleOdometer {
             Vehicle::Ackermann(car) => Self::Ackermann(Odometer::new(*car, parameters)),
             Vehicle::Increments => Self::Increments(Odometer::new(Increments, parameters)),
             Vehicle::Wheels(vehicle) => Self::Wheels(Odometer::new(*vehicle, parameters)),
+            Vehicle::TricycleSpeed(tricycle) => Self::TricycleSpeed(Odometer::new(*tricycle, parameters)),
         }
     }
 
@@ -130,6 +133,7 @@ impl VehicleOdometer {
             Self::Ackermann(odometer) => odometer.restart(),
             Self::Increments(odometer) => odometer.restart(),
             Self::Wheels(odometer) => odometer.restart(),
+            Self::TricycleSpeed(odometer) => odometer.restart(),
         }
     }
 
@@ -151,6 +155,7 @@ impl VehicleOdometer {
     pub fn speed(&mut self, sample: &SpeedSample) -> Result<Motion, OdometryError> {
         match self {
             Self::Ackermann(odometer) => odometer.report(sample),
+            Self::TricycleSpeed(odometer) => odometer.report(sample),
             _ => Err(OdometryError::WrongVehicle),
         }
     }
@@ -160,8 +165,16 @@ impl VehicleOdometer {
     /// # Errors
     /// See [`Odometer::report`].
     pub fn wheels(&mut self, sample: &WheelSample) -> Result<Motion, OdometryError> {
+        self.wheels_with_slip(sample).map(|(motion, _)| motion)
+    }
+
+    /// The motion since the last sample of several wheels, and what redundant ones say differently of it.
+    ///
+    /// # Errors
+    /// See [`Odometer::report_with_slip`].
+    pub fn wheels_with_slip(&mut self, sample: &WheelSample) -> Result<(Motion, f64), OdometryError> {
         match self {
-            Self::Wheels(odometer) => odometer.report(sample),
+            Self::Wheels(odometer) => odometer.report_with_slip(sample),
             _ => Err(OdometryError::WrongVehicle),
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Ackermann, Increments, Kinematics, Tricycle, WheelVehicle};
+use super::{Ackermann, Increments, Kinematics, Tricycle, TricycleSpeed, WheelVehicle};
 
 /// How the vehicle moves and what it reports of that.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,6 +16,8 @@ pub enum Vehicle {
     Increments,
     /// Encoder counters of several wheels.
     Wheels(WheelVehicle),
+    /// Speed and steering angle of a steered driving wheel.
+    TricycleSpeed(TricycleSpeed),
 }
 
 impl Vehicle {
@@ -27,6 +29,7 @@ impl Vehicle {
             Self::Ackermann(car) => car.steering_lever(),
             Self::Increments => Increments.steering_lever(),
             Self::Wheels(vehicle) => vehicle.steering_lever(),
+            Self::TricycleSpeed(tricycle) => tricycle.steering_lever(),
         }
     }
 }

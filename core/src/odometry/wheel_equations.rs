@@ -72,7 +72,8 @@ pub struct Solution {
     pub spread: Matrix3<f64>,
     /// Squares of what does not fit, each over the square of its slip, m.
     pub misfit: f64,
-    /// What does not fit: root of the sum of squares over all wheels, m.
+    /// What does not fit: root of the sum of squares over all wheels, m; negative if the first wheel has told too
+    /// little.
     pub slip: f64,
     /// How many more equations there are than unknowns.
     pub redundancy: usize,
@@ -95,14 +96,17 @@ pub fn solve(wheels: &[Wheel], motions: &[WheelMotion], share: f64, noise: &Odom
     let spread = normal.try_inverse()?;
     let motion = spread * right;
     let (mut misfit, mut squares) = (0.0, 0.0);
+    let mut first = None;
     for equation in equations(wheels, motions, share, noise) {
         let rest = equation.distance - equation.row.dot(&motion);
+        first.get_or_insert(rest);
         misfit += equation.weight * rest * rest;
         squares += rest * rest;
     }
     let is_sound = motion.iter().chain(spread.iter()).all(|entry| entry.is_finite());
     let redundancy = count.saturating_sub(3);
-    is_sound.then_some(Solution { motion, spread, misfit, slip: libm::sqrt(squares), redundancy })
+    let slip = libm::copysign(libm::sqrt(squares), first.unwrap_or(0.0));
+    is_sound.then_some(Solution { motion, spread, misfit, slip, redundancy })
 }
 
 fn equations<'a>(

@@ -28,7 +28,12 @@ struct List(heapless::Vec<Wheel, MOST_WHEELS>);
 
 impl List {
     fn of(wheels: &[Wheel]) -> Self {
-        Self(wheels.iter().copied().take(MOST_WHEELS).collect())
+        let mut list = heapless::Vec::new();
+        for wheel in wheels {
+            // None of the vehicles has more than there is room for.
+            let _ = list.push(*wheel);
+        }
+        Self(list)
     }
 }
 

@@ -27,7 +27,7 @@ pub async fn run<F: NorFlash>(
 ) -> ! {
     let mut bus = Bus::new(settings, name, troubles, now());
     let mut nodes = bus.nodes();
-    port.listen_to(&nodes, bus.other_frames());
+    port.listen_to(&nodes, &bus.other_frames());
     let mut objects = SharedSettings { controller };
     let mut lost_events = exchange::lost_events();
     let mut ticker = Ticker::every(STEP);
@@ -67,7 +67,7 @@ pub async fn run<F: NorFlash>(
         // A master may have others watched.
         let wanted = bus.nodes();
         if wanted != nodes {
-            port.listen_to(&wanted, bus.other_frames());
+            port.listen_to(&wanted, &bus.other_frames());
             nodes = wanted;
         }
     }

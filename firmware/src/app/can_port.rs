@@ -19,7 +19,7 @@ pub enum BusChange {
 pub trait CanPort {
     /// Takes only the frames of these nodes and for them, those for all nodes, and those of the `other` identifier. Everything, if it
     /// cannot choose.
-    fn listen_to(&mut self, _nodes: &[NodeId], _other: Option<Id>) {}
+    fn listen_to(&mut self, _nodes: &[NodeId], _others: &[Id]) {}
 
     /// The next classic frame of others, and when its end was heard.
     fn receive(&mut self) -> impl Future<Output = (Frame, Time)>;

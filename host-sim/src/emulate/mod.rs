@@ -1,9 +1,11 @@
 //! Devices that are not there.
 
 pub mod board;
+pub mod drive;
 pub mod encoder;
 mod encoder_objects;
-pub mod encoder_pair;
 pub mod foreign_traffic;
 pub mod gyro;
+pub mod motion;
+pub mod own_controller;
 pub mod vehicle;

@@ -172,9 +172,8 @@ fn number(bytes: &ValueBytes) -> u64 {
 }
 
 fn describe_settings(text: &mut String, settings: &Settings) {
-    let defaults = Settings::default();
     for leaf in &LEAVES {
-        let Some(value) = leaf.get(settings).or_else(|| leaf.get(&defaults)) else { continue };
+        let value = leaf.value(settings);
         let name = if leaf.unit.is_empty() { leaf.name.to_owned() } else { format!("{} in {}", leaf.name, leaf.unit) };
         let default = match value {
             Value::Number(number) => number.to_string(),

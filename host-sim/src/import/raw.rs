@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::path::Path;
 
-use agv_controller::{self as controller, EncoderNodes, EncoderOutput, channels};
+use agv_controller::{self as controller, EncoderNodes, EncoderOutput, channels, counted};
 use agv_core::localizer::{Event, Parameters};
 use agv_core::measurement::Time;
 use agv_core::record::{Damage, Item, RAW_A_RECORD, Raw, RawSource, Record};
@@ -168,18 +168,17 @@ impl<'a> EventMaker<'a> {
     fn look(&mut self, time: Time, frame: Option<&Frame>, events: &mut Vec<RecordedEvent>) {
         let is_first = self.encoders.is_none();
         // Encoders that were switched on later were not missing before.
-        let is_of_encoder = |frame: &Frame| {
-            [self.nodes.drive, self.nodes.steering].iter().any(|node| frame.id() == transmit_pdo_id(*node, 1))
-        };
-        if is_first && self.bus == Bus::Overheard && !frame.is_some_and(is_of_encoder) {
+        let is_of_encoder =
+            |frame: &Frame| self.nodes.encoders.iter().any(|node| frame.id() == transmit_pdo_id(*node, 1));
+        // Whose own controller tells the motion is listened to in any case.
+        let tells_itself = self.nodes.motion_frames.is_some() && self.parameters.vehicle.counters().is_empty();
+        let bus = if tells_itself { Bus::Served } else { self.bus };
+        if is_first && bus == Bus::Overheard && !frame.is_some_and(is_of_encoder) {
             return;
         }
-        let encoders = self.encoders.get_or_insert_with(|| match self.bus {
+        let encoders = self.encoders.get_or_insert_with(|| match bus {
             Bus::Served => Encoders::Served(controller::Encoders::new(self.nodes, self.parameters, time)),
-            Bus::Overheard => {
-                let [drive, steering] = channels(self.nodes, self.parameters);
-                Encoders::Overheard(EncoderListener::new(&drive, &steering, time))
-            }
+            Bus::Overheard => Encoders::Overheard(EncoderListener::new(&channels(self.nodes, self.parameters), time)),
         });
         match encoders {
             // The first record says when the bus was opened.
@@ -193,7 +192,7 @@ impl<'a> EventMaker<'a> {
                 let Some(frame) = frame else { return };
                 let (faults, sample) = listener.hear(frame, time);
                 events.extend(faults.map(RecordedEvent::EncoderFaults));
-                events.extend(sample.map(RecordedEvent::Encoders));
+                events.extend(sample.map(|counts| keep(&counted(&self.parameters.vehicle, &counts).event())));
             }
         }
     }

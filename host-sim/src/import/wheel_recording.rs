@@ -119,7 +119,7 @@ impl Row<'_> {
                 let steering = steering_range.wrap(ticks(motion.steering_end, *steering_scale));
                 RecordedEvent::Encoders(EncoderSample { time: self.time, drive, steering })
             }
-            Vehicle::Ackermann(_) => {
+            Vehicle::Ackermann(_) | Vehicle::TricycleSpeed(_) => {
                 let way = motion.turn * radius()?;
                 let speed = if self.duration > 0.0 { way / self.duration } else { 0.0 };
                 RecordedEvent::Speed(SpeedSample { time: self.time, speed, steering: motion.steering_end })

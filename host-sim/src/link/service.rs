@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use agv_core::geometry::Pose;
 use agv_core::maps::Landmark;
-use agv_settings::leaf::Value;
+use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, PROTOCOL, Refusal, Request, Response, encode};
 use agv_settings::store::{KEY, PIECE};
@@ -55,16 +55,23 @@ pub enum ServiceError {
     /// It refuses.
     #[error("{}", explain(*.0))]
     Refused(Refusal),
+    /// Its vehicle is of a kind that has no such setting.
+    #[error("the vehicle has no such setting: vehicle.kind says that it is of another kind")]
+    OtherKind,
     /// A change without a key.
     #[error("changing something needs the controller's key; state --key FILE")]
     NoKey,
 }
 
-fn explain(refusal: Refusal) -> &'static str {
-    match refusal {
+fn explain(refusal: Refusal) -> String {
+    let text = match refusal {
         Refusal::Name => "there is no setting of that name; agv ctl HOST list shows them",
         Refusal::Kind => "the setting holds another kind of value",
         Refusal::Bounds => "the value is out of bounds",
+        Refusal::Other(key) => {
+            let name = Leaf::keyed(key).map_or("another setting", |leaf| leaf.name);
+            return format!("{name} does not go with the value; it is to be changed first");
+        }
         Refusal::Moving => "the vehicle moves; it must stand for a second before it is changed",
         Refusal::Tag => "the key is not that of the controller",
         Refusal::NoKey => "no key was provisioned on the controller, so nobody may change it",
@@ -76,7 +83,8 @@ fn explain(refusal: Refusal) -> &'static str {
         Refusal::Store(agv_settings::store::StoreError::Full) => "the flash is full",
         Refusal::Store(agv_settings::store::StoreError::Map) => "the map is too large, or was not sent as a whole",
         Refusal::Store(agv_settings::store::StoreError::Flash) => "the flash does not work",
-    }
+    };
+    text.to_owned()
 }
 
 /// A setting.
@@ -213,17 +221,19 @@ impl Client {
     /// A setting.
     ///
     /// # Errors
-    /// If there is none of that name.
+    /// If there is none of that name, or none for the kind of the vehicle.
     pub fn get(&mut self, name: &str) -> Result<Setting, ServiceError> {
-        self.ask(&Request::Get(name), |response| match response {
+        let setting = self.ask(&Request::Get(name), |response| match response {
             Response::Leaf { name, unit, value } => {
-                Some(Setting { name: (*name).to_owned(), unit: (*unit).to_owned(), value: *value })
+                Some(Some(Setting { name: (*name).to_owned(), unit: (*unit).to_owned(), value: *value }))
             }
+            Response::NoLeaf => Some(None),
             _ => None,
-        })
+        })?;
+        setting.ok_or(ServiceError::OtherKind)
     }
 
-    /// All settings.
+    /// All settings that matter for the kind of the vehicle.
     ///
     /// # Errors
     /// If it does not answer.

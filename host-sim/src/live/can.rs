@@ -20,7 +20,7 @@ use crate::log::LogError;
 pub struct CanSummary {
     /// Frames of others.
     pub frames: usize,
-    /// Samples of both encoders.
+    /// Samples of the encoders, or reports of the vehicle's own controller.
     pub samples: usize,
     /// Times at which a fault began or ended.
     pub fault_changes: usize,
@@ -118,7 +118,11 @@ impl Recording<'_> {
                 }
                 EncoderOutput::Event(event) => event,
             };
-            summary.samples += usize::from(matches!(event, BusEvent::Encoders(_)));
+            let is_sample = matches!(
+                event,
+                BusEvent::Encoders(_) | BusEvent::Wheels(_) | BusEvent::Speed(_) | BusEvent::Increment(_)
+            );
+            summary.samples += usize::from(is_sample);
             if let BusEvent::EncoderFaults(found) = event
                 && [found.drive, found.steering] != *faults
             {

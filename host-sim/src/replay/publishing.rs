@@ -58,6 +58,14 @@ impl<'a> Publisher<'a> {
                 self.take_answer(event, behind);
                 self.predictor.wheels(&sample);
             }
+            Event::Speed(sample) => {
+                self.take_answer(event, behind);
+                self.predictor.speed(&sample);
+            }
+            Event::Increment(increment) => {
+                self.take_answer(event, behind);
+                self.predictor.increment(&increment);
+            }
             Event::Gyro(sample) => {
                 self.take_answer(event, behind);
                 self.predictor.gyro(&sample);

@@ -30,6 +30,7 @@ use agv_core::odometry::{Ackermann, Tricycle, Wheel, WheelBased};
 
 use crate::recording::{RecordedEvent, Recording, Truth};
 use laser::{LaserTrack, Revolution, Scene};
+use odometer::SpeedWheel;
 use path::Path;
 use random::{Random, Stream};
 use raycast::RayCaster;
@@ -204,14 +205,22 @@ fn report_motion(
                 arrivals.add(sample.time, RecordedEvent::Encoders(told));
             }
         }
-        MotionReport::Speed => {
-            let car =
-                Ackermann { wheelbase: tricycle.wheelbase, encoder_offset: scenario.vehicle.believed.encoder_offset };
-            for sample in odometer::speeds(motion, &car, scale, offset_error, options, START, random) {
+        MotionReport::Speed | MotionReport::TricycleSpeed => {
+            let encoder_offset = scenario.vehicle.believed.encoder_offset;
+            let wheel = match scenario.vehicle.reports {
+                MotionReport::Speed => SpeedWheel::Rear(Ackermann { wheelbase: tricycle.wheelbase, encoder_offset }),
+                _ => SpeedWheel::Steered,
+            };
+            for sample in odometer::speeds(motion, &wheel, scale, offset_error, options, START, random) {
                 arrivals.add(sample.time, RecordedEvent::Speed(sample));
             }
         }
-        MotionReport::Differential | MotionReport::BiSteerable | MotionReport::Omnidirectional => {
+        MotionReport::Differential
+        | MotionReport::BiSteerable
+        | MotionReport::Ackermann
+        | MotionReport::ThreeOmnidirectional
+        | MotionReport::Omnidirectional
+        | MotionReport::Mecanum => {
             let wheels = true_wheels(scenario);
             for sample in wheels::samples(motion, &wheels, tricycle.wheelbase, options, START, random) {
                 arrivals.add(sample.time, RecordedEvent::Wheels(sample));

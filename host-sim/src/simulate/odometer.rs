@@ -82,13 +82,34 @@ impl LegErrors {
     }
 }
 
-/// Speed of the rear wheel and steering angle of a car whose virtual front wheel is the tricycle's wheel. A sample tells
-/// the mean speed since the one before; `speed_scale` is the true way over the reported one and `steering_offset` (rad)
+/// The wheel whose speed is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SpeedWheel {
+    /// The driving wheel of a tricycle.
+    Steered,
+    /// A rear wheel of a car whose virtual front wheel is the tricycle's wheel.
+    Rear(Ackermann),
+}
+
+impl SpeedWheel {
+    /// How far it goes while the driving wheel goes `way` (m) at a steering angle (rad).
+    fn way(&self, way: f64, steering: f64) -> f64 {
+        match self {
+            Self::Steered => way,
+            Self::Rear(car) => {
+                let centre_way = way * libm::cos(steering);
+                centre_way - centre_way * libm::tan(steering) / car.wheelbase * car.encoder_offset
+            }
+        }
+    }
+}
+
+/// Speed of a wheel and steering angle. A sample tells the mean speed since the one before; `speed_scale` is the true way over the reported one and `steering_offset` (rad)
 /// is what is missing in the reported angle.
 #[must_use]
 pub fn speeds(
     motion: &Motion,
-    car: &Ackermann,
+    wheel: &SpeedWheel,
     speed_scale: f64,
     steering_offset: f64,
     options: &OdometryOptions,
@@ -101,10 +122,9 @@ pub fn speeds(
     for (index, state) in motion.states.iter().enumerate() {
         let before = previous.replace(*state).unwrap_or(*state);
         let mean_steering = 0.5 * (before.steering + state.steering);
-        let centre_way = (state.wheel_way - before.wheel_way) * libm::cos(mean_steering);
-        let rotation = centre_way * libm::tan(mean_steering) / car.wheelbase;
-        let rear_wheel_way = centre_way - rotation * car.encoder_offset;
-        let counted = rear_wheel_way + options.slip * libm::sqrt(rear_wheel_way.abs()) * random.normal();
+        let way = wheel.way(state.wheel_way - before.wheel_way, mean_steering);
+        let slip = options.slip_of(0, index as f64 * motion.interval);
+        let counted = way * (1.0 + slip) + options.slip * libm::sqrt(way.abs()) * random.normal();
         samples.push(SpeedSample {
             time: start.offset(index as f64 * motion.interval),
             speed: counted / speed_scale / motion.interval,

@@ -1,21 +1,20 @@
 //! A vehicle with everything on it, in simulated time: sensors that see a simulated drive, lines with faults, and the
 //! controller.
 
-use agv_controller::{Controller, LaserOrder};
+use agv_controller::{Controller, EncoderNodes, LaserOrder};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Localizer, PoseFix};
 use agv_core::maps::MapError;
 use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
 use agv_settings::Settings;
-use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller::{PoseReceiver, PublishedPose};
 use agv_wire::can::frame::Frame;
 use agv_wire::nav350::SensorFrame;
 
 use super::fault::{Fault, FaultKind, Line};
-use agv_host_sim::emulate::encoder_pair::{EmulatedPair, PairError};
 use agv_host_sim::emulate::gyro::EmulatedGyro;
+use agv_host_sim::emulate::motion::{EmulatedMotion, MotionError};
 use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
 use agv_host_sim::serve::nav350::{Connection, Drive, DriveError, Sensor, SensorClockOptions};
 use agv_host_sim::simulate::START;
@@ -27,9 +26,9 @@ pub enum RigError {
     /// The laser has nothing to see.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// The vehicle has no encoders.
+    /// Nothing tells how the vehicle moves.
     #[error(transparent)]
-    Pair(#[from] PairError),
+    Motion(#[from] MotionError),
     /// The map does not fit.
     #[error("the map has more reflectors than the controller has room for, or one that is not finite")]
     Map(MapError),
@@ -79,7 +78,7 @@ struct Rig<'a> {
     faults: &'a [&'a Fault],
     /// None while the power is cut.
     controller: Option<Box<Controller>>,
-    pair: EmulatedPair,
+    motion: EmulatedMotion,
     gyro: Option<EmulatedGyro>,
     sensor: Sensor,
     connection: Option<Connection>,
@@ -159,18 +158,16 @@ pub fn drive_listening(
 impl<'a> Rig<'a> {
     fn new(recording: &'a Recording, faults: &'a [&'a Fault], seed: u64) -> Result<Self, RigError> {
         let settings = Settings::of(recording.parameters);
-        let node = |number| NodeId::new(number).ok_or(RigError::Pair(PairError::NoEncoders));
-        let pair =
-            EmulatedPair::new(recording, node(settings.nodes.drive)?, node(settings.nodes.steering)?)?.standing();
+        let nodes = EncoderNodes::of(&settings);
+        let motion = EmulatedMotion::new(recording, &nodes)?.standing();
         let drive = Drive::new(recording, SensorFrame::default())?;
-        let receiver = PoseReceiver::new(node(settings.nodes.controller)?);
+        let receiver = PoseReceiver::new(nodes.controller);
         let mut rig = Self {
             recording,
             faults,
-
             controller: None,
             gyro: EmulatedGyro::of(recording, &settings.gyro_frame),
-            pair,
+            motion,
             sensor: Sensor::new(drive, clock(faults), None, true),
             connection: None,
             from_laser: Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams)),
@@ -194,7 +191,7 @@ impl<'a> Rig<'a> {
 
     /// Lets the vehicle drive off.
     fn begin(&mut self, now: Time, is_told: bool, listen: &mut impl FnMut(Time, Given)) {
-        self.pair.begin(now);
+        self.motion.begin(now);
         if let Some(gyro) = &mut self.gyro {
             gyro.begin(now);
         }
@@ -249,12 +246,12 @@ impl<'a> Rig<'a> {
             // What answers a frame is no pose.
             controller.hear_bus(&frame, now, |_| (), |_| ());
         }
-        let Self { receiver, published, pair, from_bus, faults, .. } = self;
+        let Self { receiver, published, motion, from_bus, faults, .. } = self;
         let answer = |frame: &Frame| {
             if let Some(pose) = receiver.handle(frame) {
                 *published = Some((pose, stated(&pose, now)));
             }
-            for answer in pair.handle(frame) {
+            for answer in motion.handle(frame) {
                 from_bus.send_frame(now, time, answer, faults);
             }
         };
@@ -302,7 +299,7 @@ impl<'a> Rig<'a> {
                 self.from_laser.send_telegram(now, time, answer, self.faults);
             }
         }
-        for frame in self.pair.poll(now).into_iter().chain(self.gyro.iter_mut().flat_map(|gyro| gyro.poll(now))) {
+        for frame in self.motion.poll(now).into_iter().chain(self.gyro.iter_mut().flat_map(|gyro| gyro.poll(now))) {
             self.from_bus.send_frame(now, time, frame, self.faults);
         }
     }

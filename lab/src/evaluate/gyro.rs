@@ -8,17 +8,20 @@
 //! - the 95 % mark: the smallest value that 95 % of all drives do not exceed; no drive is left out;
 //! - told: the first pose on the bus with the reason [`Reason::WheelsSlip`] after the slip began; its way is that of the truth.
 
+use std::ops::Range;
+
 use agv_core::geometry::{Pose, difference};
 use agv_core::state::Reason;
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::scenario::{
-    GyroOptions, MotionReport, PathKind, PathOptions, PoseOptions, ReflectorShape, Scenario, Shapes, Slip, WorldOptions,
+    PathKind, PathOptions, PoseOptions, ReflectorShape, Scenario, Shapes, Slip, WorldOptions,
 };
 use agv_host_sim::simulate::{SimulateError, simulate};
 use serde::Serialize;
 
 use crate::campaign::fault::{Fault, FaultKind};
 use crate::campaign::rig::{self, RigError, RigOptions};
+use crate::equipment::{Equipment, VehicleKind};
 
 /// Way without landmarks, m.
 const WAY: f64 = 12.0;
@@ -60,14 +63,16 @@ pub enum Way {
     Curve,
 }
 
-/// The vehicle.
+/// What can show a slip, beside redundant wheels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum VehicleKind {
-    /// One wheel that steers and drives.
-    Tricycle,
-    /// Two driven wheels side by side.
-    Differential,
+pub enum ShownBy {
+    /// A gyro; the laser is silent.
+    Gyro,
+    /// The reflectors around; there is no gyro.
+    Reflectors,
+    /// Nothing: the laser is silent, and there is no gyro.
+    Nothing,
 }
 
 /// What was measured of one kind of drive.
@@ -104,6 +109,8 @@ pub struct SlipRow {
     pub vehicle: VehicleKind,
     /// Where the wheel slips.
     pub way: Way,
+    /// What can show it beside the wheels.
+    pub shown_by: ShownBy,
     /// Drives.
     pub drives: usize,
     /// Those in which the slip was told.
@@ -149,26 +156,41 @@ pub fn run(drives: u32, seed: u64, mut step: impl FnMut()) -> Result<GyroOutcome
             }
             headings.push(heading_row(kind, &found));
         }
-        for way in WAYS {
-            let mut row =
-                SlipRow { vehicle, way, drives: 0, told: 0, longest_m: 0.0, worst_seed: seed, beyond_level: 0 };
-            for seed in seeds.clone() {
-                let (told, is_beyond) = slipping_drive(vehicle, way, seed)?;
-                row.drives += 1;
-                row.told += usize::from(told.is_some());
-                row.beyond_level += usize::from(is_beyond);
-                if let Some(way) = told.filter(|way| *way > row.longest_m) {
-                    (row.longest_m, row.worst_seed) = (way, seed);
-                }
-                step();
-            }
-            slips.push(row);
+        for (way, shown_by) in slips_of() {
+            slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &mut step)?);
         }
     }
     Ok(GyroOutcome { headings, slips })
 }
 
-const VEHICLES: [VehicleKind; 2] = [VehicleKind::Tricycle, VehicleKind::Differential];
+/// Lets a wheel of a vehicle slip on drives with those seeds. `step` is called after each drive.
+///
+/// # Errors
+/// See [`GyroError`].
+pub fn slip_row(
+    vehicle: VehicleKind,
+    way: Way,
+    shown_by: ShownBy,
+    seeds: Range<u64>,
+    mut step: impl FnMut(),
+) -> Result<SlipRow, GyroError> {
+    let (mut drives, mut told, mut beyond_level) = (0, 0, 0);
+    let (mut longest_m, mut worst_seed) = (0.0, seeds.start);
+    for seed in seeds {
+        let (after, is_beyond) = slipping_drive(vehicle, way, shown_by, seed)?;
+        drives += 1;
+        told += usize::from(after.is_some());
+        beyond_level += usize::from(is_beyond);
+        if let Some(after) = after.filter(|after| *after > longest_m) {
+            (longest_m, worst_seed) = (after, seed);
+        }
+        step();
+    }
+    Ok(SlipRow { vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level })
+}
+
+const VEHICLES: [VehicleKind; 4] =
+    [VehicleKind::Tricycle, VehicleKind::Differential, VehicleKind::BiSteerable, VehicleKind::Omni4];
 const WAYS: [Way; 2] = [Way::Straight, Way::Curve];
 
 /// One kind of drive.
@@ -186,10 +208,15 @@ fn kinds() -> impl Iterator<Item = (Before, Way, bool)> {
         .flat_map(|before| WAYS.into_iter().flat_map(move |way| [true, false].map(|has_gyro| (before, way, has_gyro))))
 }
 
+fn slips_of() -> impl Iterator<Item = (Way, ShownBy)> {
+    let shown = [ShownBy::Gyro, ShownBy::Reflectors, ShownBy::Nothing];
+    WAYS.into_iter().flat_map(move |way| shown.map(|shown_by| (way, shown_by)))
+}
+
 /// How many drives [`run`] makes.
 #[must_use]
 pub fn drives(of_each: u32) -> u64 {
-    let of_vehicle = kinds().count() + WAYS.len();
+    let of_vehicle = kinds().count() + slips_of().count();
     (VEHICLES.len() * of_vehicle) as u64 * u64::from(of_each)
 }
 
@@ -226,10 +253,6 @@ fn segment(length: f64, curvature: f64) -> PathSegment {
 fn scenario(kind: Kind, seed: u64) -> Scenario {
     let Kind { vehicle, before, way, has_gyro } = kind;
     let mut scenario = Scenario { seed, ..Scenario::default() };
-    scenario.vehicle.reports = match vehicle {
-        VehicleKind::Tricycle => MotionReport::Encoders,
-        VehicleKind::Differential => MotionReport::Differential,
-    };
     let place = |number: u32| {
         // No two of them are as far apart as two others.
         let along = f64::from(number) * 3.1 + f64::from(number * number % 7) * 0.23;
@@ -274,7 +297,7 @@ fn scenario(kind: Kind, seed: u64) -> Scenario {
         start: PoseOptions { x: 0.0, y: -1.0, heading_deg: 0.0 },
         legs: vec![Leg { direction: Direction::Forward, segments }],
     };
-    scenario.gyro = GyroOptions { fitted: has_gyro, ..GyroOptions::default() };
+    Equipment { vehicle, gyro: has_gyro }.apply(&mut scenario);
     scenario
 }
 
@@ -325,8 +348,14 @@ fn blind_drive(kind: Kind, seed: u64) -> Result<Drive, GyroError> {
 }
 
 /// The way until the slip was told, and whether the pose was beyond its protection level meanwhile.
-fn slipping_drive(vehicle: VehicleKind, way: Way, seed: u64) -> Result<(Option<f64>, bool), GyroError> {
-    let mut scenario = scenario(Kind { vehicle, before: Before::Stands, way, has_gyro: true }, seed);
+fn slipping_drive(
+    vehicle: VehicleKind,
+    way: Way,
+    shown_by: ShownBy,
+    seed: u64,
+) -> Result<(Option<f64>, bool), GyroError> {
+    let has_gyro = shown_by == ShownBy::Gyro;
+    let mut scenario = scenario(Kind { vehicle, before: Before::Stands, way, has_gyro }, seed);
     // In the middle of the curve or of the line.
     let lead = 0.5 * scenario.drive.speed / scenario.drive.acceleration;
     let from = BEFORE + lead + 7.5 / scenario.drive.speed;
@@ -334,10 +363,11 @@ fn slipping_drive(vehicle: VehicleKind, way: Way, seed: u64) -> Result<(Option<f
     let (_, end) = times(&scenario, Before::Stands);
     let simulation = simulate(&scenario)?;
     let silence = silence_from(BEFORE + lead + 1.0);
+    let faults = if shown_by == ShownBy::Reflectors { &[][..] } else { &[&silence] };
     let options = RigOptions { seconds: end.min(from + 3.0), seed, is_told: true };
     let (mut begun, mut told, mut is_beyond) = (None::<Pose>, None, false);
     let (mut driven, mut last) = (0.0, None::<Pose>);
-    rig::drive(&simulation.recording, &[&silence], &options, |heard| {
+    rig::drive(&simulation.recording, faults, &options, |heard| {
         let Some(output) = heard.output.filter(|_| heard.time >= from) else { return };
         let Some(truth) = (heard.truth)(output.time) else { return };
         begun.get_or_insert(truth);

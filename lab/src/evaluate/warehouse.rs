@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::warehouse_disturbance::Disturbance;
+use crate::equipment::Equipment;
 use agv_host_sim::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, PoseError, Spread, pose_error};
 use agv_host_sim::mapping::{Clustering, map_features};
 use agv_host_sim::replay::{ReplayError, replay};
@@ -140,6 +141,9 @@ pub struct Experiment {
     pub map: Map,
     /// In what the drive differs from the standard one.
     pub disturbance: Disturbance,
+    /// The vehicle.
+    #[serde(flatten)]
+    pub equipment: Equipment,
     /// Length of the way, m.
     pub path_m: f64,
     /// Number of runs.
@@ -193,14 +197,14 @@ struct Run {
 pub fn experiment(
     (path_name, path): (&str, BlockStoragePath),
     method: &Method,
-    disturbance: Disturbance,
+    (disturbance, equipment): (Disturbance, Equipment),
     seeds: Range<u64>,
     done: impl Fn() + Sync,
 ) -> Result<Experiment, WarehouseError> {
     let results: Vec<Run> = seeds
         .into_par_iter()
         .map(|seed| {
-            let run = run(path, method, disturbance, seed);
+            let run = run(path, method, disturbance, equipment, seed);
             done();
             run
         })
@@ -213,6 +217,7 @@ pub fn experiment(
         name: format!("{path_name} {}", method.name),
         map: method.map,
         disturbance,
+        equipment,
         path_m: sum(|run| run.path) / runs,
         runs: results.len(),
         ok_share: results.iter().filter(is_ok).count() as f64 / runs,
@@ -233,9 +238,12 @@ pub fn prepare(
     path: BlockStoragePath,
     method: &Method,
     disturbance: Disturbance,
+    equipment: Equipment,
     seed: u64,
 ) -> Result<Simulation, WarehouseError> {
-    let mut simulation = simulate(&scenario(path, method.map, disturbance, seed, seed))?;
+    let mut drive = scenario(path, method.map, disturbance, seed, seed);
+    equipment.apply(&mut drive);
+    let mut simulation = simulate(&drive)?;
     let recording = &mut simulation.recording;
     recording.parameters.features.detector = method.detector;
     recording.parameters.features.added_deviation = method.added_deviation;
@@ -251,13 +259,14 @@ pub fn prepare(
     }
     recording.parameters.sources = Switches { key_scans: method.map.has_key_scans(), ..method.sources };
     if method.map.has_static_features() {
-        let mapping = scenario(
+        let mut mapping = scenario(
             BlockStoragePath::Mapping,
             method.map,
             disturbance.of_the_mapping_drive(),
             seed,
             seed ^ MAPPING_SEED_BIT,
         );
+        equipment.apply(&mut mapping);
         let mut mapping = simulate(&mapping)?.recording;
         mapping.parameters.features.detector = method.detector;
         mapping.landmarks.clone_from(&recording.landmarks);
@@ -278,8 +287,14 @@ fn scenario(path: BlockStoragePath, map: Map, disturbance: Disturbance, world_se
     scenario
 }
 
-fn run(path: BlockStoragePath, method: &Method, disturbance: Disturbance, seed: u64) -> Result<Run, WarehouseError> {
-    let simulation = prepare(path, method, disturbance, seed)?;
+fn run(
+    path: BlockStoragePath,
+    method: &Method,
+    disturbance: Disturbance,
+    equipment: Equipment,
+    seed: u64,
+) -> Result<Run, WarehouseError> {
+    let simulation = prepare(path, method, disturbance, equipment, seed)?;
     let recording = &simulation.recording;
     let replay = replay(recording, |_| {})?;
     let last = replay.poses.iter().rev().find_map(|pose| pose_error(pose, &recording.truth));

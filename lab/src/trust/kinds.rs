@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use agv_core::odometry::Vehicle;
 use agv_host_sim::simulate::random::Random;
 use agv_host_sim::simulate::scenario::{Carry, Knock, toml_complaint};
 use agv_host_sim::simulate::standard;
@@ -239,6 +240,13 @@ impl Kind {
             return Ok(Drawn::Nothing);
         }
         Ok(Drawn::Fault(Fault { name: self.name.clone(), from, until, what, can_recover: until.is_some() }))
+    }
+
+    /// Whether a vehicle can have it.
+    #[must_use]
+    pub fn is_possible(&self, vehicle: &Vehicle) -> bool {
+        let fault = self.every_size().first().and_then(|size| self.at(*size, 0.0).ok());
+        !matches!(fault, Some(Drawn::Fault(fault)) if !fault.what.is_possible(vehicle))
     }
 
     /// When the fault of a run begins, s after the vehicle drives off, in a drive of that many seconds in which the vehicle

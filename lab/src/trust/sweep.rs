@@ -12,6 +12,7 @@ use super::pair;
 use super::row::{Row, by_size, worst_size};
 use super::trial::Trial;
 use crate::campaign::{CampaignError, Shard};
+use crate::equipment::Equipment;
 
 /// Between the seeds of the sweep and those of the worst sizes.
 pub const OTHER_SEEDS: u64 = 50_000;
@@ -65,7 +66,7 @@ pub fn worst<'a>(kinds: &'a [Kind], rows: &[Row], runs: u64, first_seed: u64) ->
     kinds.iter().flat_map(of_kind).collect()
 }
 
-/// Makes those runs that are in a shard, on all cores, and returns them in order. `settings` changes what the controller believes from
+/// Makes those runs that are in a shard with that vehicle, on all cores, and returns them in order. `settings` changes what the controller believes from
 /// its defaults, and `done` is called after each run.
 ///
 /// # Errors
@@ -73,6 +74,7 @@ pub fn worst<'a>(kinds: &'a [Kind], rows: &[Row], runs: u64, first_seed: u64) ->
 pub fn run(
     trials: &[Trial],
     shard: Shard,
+    equipment: Equipment,
     settings: &(dyn Fn(&mut Parameters) + Sync),
     done: impl Fn() + Sync,
 ) -> Result<Vec<Row>, CampaignError> {
@@ -81,7 +83,7 @@ pub fn run(
     of_shard
         .into_par_iter()
         .map(|trial| {
-            let tried = catch_unwind(AssertUnwindSafe(|| trial.run(settings))).ok().transpose()?;
+            let tried = catch_unwind(AssertUnwindSafe(|| trial.run(equipment, settings))).ok().transpose()?;
             done();
             Ok(Row {
                 kind: trial.kind.name.clone(),

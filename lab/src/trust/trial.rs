@@ -15,6 +15,7 @@ use super::sight::Sight;
 use crate::campaign::CampaignError;
 use crate::campaign::fault::{Fault, simulate_with};
 use crate::campaign::rig::{self, RigOptions};
+use crate::equipment::Equipment;
 
 /// What one run is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,12 +47,17 @@ impl Trial<'_> {
         [(self.kind, self.size)].into_iter().chain(self.with)
     }
 
-    /// Makes the run; `settings` changes what the controller believes from its defaults.
+    /// Makes the run with that vehicle; `settings` changes what the controller believes from its defaults.
     ///
     /// # Errors
     /// See [`CampaignError`].
-    pub fn run(&self, settings: &(dyn Fn(&mut Parameters) + Sync)) -> Result<Tried, CampaignError> {
+    pub fn run(
+        &self,
+        equipment: Equipment,
+        settings: &(dyn Fn(&mut Parameters) + Sync),
+    ) -> Result<Tried, CampaignError> {
         let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
+        equipment.apply(&mut scenario);
         let mut random = Random::new(self.seed, Stream::Faults);
         let timetable = Timetable::of(&scenario)?;
         let seconds = timetable.seconds;

@@ -86,7 +86,7 @@ pub enum Response<'a> {
         /// What it is set to.
         value: Value,
     },
-    /// The vehicle has no such setting, but the list goes on.
+    /// The setting does not matter for the kind of the vehicle, but the list goes on.
     NoLeaf,
     /// The list of settings ends before that place.
     End,
@@ -126,4 +126,6 @@ pub enum Refusal {
     Store(StoreError),
     /// The CAN bus would be loaded by more than 60 % of its bit rate.
     BusLoad,
+    /// With the value the setting of that key is out of its bounds, or does not go with the others.
+    Other(u16),
 }

@@ -204,6 +204,7 @@ fn perform<F: NorFlash>(
                 LeafError::Kind => Refusal::Kind,
                 LeafError::Bounds => Refusal::Bounds,
                 LeafError::BusLoad => Refusal::BusLoad,
+                LeafError::Other(key) => Refusal::Other(key),
             })?;
             return Ok(Action::None);
         }

@@ -3,7 +3,7 @@
 
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_settings::store::{LANDMARKS, Loaded, Store};
-use agv_settings::{LEAVES, Settings};
+use agv_settings::{LEAVES, Settings, VehicleKind};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
@@ -139,7 +139,17 @@ pub fn changed(share: f64) -> Settings {
         let (least, most) = leaf.bounds;
         // Settings of any two shares go together.
         let share = if leaf.name == "features.nearest" { 0.1 * share } else { share };
-        let value = match leaf.get(&settings).unwrap() {
+        let near = |first: f64| Value::Whole((first + 8.0 * share) as u64);
+        let value = match leaf.value(&settings) {
+            Value::Whole(_) if leaf.name == "vehicle.kind" => {
+                Value::Whole(if share < 0.5 { VehicleKind::Differential } else { VehicleKind::Mecanum } as u64)
+            }
+            // No two nodes are the same.
+            Value::Whole(_) if leaf.name == "can.controller_node" => near(30.0),
+            Value::Whole(_) if leaf.name == "can.drive_node" => near(40.0),
+            Value::Whole(_) if leaf.name == "can.steering_node" => near(50.0),
+            Value::Whole(_) if leaf.name == "can.third_node" => near(60.0),
+            Value::Whole(_) if leaf.name == "can.fourth_node" => near(70.0),
             // There are five bit rates, and on the lower ones there is no room for everything.
             Value::Whole(_) if leaf.name == "can.bit_rate" => Value::Whole(if share < 0.5 { 800 } else { 1000 }),
             Value::Whole(_) if leaf.name.ends_with("_profile") => Value::Whole(402),

@@ -57,17 +57,8 @@ impl GyroFrame {
     /// The other axes tell nothing. None if the rate has no place in a frame.
     #[must_use]
     pub fn encode(&self, rate: f64) -> Option<Frame> {
-        let signal = self.signal().signal;
-        let (first, length) = (usize::from(signal.first_byte), usize::from(signal.length));
-        if length == 0 || length > 8 {
-            return None;
-        }
-        let most = ((1_i64 << (8 * length - 1)) - 1) as f64;
-        let steps = libm::round(rate / self.unit).clamp(-most, most) as i64;
         let mut data = [0; super::frame::CLASSIC_LENGTH];
-        for (to, from) in data.get_mut(first..first.checked_add(length)?)?.iter_mut().zip(steps.to_le_bytes()) {
-            *to = from;
-        }
+        self.signal().signal.put(rate, &mut data)?;
         Frame::new(self.id(), &data)
     }
 }

@@ -9,8 +9,8 @@
 //! | one CiA 406 encoder and its states | [`encoder`] |
 //! | drives of CiA 402 as encoders | [`drive_402`] |
 //! | is the encoder to be believed | [`plausibility`] |
-//! | two encoders as one measurement | [`encoder_pair`] |
-//! | numbers in frames of unknown makers | [`signal`], [`drive_unit`], [`gyro`] |
+//! | the encoders of a vehicle as one measurement | [`encoder_group`] |
+//! | numbers in frames of unknown makers | [`signal`], [`drive_unit`], [`motion_frames`], [`gyro`] |
 //! | what the controller says and hears | [`controller`] |
 //! | the controller as a node, with its objects | [`controller_node`] |
 //!
@@ -26,9 +26,10 @@ pub mod drive_402;
 pub mod drive_unit;
 pub mod emcy;
 pub mod encoder;
-pub mod encoder_pair;
+pub mod encoder_group;
 pub mod frame;
 pub mod gyro;
+pub mod motion_frames;
 pub mod nmt;
 pub mod pdo;
 pub mod plausibility;

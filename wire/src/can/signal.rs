@@ -52,4 +52,27 @@ impl Signal {
         let number = if self.is_signed { raw as f64 } else { raw as u64 as f64 };
         Some(number * self.scale + self.offset)
     }
+
+    /// Puts the value into the data, as nearly as its steps tell it; the largest or least that they can if it is beyond.
+    /// None if it has no place there.
+    pub fn put(&self, value: f64, data: &mut [u8]) -> Option<()> {
+        let length = usize::from(self.length);
+        let first = usize::from(self.first_byte);
+        let bytes = data.get_mut(first..first + length)?;
+        if bytes.is_empty() || bytes.len() > 8 {
+            return None;
+        }
+        let bits = 8 * u32::from(self.length);
+        // As many as a number of 64 bits holds without rounding up.
+        let most = if self.is_signed { i64::MAX >> (64 - bits) } else { (u64::MAX >> (64 - bits).max(1)) as i64 };
+        let least = if self.is_signed { -most } else { 0 };
+        let steps = libm::round((value - self.offset) / self.scale) as i64;
+        let number = steps.clamp(least, most).to_le_bytes();
+        let places = number.iter().take(length);
+        match self.order {
+            ByteOrder::LittleEndian => bytes.iter_mut().zip(places).for_each(|(to, from)| *to = *from),
+            ByteOrder::BigEndian => bytes.iter_mut().rev().zip(places).for_each(|(to, from)| *to = *from),
+        }
+        Some(())
+    }
 }

@@ -77,8 +77,8 @@ fn table(dbc: &str) -> String {
             words[0].clone_into(&mut id);
             let number: u32 = words[0].parse().unwrap();
             let who = if words[3] == "AGV" { "said by the controller" } else { "heard by the controller" };
-            // A gyro is no node that the settings number.
-            let place = if words[3] == "Gyro" {
+            // Neither a gyro nor the vehicle's own controller is a node that the settings number.
+            let place = if matches!(words[3], "Gyro" | "Vehicle") {
                 format!("({number:03X}h)")
             } else {
                 format!("({number:03X}h = {:03X}h + node)", number - 16)

@@ -71,16 +71,17 @@ impl Gyro {
                 row.false_alarms
             );
         }
-        println!("\nslip of a driven wheel by a fifth, without landmarks");
+        println!("\nslip of the first driven wheel by a fifth");
         println!(
-            "{:<13} {:<9} {:>7} {:>6} {:>12} {:>10} {:>12}",
-            "vehicle", "way", "drives", "told", "after, m", "its seed", "beyond level"
+            "{:<13} {:<9} {:<11} {:>7} {:>6} {:>12} {:>10} {:>12}",
+            "vehicle", "way", "shown by", "drives", "told", "after, m", "its seed", "beyond level"
         );
         for row in &outcome.slips {
             println!(
-                "{:<13} {:<9} {:>7} {:>6} {:>12.3} {:>10} {:>12}",
+                "{:<13} {:<9} {:<11} {:>7} {:>6} {:>12.3} {:>10} {:>12}",
                 word(row.vehicle),
                 word(row.way),
+                word(row.shown_by),
                 row.drives,
                 row.told,
                 row.longest_m,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use agv_core::localizer::Parameters;
 use agv_host_sim::output_file;
 use agv_lab::campaign::Shard;
+use agv_lab::equipment::Equipment;
 use agv_lab::trust::figures::{Figures, figures};
 use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
 use agv_lab::trust::page::{diagrams, page};
@@ -14,6 +15,7 @@ use agv_lab::trust::trial::Trial;
 use agv_settings::Settings;
 use anyhow::{Context as _, ensure};
 
+use crate::command::output::note;
 use crate::command::progress;
 use crate::command::setting_arguments::SettingArguments;
 
@@ -51,6 +53,8 @@ pub struct Trust {
     /// First seed of the sweep; those of the worst sizes are 50000 later, those of the pairs 75000. Seeds below 1000 are for development.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
+    #[command(flatten)]
+    equipment: Equipment,
     /// Make only the runs of part I of N, counted from 0, and write their rows to --output: those of the sweep, or with --swept
     /// those of the worst sizes, without a fault and of pairs.
     #[arg(long, value_name = "I/N", requires = "output", conflicts_with = "set")]
@@ -83,6 +87,7 @@ Examples:
   agv evaluate trust --only 'laser shifted' --runs 20
   agv evaluate trust --sample 100 --seed 7
   agv evaluate trust --only nothing --sound-runs 30 --set odometry.slip=0.003
+  agv evaluate trust --vehicle differential --gyro --sweep-runs 1 --runs 2 --sound-runs 10
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
@@ -94,12 +99,13 @@ continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_sh
 [95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
 pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
-and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set].";
+and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro.";
 
 impl Trust {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let catalogue = kinds::read(&self.kinds)?;
+        let mut catalogue = kinds::read(&self.kinds)?;
+        self.leave_out(&mut catalogue)?;
         let all = &catalogue.kinds;
         let is_wanted = |kind: &&Kind| self.only.as_ref().is_none_or(|only| kind.name.contains(only));
         let (sound, faults): (Vec<Kind>, Vec<Kind>) =
@@ -108,7 +114,7 @@ impl Trust {
         if !self.merge.is_empty() {
             return self.tell(&row::read(&self.merge, all)?, &catalogue);
         }
-        let mut parameters = Settings::default().parameters;
+        let mut parameters = Parameters { vehicle: self.equipment.believed(), ..Settings::default().parameters };
         self.settings.apply(&mut parameters)?;
         if let Some(runs) = self.sample {
             let rows = self.make("spot check", &sweep::sample(&faults, runs, self.seed), Shard::ALL)?;
@@ -135,12 +141,28 @@ impl Trust {
         }
     }
 
+    /// Leaves out the kinds of faults that the vehicle cannot have, and names them.
+    fn leave_out(&self, catalogue: &mut Catalogue) -> anyhow::Result<()> {
+        let vehicle = self.equipment.believed();
+        let mut impossible = Vec::new();
+        catalogue.kinds.retain(|kind| {
+            let is_possible = kind.is_possible(&vehicle);
+            impossible.extend((!is_possible).then(|| kind.name.clone()));
+            is_possible
+        });
+        if !impossible.is_empty() {
+            note(&format!("agv: left out, as the vehicle cannot have them: {}", impossible.join(", ")));
+        }
+        ensure!(!catalogue.kinds.is_empty(), "the vehicle can have none of the kinds of faults");
+        Ok(())
+    }
+
     /// Makes the runs of a part.
     fn make(&self, what: &'static str, trials: &[Trial], shard: Shard) -> anyhow::Result<Vec<Row>> {
         let bar = progress::bar(what, (0..trials.len()).filter(|run| shard.has(*run)).count() as u64);
         // Whatever can be refused was refused before.
         let settings = |parameters: &mut Parameters| _ = self.settings.apply(parameters);
-        let rows = run(trials, shard, &settings, || bar.inc(1)).context("a run cannot be made")?;
+        let rows = run(trials, shard, self.equipment, &settings, || bar.inc(1)).context("a run cannot be made")?;
         bar.finish_and_clear();
         Ok(rows)
     }
@@ -160,6 +182,8 @@ impl Trust {
         if self.json {
             let mut told = serde_json::to_value(&figures)?;
             told["settings"] = self.settings.texts().into();
+            told["vehicle"] = serde_json::to_value(self.equipment.vehicle)?;
+            told["gyro"] = self.equipment.gyro.into();
             println!("{}", serde_json::to_string_pretty(&told)?);
         } else {
             print(&figures);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use agv_lab::equipment::Equipment;
 use agv_lab::evaluate::warehouse::{Experiment, Method, PATHS, experiment};
 use agv_lab::evaluate::warehouse_disturbance::Disturbance;
 use agv_lab::evaluate::warehouse_page::page;
@@ -31,6 +32,8 @@ pub struct Warehouse {
     /// Every disturbance, and the standard drive.
     #[arg(long, conflicts_with = "disturb")]
     disturb_all: bool,
+    #[command(flatten)]
+    equipment: Equipment,
     /// One JSON array instead of a table.
     #[arg(long)]
     json: bool,
@@ -57,7 +60,9 @@ impl Warehouse {
         let progress = progress::bar("runs", wanted.len() as u64 * self.runs);
         let experiments: Vec<Experiment> = wanted
             .into_iter()
-            .map(|(path, method, disturbance)| experiment(path, method, disturbance, seeds.clone(), || progress.inc(1)))
+            .map(|(path, method, disturbance)| {
+                experiment(path, method, (disturbance, self.equipment), seeds.clone(), || progress.inc(1))
+            })
             .collect::<Result<_, _>>()?;
         progress.finish_and_clear();
         if let Some(report) = &self.report {

@@ -39,7 +39,7 @@ const CLOCK: u32 = 80_000_000;
 const USUAL: BitTiming = BitTiming { prescaler: 10, before: 13, behind: 2, jump: 2 };
 
 /// Places for what is listened to: everybody, the controller, its encoders, and nodes whose heartbeats are watched.
-const SLOTS: [StandardFilterSlot; 8] = [
+const SLOTS: [StandardFilterSlot; 10] = [
     StandardFilterSlot::_0,
     StandardFilterSlot::_1,
     StandardFilterSlot::_2,
@@ -48,6 +48,14 @@ const SLOTS: [StandardFilterSlot; 8] = [
     StandardFilterSlot::_5,
     StandardFilterSlot::_6,
     StandardFilterSlot::_7,
+    StandardFilterSlot::_8,
+    StandardFilterSlot::_9,
+];
+/// Places for frames of no such node: those of the vehicle's own controller and of a gyro.
+const OTHERS: [(StandardFilterSlot, ExtendedFilterSlot); 3] = [
+    (StandardFilterSlot::_10, ExtendedFilterSlot::_0),
+    (StandardFilterSlot::_11, ExtendedFilterSlot::_1),
+    (StandardFilterSlot::_12, ExtendedFilterSlot::_2),
 ];
 
 /// While nobody acknowledges, a frame waits for so long at most, us.
@@ -187,7 +195,7 @@ impl FdCanPort {
 }
 
 impl CanPort for FdCanPort {
-    fn listen_to(&mut self, nodes: &[NodeId], other: Option<Id>) {
+    fn listen_to(&mut self, nodes: &[NodeId], others: &[Id]) {
         // Commands to all nodes and the SYNC, which have number 0, and everything from or for the others.
         let numbers = core::iter::once(0).chain(nodes.iter().map(|node| u16::from(node.number())));
         let mut numbers = numbers.map(|number| FilterType::BitMask { filter: number, mask: 0x7F });
@@ -200,18 +208,19 @@ impl CanPort for FdCanPort {
             self.bus.properties().set_standard_filter(slot, filter);
         }
         let action = Action::StoreInFifo0;
-        match other {
-            Some(Id::Standard(id)) => {
-                let filter = FilterType::BitMask { filter: id.as_raw(), mask: 0x7FF };
-                let filter = StandardFilter { filter, action };
-                self.bus.properties().set_standard_filter(StandardFilterSlot::_8, filter);
+        for (id, (standard, extended)) in others.iter().zip(OTHERS) {
+            match id {
+                Id::Standard(id) => {
+                    let filter = FilterType::BitMask { filter: id.as_raw(), mask: 0x7FF };
+                    let filter = StandardFilter { filter, action };
+                    self.bus.properties().set_standard_filter(standard, filter);
+                }
+                Id::Extended(id) => {
+                    let filter = FilterType::BitMask { filter: id.as_raw(), mask: 0x1FFF_FFFF };
+                    let filter = ExtendedFilter { filter, action };
+                    self.bus.properties().set_extended_filter(extended, filter);
+                }
             }
-            Some(Id::Extended(id)) => {
-                let filter = FilterType::BitMask { filter: id.as_raw(), mask: 0x1FFF_FFFF };
-                let filter = ExtendedFilter { filter, action };
-                self.bus.properties().set_extended_filter(ExtendedFilterSlot::_0, filter);
-            }
-            None => {}
         }
     }
 

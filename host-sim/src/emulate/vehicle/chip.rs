@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use agv_controller::EncoderNodes;
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_wire::can::canopen::{Message, NodeId};
@@ -19,8 +20,8 @@ use serde::{Deserialize, Serialize};
 use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose};
 use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like};
 use crate::emulate::board::{ADDRESS, HOST};
-use crate::emulate::encoder_pair::EmulatedPair;
 use crate::emulate::gyro::EmulatedGyro;
+use crate::emulate::motion::EmulatedMotion;
 use crate::live::stream::LogCopy;
 use crate::log::Reader;
 use crate::provision::flash_image;
@@ -133,7 +134,7 @@ fn bytes(text: &str) -> Result<Vec<u8>, VehicleError> {
 struct Play<'a> {
     recording: &'a Recording,
     controller: NodeId,
-    pair: EmulatedPair,
+    motion: EmulatedMotion,
     gyro: Option<EmulatedGyro>,
     sensor: Sensor,
     connection: Option<Connection>,
@@ -178,13 +179,11 @@ pub fn drive_in_chip(
     let vehicle = Vehicle { flash: &flash, controller: ADDRESS, host: HOST, laser_port: LASER_PORT, log_port };
     let mut chip = Chip::start(program, &vehicle)?;
     let sensor_drive = Drive::new(recording, SensorFrame::default())?;
-    let node = |number| NodeId::new(number).unwrap_or(FIRST_NODE);
-    let nodes = settings.nodes;
-    let controller = node(nodes.controller);
+    let controller = NodeId::new(settings.nodes.controller).unwrap_or(FIRST_NODE);
     let mut play = Play {
         recording,
         controller,
-        pair: EmulatedPair::new(recording, node(nodes.drive), node(nodes.steering))?.standing(),
+        motion: EmulatedMotion::new(recording, &EncoderNodes::of(&settings))?.standing(),
         gyro: EmulatedGyro::of(recording, &settings.gyro_frame),
         first: sensor_drive.turns().first().map_or(Time::default(), |turn| turn.start),
         sensor: Sensor::new(sensor_drive, SensorClockOptions::default(), None, true),
@@ -200,7 +199,7 @@ pub fn drive_in_chip(
         poses: Vec::new(),
         emergencies: Vec::new(),
     };
-    let length = (1e6 * seconds.min(play.pair.duration())) as u64;
+    let length = (1e6 * seconds.min(play.motion.duration())) as u64;
     for step in 1.. {
         let until = step * STEP;
         let said = play.said(until);
@@ -248,14 +247,14 @@ impl Play<'_> {
             return Ok(());
         }
         let time = Time::from_micros(now);
-        self.frames.extend(self.pair.poll(time));
+        self.frames.extend(self.motion.poll(time));
         self.frames.extend(self.gyro.iter_mut().flat_map(|gyro| gyro.poll(time)));
         if self.begin.is_some() {
             return Ok(());
         }
         if matches!(self.mode(), Some(Mode::Reflectors | Mode::Mixed)) {
             self.drive_off(now);
-        } else if self.pair.are_operational() && now > self.last_order + BETWEEN_ORDERS.as_micros() as u64 {
+        } else if self.motion.are_operational() && now > self.last_order + BETWEEN_ORDERS.as_micros() as u64 {
             self.last_order = now;
             self.orders = (self.orders + 1) % 16;
             let pose = truth_at(&self.recording.truth, self.first).unwrap_or_default();
@@ -265,7 +264,7 @@ impl Play<'_> {
     }
 
     fn hear(&mut self, frame: &Frame, time: u64) {
-        self.frames.extend(self.pair.handle(frame));
+        self.frames.extend(self.motion.handle(frame));
         let heard = self.origin + Duration::from_micros(time);
         if let Some(pose) = self.receiver.handle(frame) {
             self.poses.push(HeardPose { heard, pose });
@@ -297,7 +296,7 @@ impl Play<'_> {
         let events = &self.recording.events;
         let first_sample = events.iter().find(|event| event.is_odometry()).and_then(|event| event.time());
         let first_sample = begin.offset(first_sample.map_or(0.0, |time| time.since(self.first)));
-        self.pair.begin(first_sample);
+        self.motion.begin(first_sample);
         if let Some(gyro) = &mut self.gyro {
             gyro.begin(first_sample);
         }

@@ -3,7 +3,7 @@
 use agv_core::state::Mode;
 
 use crate::emulate::board::BoardError;
-use crate::emulate::encoder_pair::PairError;
+use crate::emulate::motion::MotionError;
 use crate::log::LogError;
 use crate::provision::ProvisionError;
 use crate::serve::nav350::DriveError;
@@ -17,9 +17,9 @@ pub enum VehicleError {
     /// The recording has nothing for the laser to see.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// The recording has nothing for the encoders.
+    /// The recording has nothing that tells how the vehicle moves.
     #[error(transparent)]
-    Pair(#[from] PairError),
+    Motion(#[from] MotionError),
     /// The settings do not fit.
     #[error(transparent)]
     Provision(#[from] ProvisionError),

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use agv_controller::EncoderNodes;
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
@@ -16,9 +17,9 @@ use super::error::VehicleError;
 use super::watch::{BusTrouble, Heard, HeardEmergency, HeardPose};
 use crate::bus::{Bus, SlcanBus};
 use crate::emulate::board::{Board, BoardError};
-use crate::emulate::encoder_pair::EmulatedPair;
 use crate::emulate::foreign_traffic::ForeignTraffic;
 use crate::emulate::gyro::EmulatedGyro;
+use crate::emulate::motion::EmulatedMotion;
 use crate::recording::{Recording, truth_at};
 use crate::serve::nav350::Nav350;
 
@@ -51,7 +52,7 @@ struct Play<'a> {
     stage: &'a Stage<'a>,
     bus: SlcanBus,
     controller: NodeId,
-    pair: EmulatedPair,
+    motion: EmulatedMotion,
     gyro: Option<EmulatedGyro>,
     receiver: PoseReceiver,
     foreign: ForeignTraffic,
@@ -102,7 +103,7 @@ impl Stage<'_> {
             }
             if self.mode().is_some_and(|mode| mode == Mode::Reflectors || mode == Mode::Mixed) {
                 play.drive_off(seconds);
-            } else if self.is_told && play.pair.are_operational() && play.last_order.elapsed() > BETWEEN_ORDERS {
+            } else if self.is_told && play.motion.are_operational() && play.last_order.elapsed() > BETWEEN_ORDERS {
                 play.last_order = Instant::now();
                 play.tell_pose()?;
             }
@@ -116,13 +117,14 @@ impl Stage<'_> {
         let nodes = self.settings.nodes;
         let node = |number| NodeId::new(number).unwrap_or(FIRST_NODE);
         let controller = node(nodes.controller);
-        let own = [nodes.drive, nodes.steering, nodes.controller].map(node);
+        let own: Vec<NodeId> =
+            nodes.encoders.iter().map(|encoder| encoder.node).chain([nodes.controller]).map(node).collect();
         let start = Instant::now();
         Ok(Play {
             stage: self,
             bus,
             controller,
-            pair: EmulatedPair::new(self.recording, node(nodes.drive), node(nodes.steering))?.standing(),
+            motion: EmulatedMotion::new(self.recording, &EncoderNodes::of(self.settings))?.standing(),
             gyro: EmulatedGyro::of(self.recording, &self.settings.gyro_frame),
             receiver: PoseReceiver::new(controller),
             foreign: ForeignTraffic::new(1, &own),
@@ -197,7 +199,7 @@ impl Play<'_> {
 
     fn send_sensors(&mut self) -> Result<(), BoardError> {
         let now = self.now();
-        for frame in self.pair.poll(now) {
+        for frame in self.motion.poll(now) {
             self.send_sensor_frame(&frame)?;
         }
         for frame in self.gyro.iter_mut().flat_map(|gyro| gyro.poll(now)).collect::<Vec<_>>() {
@@ -212,7 +214,7 @@ impl Play<'_> {
         let is_drive = matches!(
             Message::decode(frame),
             Ok(Message::TransmitPdo { node, .. } | Message::Heartbeat { node, .. })
-                if node.number() == self.stage.settings.nodes.drive
+                if node.number() == self.stage.settings.nodes.encoders[0].node
         );
         if is_drive && trouble.is_drive_silent.load(Ordering::Relaxed) {
             return Ok(());
@@ -236,7 +238,7 @@ impl Play<'_> {
     fn answer(&mut self) -> Result<(), BoardError> {
         let received = self.bus.receive(Instant::now() + Duration::from_millis(1))?;
         let Some(frame) = received.as_ref().and_then(|frame| frame.classic()) else { return Ok(()) };
-        for answer in self.pair.handle(frame) {
+        for answer in self.motion.handle(frame) {
             self.bus.send(&answer.into())?;
         }
         let time = Instant::now();
@@ -268,11 +270,11 @@ impl Play<'_> {
             stage.recording.events.iter().find(|event| event.is_odometry()).and_then(|event| event.time());
         let shift = first_sample.map_or(0.0, |time| time.since(stage.first));
         let now = self.now();
-        self.pair.begin(now.offset(LEAD.as_secs_f64() + shift));
+        self.motion.begin(now.offset(LEAD.as_secs_f64() + shift));
         if let Some(gyro) = &mut self.gyro {
             gyro.begin(now.offset(LEAD.as_secs_f64() + shift));
         }
         stage.heard().begin = Some(begin);
-        self.end = Some(begin + Duration::from_secs_f64(seconds.min(self.pair.duration())));
+        self.end = Some(begin + Duration::from_secs_f64(seconds.min(self.motion.duration())));
     }
 }

@@ -2,8 +2,8 @@
 
 use agv_core::localizer::Parameters;
 use agv_core::odometry::{
-    Ackermann, AngleEncoder, BiSteerable, CounterRange, Differential, DrivenWheel, GyroParameters, Omnidirectional,
-    SteeredWheel, Tricycle, Vehicle, WheelVehicle,
+    Ackermann, AckermannWheels, AngleEncoder, BiSteerable, CounterRange, Differential, DrivenWheel, GyroParameters,
+    Mecanum, Omnidirectional, SteeredWheel, Tricycle, TricycleSpeed, Vehicle, WheelVehicle,
 };
 
 use super::{MotionReport, Scenario};
@@ -17,10 +17,12 @@ pub fn believed_parameters(scenario: &Scenario) -> Parameters {
         MotionReport::Speed => {
             Vehicle::Ackermann(Ackermann { wheelbase: believed.wheelbase, encoder_offset: believed.encoder_offset })
         }
+        MotionReport::TricycleSpeed => Vehicle::TricycleSpeed(TricycleSpeed {
+            wheelbase: believed.wheelbase,
+            steering_offset: believed.steering_offset_forward_deg.to_radians(),
+        }),
         MotionReport::Increments => Vehicle::Increments,
-        MotionReport::Differential | MotionReport::BiSteerable | MotionReport::Omnidirectional => {
-            believed_wheels(scenario).map_or(Vehicle::Increments, Vehicle::Wheels)
-        }
+        _ => believed_wheels(scenario).map_or(Vehicle::Increments, Vehicle::Wheels),
     };
     let gyro = &scenario.gyro;
     let mut parameters = Parameters::new(vehicle, scenario.laser.mounting.pose());
@@ -63,18 +65,33 @@ pub fn believed_wheels(scenario: &Scenario) -> Option<WheelVehicle> {
     let scale = std::f64::consts::TAU / believed.steering_counter as f64;
     let steering = AngleEncoder { scale, range: range(believed.steering_counter) };
     let steered = |x: f64| SteeredWheel { x, y: 0.0, drive: driven, steering, steering_offset: 0.0 };
+    let axle = Differential { track: believed.track, left: driven, right: driven };
     match scenario.vehicle.reports {
-        MotionReport::Encoders | MotionReport::Speed | MotionReport::Increments => None,
-        MotionReport::Differential => {
-            Some(WheelVehicle::Differential(Differential { track: believed.track, left: driven, right: driven }))
-        }
+        MotionReport::Encoders | MotionReport::Speed | MotionReport::TricycleSpeed | MotionReport::Increments => None,
+        MotionReport::Differential => Some(WheelVehicle::Differential(axle)),
+        MotionReport::Ackermann => Some(WheelVehicle::Ackermann(AckermannWheels {
+            rear: axle,
+            wheelbase: believed.wheelbase,
+            steering,
+            steering_offset: believed.steering_offset_forward_deg.to_radians(),
+        })),
         MotionReport::BiSteerable => {
             let half = 0.5 * believed.wheelbase;
             Some(WheelVehicle::BiSteerable(BiSteerable { front: steered(half), rear: steered(-half) }))
         }
+        MotionReport::ThreeOmnidirectional => Some(WheelVehicle::ThreeOmnidirectional(Omnidirectional {
+            arm: 0.5 * believed.track,
+            first: std::f64::consts::FRAC_PI_3,
+            driven: [driven; 3],
+        })),
         MotionReport::Omnidirectional => Some(WheelVehicle::FourOmnidirectional(Omnidirectional {
             arm: 0.5 * believed.track,
             first: std::f64::consts::FRAC_PI_4,
+            driven: [driven; 4],
+        })),
+        MotionReport::Mecanum => Some(WheelVehicle::Mecanum(Mecanum {
+            wheelbase: believed.wheelbase,
+            track: believed.track,
             driven: [driven; 4],
         })),
     }

@@ -162,7 +162,8 @@ pub const CHOICES: [[&str; 3]; 22] = [
     ["path.legs.direction", "forward, backward", "sense of travel of a leg"],
     [
         "vehicle.reports",
-        "encoders, speed, increments, differential, bi_steerable, omnidirectional",
+        "encoders, tricycle_speed, speed, increments, differential, bi_steerable, ackermann, three_omnidirectional, omnidirectional, \
+         mecanum",
         "what the vehicle reports of its motion",
     ],
     [

@@ -88,6 +88,14 @@ pub enum MotionReport {
     BiSteerable,
     /// Counters of four omnidirectional wheels.
     Omnidirectional,
+    /// Speed and steering angle of a tricycle's wheel.
+    TricycleSpeed,
+    /// Counters of the rear wheels and of the steering of a car.
+    Ackermann,
+    /// Counters of three omnidirectional wheels.
+    ThreeOmnidirectional,
+    /// Counters of four mecanum wheels.
+    Mecanum,
 }
 
 /// What the localiser believes of the vehicle.
@@ -109,7 +117,7 @@ pub struct BelievedVehicle {
     pub steering_offset_backward_deg: f64,
     /// Distance of the wheel with the speed sensor to the left of the axis, m; for a car.
     pub encoder_offset: f64,
-    /// Distance of the driven wheels of a differential vehicle, and of opposite omnidirectional ones, m.
+    /// Distance of the wheels of an axle, and of opposite omnidirectional ones, m.
     pub track: f64,
 }
 

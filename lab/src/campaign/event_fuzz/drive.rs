@@ -127,12 +127,13 @@ impl Drive {
         let wheelbase = match self.parameters.vehicle {
             Vehicle::Tricycle(vehicle) => vehicle.wheelbase,
             Vehicle::Ackermann(vehicle) => vehicle.wheelbase,
+            Vehicle::TricycleSpeed(vehicle) => vehicle.wheelbase,
             Vehicle::Increments | Vehicle::Wheels(_) => 1.5,
         };
         self.truth = self.truth.compose(&control.displacement(wheelbase, self.parameters.integration));
         match self.parameters.vehicle {
             Vehicle::Tricycle(_) => self.encoders(dice, distance),
-            Vehicle::Ackermann(_) => self.speed(dice),
+            Vehicle::Ackermann(_) | Vehicle::TricycleSpeed(_) => self.speed(dice),
             Vehicle::Increments => self.increment(dice, before.between(&self.truth)),
             Vehicle::Wheels(_) => self.foreign(dice),
         }

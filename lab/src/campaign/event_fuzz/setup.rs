@@ -26,11 +26,11 @@ fn settings(dice: &mut Dice<impl Source>) -> Settings {
             2..=4 => least + (most - least) * dice.between(-9.0, 0.0).exp2().powi(3),
             _ => dice.between(least, most),
         };
-        let value = match leaf.get(&settings) {
-            Some(Value::Number(_)) => Value::Number(number.clamp(least, most)),
-            Some(Value::Whole(_)) => Value::Whole(number.clamp(least, most) as u64),
-            Some(Value::Switch(_)) => Value::Switch(dice.once_in(2)),
-            Some(Value::Address(_)) | None => continue,
+        let value = match leaf.value(&settings) {
+            Value::Number(_) => Value::Number(number.clamp(least, most)),
+            Value::Whole(_) => Value::Whole(number.clamp(least, most) as u64),
+            Value::Switch(_) => Value::Switch(dice.once_in(2)),
+            Value::Address(_) => continue,
         };
         // What does not fit stays as it was.
         let _ = leaf.set(&mut settings, value);

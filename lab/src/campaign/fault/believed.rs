@@ -7,6 +7,7 @@ use agv_core::odometry::Vehicle;
 use super::{Fault, FaultKind};
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::simulate::random::Random;
+use agv_settings::VehicleSettings;
 
 impl Fault {
     /// Makes what the localiser is told before the drive wrong.
@@ -15,22 +16,13 @@ impl Fault {
             move_one(recording, metres, random);
         }
         self.move_landmarks(&mut recording.landmarks, random);
-        let tricycle = match &mut recording.parameters.vehicle {
-            Vehicle::Tricycle(tricycle) => Some(tricycle),
-            _ => None,
-        };
-        match (self.what, tricycle) {
-            (FaultKind::MountingWrong { deg, x, y }, _) => {
+        mistake(self.what, &mut recording.parameters.vehicle);
+        match self.what {
+            FaultKind::MountingWrong { deg, x, y } => {
                 let laser = recording.parameters.lasers.first_mut();
                 *laser = Pose::new(laser.x + x, laser.y + y, laser.theta + deg.to_radians());
             }
-            (FaultKind::SteeringOffsetWrong { deg }, Some(tricycle)) => {
-                tricycle.steering_offset_forward += deg.to_radians();
-                tricycle.steering_offset_backward += deg.to_radians();
-            }
-            (FaultKind::WheelbaseWrong { metres }, Some(tricycle)) => tricycle.wheelbase += metres,
-            (FaultKind::DriveScaleWrong { share }, Some(tricycle)) => tricycle.drive_scale *= 1.0 + share,
-            (FaultKind::StartWrong { x, y, deg }, _) => {
+            FaultKind::StartWrong { x, y, deg } => {
                 for event in &mut recording.events {
                     if let RecordedEvent::SetPose(fix) = event {
                         fix.pose = fix.pose.compose(&Pose::new(x, y, deg.to_radians()));
@@ -91,6 +83,25 @@ impl Fault {
             _ => {}
         }
     }
+}
+
+/// Makes what is believed of the vehicle wrong; of one with several steered wheels the first.
+fn mistake(what: FaultKind, vehicle: &mut Vehicle) {
+    let mut settings = VehicleSettings::of(vehicle);
+    match what {
+        FaultKind::SteeringOffsetWrong { deg } => {
+            settings.steering_offset_forward += deg.to_radians();
+            settings.steering_offset_backward += deg.to_radians();
+            settings.wheels[0].steering_offset += deg.to_radians();
+        }
+        FaultKind::WheelbaseWrong { metres } => settings.wheelbase += metres,
+        FaultKind::DriveScaleWrong { share } => {
+            settings.drive_scale *= 1.0 + share;
+            settings.wheels.iter_mut().for_each(|wheel| wheel.scale *= 1.0 + share);
+        }
+        _ => return,
+    }
+    *vehicle = settings.vehicle();
 }
 
 /// Moves one of the reflectors that stand nearest to a place of the way.

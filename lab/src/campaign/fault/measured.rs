@@ -2,7 +2,7 @@
 
 use agv_core::geometry::{Point, wrap};
 use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
-use agv_core::odometry::{CounterRange, Tricycle};
+use agv_core::odometry::{Counted, Counter, CounterRange, Tricycle, Vehicle};
 
 use super::laser_state::LaserState;
 use super::tilt::Tilt;
@@ -12,18 +12,40 @@ use agv_host_sim::simulate::START;
 use agv_host_sim::simulate::random::Random;
 
 impl Fault {
-    /// Makes what the sensors have seen on a drive wrong.
+    /// Makes what the sensors have seen on a drive wrong. `tricycle` is the true one. Of a vehicle with several wheels the
+    /// first wheel is at fault, and the first that steers.
     pub fn spoil(&self, recording: &mut Recording, tricycle: &Tricycle, random: &mut Random) {
+        let counters = recording.parameters.vehicle.counters();
         if let FaultKind::Kidnapped { seconds } = self.what {
-            kidnap(recording, self.from, seconds, tricycle.drive_range);
+            kidnap(recording, self.from, seconds, &counters);
         }
+        let of = |counted| counters.iter().find(|counter| counter.counted == counted).copied();
+        let (drive, steering) = (of(Counted::Turn), of(Counted::Steering));
+        let offset = match recording.parameters.vehicle {
+            Vehicle::Tricycle(_) => tricycle.steering_offset_forward,
+            _ => 0.0,
+        };
         let mut encoders = EncoderFaultState::default();
         let mut laser = LaserState::new(self.what, recording, random);
         for event in &mut recording.events {
             match event {
-                RecordedEvent::Encoders(sample) => {
+                RecordedEvent::Encoders(EncoderSample { time, drive: turn, steering: angle }) => {
+                    let time = time.since(START);
+                    drive.inspect(|counter| self.spoil_drive(turn, time, counter, &mut encoders));
+                    steering.inspect(|counter| self.spoil_steering(angle, time, counter, offset, &mut encoders));
+                }
+                RecordedEvent::Wheels(sample) => {
                     let time = sample.time.since(START);
-                    self.spoil_encoders(sample, time, tricycle, &mut encoders);
+                    if let Some(counter) = &drive {
+                        let mut turn = sample.count(counter);
+                        self.spoil_drive(&mut turn, time, counter, &mut encoders);
+                        sample.set_count(counter, turn);
+                    }
+                    if let Some(counter) = &steering {
+                        let mut angle = sample.count(counter);
+                        self.spoil_steering(&mut angle, time, counter, offset, &mut encoders);
+                        sample.set_count(counter, angle);
+                    }
                 }
                 RecordedEvent::Reflectors(seen) => {
                     let Some(first) = seen.observations.first() else { continue };
@@ -79,48 +101,52 @@ impl Fault {
         }
     }
 
-    fn spoil_encoders(
-        &self,
-        sample: &mut EncoderSample,
-        time: f64,
-        tricycle: &Tricycle,
-        state: &mut EncoderFaultState,
-    ) {
-        let true_drive = sample.drive;
-        let moved = state.true_drive.map_or(0, |before| tricycle.drive_range.step(before, true_drive));
+    fn spoil_drive(&self, count: &mut u32, time: f64, counter: &Counter, state: &mut EncoderFaultState) {
+        let true_drive = *count;
+        let moved = state.true_drive.map_or(0, |before| counter.range.step(before, true_drive));
         state.true_drive = Some(true_drive);
         let is_active = self.is_active(time);
         let begins = is_active && !std::mem::replace(&mut state.was_active, is_active);
         match self.what {
-            FaultKind::DriveFrozen if is_active => {
-                sample.drive = *state.frozen_drive.get_or_insert(sample.drive);
-            }
-            FaultKind::SteeringFrozen if is_active => {
-                sample.steering = *state.frozen_steering.get_or_insert(sample.steering);
-            }
+            FaultKind::DriveFrozen if is_active => *count = *state.frozen_drive.get_or_insert(*count),
             FaultKind::DriveJumps { ticks } => state.drive += if begins { ticks as f64 } else { 0.0 },
             FaultKind::DriveReversed if is_active => state.drive -= 2.0 * moved as f64,
             FaultKind::WheelSpins { share } if is_active => state.drive += share * moved as f64,
             FaultKind::WheelSlides { share } if is_active => state.drive -= share * moved as f64,
-            FaultKind::SteeringReversed if is_active => {
-                sample.steering = sample.steering.wrapping_neg() & last_value(tricycle.steering_range);
-            }
-            FaultKind::SlipInBends { share } if is_active => {
-                let ticks = i64::from(sample.steering);
-                let values = tricycle.steering_range.values() as i64;
+            _ => {}
+        }
+        *count = shifted(*count, libm::round(state.drive) as i64, counter.range);
+    }
+
+    /// `offset` is what the true angle is more than the told one, rad.
+    fn spoil_steering(
+        &self,
+        count: &mut u32,
+        time: f64,
+        counter: &Counter,
+        offset: f64,
+        state: &mut EncoderFaultState,
+    ) {
+        if !self.is_active(time) {
+            return;
+        }
+        let Counter { range, scale, .. } = *counter;
+        match self.what {
+            FaultKind::SteeringFrozen => *count = *state.frozen_steering.get_or_insert(*count),
+            FaultKind::SteeringReversed => *count = count.wrapping_neg() & last_value(range),
+            FaultKind::SlipInBends { share } => {
+                let ticks = i64::from(*count);
+                let values = range.values() as i64;
                 let signed = if ticks > values / 2 { ticks - values } else { ticks };
-                let angle = signed as f64 * tricycle.steering_scale + tricycle.steering_offset_forward;
+                let angle = signed as f64 * scale + offset;
                 let told = libm::atan((1.0 + share) * libm::tan(angle));
-                let more = libm::round((told - angle) / tricycle.steering_scale) as i64;
-                sample.steering = shifted(sample.steering, more, tricycle.steering_range);
+                *count = shifted(*count, libm::round((told - angle) / scale) as i64, range);
             }
-            FaultKind::SteeringJumps { deg } | FaultKind::SteeringBent { deg } if is_active => {
-                let ticks = libm::round(deg.to_radians() / tricycle.steering_scale) as i64;
-                sample.steering = shifted(sample.steering, ticks, tricycle.steering_range);
+            FaultKind::SteeringJumps { deg } | FaultKind::SteeringBent { deg } => {
+                *count = shifted(*count, libm::round(deg.to_radians() / scale) as i64, range);
             }
             _ => {}
         }
-        sample.drive = shifted(sample.drive, libm::round(state.drive) as i64, tricycle.drive_range);
     }
 
     fn spoil_reflectors(
@@ -277,27 +303,61 @@ fn revolution_of(time: f64) -> f64 {
     REVOLUTION * libm::floor(time / REVOLUTION + 1e-6)
 }
 
-/// Cuts `seconds` out of a drive: the vehicle is set down where it would have been later, and its wheel has not turned.
-fn kidnap(recording: &mut Recording, from: f64, seconds: f64, range: CounterRange) {
+/// A counter of which a part is cut out.
+#[derive(Clone, Copy, Default)]
+struct CutCounter {
+    last: Option<u32>,
+    ticks: i64,
+}
+
+impl CutCounter {
+    /// Takes what it shows, and changes what it shows behind the cut; a steering angle is where it is.
+    fn hear(&mut self, count: &mut u32, counter: &Counter, is_before: bool, is_behind: bool) {
+        if counter.counted == Counted::Steering {
+            return;
+        }
+        if is_behind {
+            *count = shifted(*count, -self.ticks, counter.range);
+        } else if is_before {
+            self.last = Some(*count);
+        } else if let Some(last) = &mut self.last {
+            self.ticks += counter.range.step(*last, *count);
+            *last = *count;
+        }
+    }
+}
+
+/// Cuts `seconds` out of a drive: the vehicle is set down where it would have been later, and its wheels have not turned.
+fn kidnap(recording: &mut Recording, from: f64, seconds: f64, counters: &[Counter]) {
     let (begin, end) = (START.offset(from), START.offset(from + seconds));
     let earlier = |time: Time| time.offset(-seconds);
-    let mut last_before = None;
-    let mut ticks = 0;
+    let mut cut = vec![CutCounter::default(); counters.len()];
     recording.events.retain_mut(|event| {
         let Some(time) = event.time() else { return true };
         let is_before = time < begin;
         match event {
-            RecordedEvent::Encoders(sample) if is_before => last_before = Some(*sample),
-            RecordedEvent::Encoders(sample) if time < end => {
-                if let Some(last) = last_before {
-                    ticks += range.step(last.drive, sample.drive);
-                    last_before = Some(*sample);
+            RecordedEvent::Encoders(sample) => {
+                let counts = [&mut sample.drive, &mut sample.steering];
+                for ((cut, counter), count) in cut.iter_mut().zip(counters).zip(counts) {
+                    cut.hear(count, counter, is_before, time >= end);
+                }
+                if time >= end {
+                    sample.time = earlier(sample.time);
                 }
             }
-            RecordedEvent::Encoders(sample) => {
-                sample.time = earlier(sample.time);
-                sample.drive = shifted(sample.drive, -ticks, range);
+            RecordedEvent::Wheels(sample) => {
+                for (cut, counter) in cut.iter_mut().zip(counters) {
+                    let mut count = sample.count(counter);
+                    cut.hear(&mut count, counter, is_before, time >= end);
+                    sample.set_count(counter, count);
+                }
+                if time >= end {
+                    sample.time = earlier(sample.time);
+                }
             }
+            RecordedEvent::Speed(sample) if time >= end => sample.time = earlier(sample.time),
+            RecordedEvent::Increment(increment) if time >= end => increment.time = earlier(increment.time),
+            RecordedEvent::Gyro(sample) if time >= end => sample.time = earlier(sample.time),
             RecordedEvent::Reflectors(seen) if time >= end => {
                 for observation in &mut seen.observations {
                     observation.time = earlier(observation.time);

@@ -10,6 +10,7 @@ mod wire;
 pub use hall::simulate_with;
 pub use wire::{Line, Message};
 
+use agv_core::odometry::{Counted, Vehicle, WheelVehicle};
 use serde::{Deserialize, Serialize};
 
 /// One thing that goes wrong.
@@ -44,6 +45,34 @@ impl Fault {
     /// How much of `share` s after its beginning has come, 0 to 1.
     fn grown(&self, time: f64, seconds: f64) -> f64 {
         ((time - self.from) / seconds.max(1e-9)).clamp(0.0, 1.0)
+    }
+}
+
+impl FaultKind {
+    /// Whether a vehicle can have it: what steers can steer wrongly, and what counts can count wrongly.
+    #[must_use]
+    pub fn is_possible(&self, vehicle: &Vehicle) -> bool {
+        let counters = vehicle.counters();
+        let has = |counted| counters.iter().any(|counter| counter.counted == counted);
+        match self {
+            Self::SteeringFrozen
+            | Self::SteeringReversed
+            | Self::SteeringJumps { .. }
+            | Self::SteeringBent { .. }
+            | Self::SteeringOffsetWrong { .. }
+            | Self::SlipInBends { .. } => has(Counted::Steering),
+            Self::WheelbaseWrong { .. } => matches!(
+                vehicle,
+                Vehicle::Tricycle(_) | Vehicle::Wheels(WheelVehicle::Ackermann(_) | WheelVehicle::Mecanum(_))
+            ),
+            Self::DriveFrozen
+            | Self::DriveJumps { .. }
+            | Self::DriveReversed
+            | Self::WheelSpins { .. }
+            | Self::WheelSlides { .. }
+            | Self::DriveScaleWrong { .. } => has(Counted::Turn),
+            _ => true,
+        }
     }
 }
 

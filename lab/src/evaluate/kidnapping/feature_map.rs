@@ -12,6 +12,7 @@ use agv_core::sensing::{Keypoint, PointScan};
 use rayon::prelude::*;
 
 use super::{Outcome, REVOLUTIONS, SearchedMap, Start, outcome, search};
+use crate::equipment::Equipment;
 use crate::evaluate::falko::{BEAMS, KEYPOINTS};
 use crate::evaluate::warehouse::{Map, Method, PATHS, WarehouseError, prepare};
 use crate::evaluate::warehouse_disturbance::Disturbance;
@@ -52,7 +53,7 @@ pub fn run(
         .into_par_iter()
         .map(|number| {
             let seed = seed.wrapping_mul(1_000_003).wrapping_add(number);
-            let simulation = prepare(PATHS[0].1, &method, Disturbance::None, seed)?;
+            let simulation = prepare(PATHS[0].1, &method, Disturbance::None, Equipment::default(), seed)?;
             let count = STARTS_A_STORAGE.min(starts - number * STARTS_A_STORAGE);
             Ok(run_storage(&simulation, seed, count, parameters, &done))
         })

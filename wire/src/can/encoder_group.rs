@@ -1,29 +1,47 @@
-//! The encoders of driving wheel and steering as one measurement.
+//! The encoders of a vehicle as one measurement.
+
+use heapless::Vec;
 
 use super::encoder::{Encoder, EncoderEvent, EncoderReading, EncoderSettings, EncoderState, Reporting};
 use super::frame::Frame;
 use super::plausibility::{PlausibilityLimits, PlausibilityMonitor};
 use super::sync::SyncProducer;
-use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
-use agv_core::odometry::CounterRange;
+use agv_core::measurement::{EncoderFault, EncoderFaults, Time};
+use agv_core::odometry::{Counted, CounterRange, MOST_COUNTERS};
 
-/// One of the two encoders.
+/// One of the encoders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelSettings {
     /// How it is set up.
     pub encoder: EncoderSettings,
     /// What it does on a sound vehicle.
     pub limits: PlausibilityLimits,
+    /// What it counts.
+    pub counted: Counted,
+}
+
+/// The counters of all encoders at one time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counts {
+    /// When they were read.
+    pub time: Time,
+    /// Ticks, in the order of the encoders; those that the vehicle does not have are zero.
+    pub counts: [u32; MOST_COUNTERS],
 }
 
 #[derive(Clone, Debug)]
 struct Channel {
     encoder: Encoder,
     monitor: PlausibilityMonitor,
+    counted: Counted,
     range: CounterRange,
     has_error: bool,
     before: Option<EncoderReading>,
     latest: Option<EncoderReading>,
+    /// What is taken from the counter, ticks.
+    offset: u32,
+    /// What was told of the counter last, to go on from after a jump.
+    told: Option<u32>,
 }
 
 impl Channel {
@@ -32,15 +50,18 @@ impl Channel {
         Self {
             encoder: Encoder::new(settings.encoder, start),
             monitor: PlausibilityMonitor::new(settings.limits, range, start),
+            counted: settings.counted,
             range,
             has_error: false,
             before: None,
             latest: None,
+            offset: 0,
+            told: None,
         }
     }
 
     /// Whether there is a new reading that can be used.
-    fn handle(&mut self, frame: &Frame, time: Time) -> Option<Result<EncoderReading, (EncoderFault, EncoderReading)>> {
+    fn handle(&mut self, frame: &Frame, time: Time) -> Option<Result<EncoderReading, EncoderFault>> {
         match self.encoder.handle(frame, time)? {
             EncoderEvent::Reading(reading) => Some(match self.monitor.reading(reading.time, reading.position) {
                 None => {
@@ -50,7 +71,11 @@ impl Channel {
                 Some(fault) => {
                     self.before = None;
                     self.latest = None;
-                    Err((fault, reading))
+                    // An angle is where it is; a way goes on from where it was.
+                    if let (EncoderFault::Jumped, Counted::Turn, Some(told)) = (fault, self.counted, self.told) {
+                        self.offset = self.less(reading.position, told);
+                    }
+                    Err(fault)
                 }
             }),
             EncoderEvent::Started => {
@@ -84,8 +109,17 @@ impl Channel {
         self.monitor.check(now)
     }
 
-    /// The counter at `time`, if it lies between the last two readings or at one of them.
+    /// The difference of two counters, modulo their range.
+    fn less(&self, position: u32, amount: u32) -> u32 {
+        self.range.wrap(i64::from(position) - i64::from(amount))
+    }
+
+    /// What is told of the counter at `time`, if it lies between the last two readings or at one of them.
     fn at(&self, time: Time) -> Option<u32> {
+        Some(self.less(self.position_at(time)?, self.offset))
+    }
+
+    fn position_at(&self, time: Time) -> Option<u32> {
         let latest = self.latest?;
         if latest.time == time {
             return Some(latest.position);
@@ -101,22 +135,17 @@ impl Channel {
     }
 }
 
-/// Sets up two encoders, watches them, and puts their positions together.
+/// Sets up the encoders of a vehicle, watches them, and puts their positions together.
 ///
-/// A sample is true when the driving wheel's counter was read; the steering angle is that of the same moment, between
-/// two readings if it must be. So no way is ever invented: the counters of the driving wheel are the real ones. A fault
-/// of either encoder gives no samples while it lasts. After a jump of the driving wheel's counter the samples go on from
-/// the last good value: the way that was driven meanwhile is lost, but no false way is reported.
+/// A sample is true when the first counter was read, which is that of a driven wheel; the others are those of the same
+/// moment, between two readings if they must be. So no way is ever invented: the counters of a wheel are its real ones, or
+/// between two real ones. A fault of any encoder gives no samples while it lasts. After a jump of a wheel's counter the
+/// samples go on from the last good value: the way that was driven meanwhile is lost, but no false way is reported.
 #[derive(Clone, Debug)]
-pub struct EncoderPair {
-    drive: Channel,
-    steering: Channel,
+pub struct EncoderGroup {
+    channels: Vec<Channel, MOST_COUNTERS>,
     sync: Option<SyncProducer>,
-    /// What is taken from the driving wheel's counter, ticks.
-    drive_offset: u32,
-    /// The counter of the last sample, to go on from after a jump.
-    last_drive: Option<u32>,
-    /// A reading of the driving wheel that waits for the steering.
+    /// A reading of the first encoder that waits for the others.
     waiting: Option<EncoderReading>,
     /// What was said of faults last.
     told_faults: EncoderFaults,
@@ -125,73 +154,76 @@ pub struct EncoderPair {
 /// Time between two reports of a fault that lasts, s.
 pub const FAULT_PERIOD: f64 = 0.010;
 
-impl EncoderPair {
-    /// Two encoders that have not been heard. If one reports at SYNC, and no other master sees to it, the
-    /// pair sends SYNC every `sync_period` seconds.
+impl EncoderGroup {
+    /// Encoders that have not been heard, at most [`MOST_COUNTERS`] of them; more are left out. If one reports at SYNC, and
+    /// no other master sees to it, the group sends SYNC every `sync_period` seconds.
     #[must_use]
-    pub fn new(drive: &ChannelSettings, steering: &ChannelSettings, sync_period: f64, start: Time) -> Self {
-        let is_synchronous = [drive, steering]
+    pub fn new(channels: &[ChannelSettings], sync_period: f64, start: Time) -> Self {
+        let channels = channels.get(..MOST_COUNTERS).unwrap_or(channels);
+        let is_synchronous = channels
             .iter()
             .any(|channel| channel.encoder.has_master() && channel.encoder.reporting == Reporting::Synchronous);
-        Self {
-            drive: Channel::new(drive, start),
-            steering: Channel::new(steering, start),
+        let mut group = Self {
+            channels: Vec::new(),
             sync: is_synchronous.then(|| SyncProducer::new(sync_period, start)),
-            drive_offset: 0,
-            last_drive: None,
             waiting: None,
             told_faults: EncoderFaults::default(),
+        };
+        for settings in channels {
+            // There is room for all that are left.
+            let _ = group.channels.push(Channel::new(settings, start));
         }
+        group
     }
 
     /// Takes a frame that was received at `time`; gives a sample if it completes one.
-    pub fn handle(&mut self, frame: &Frame, time: Time) -> Option<EncoderSample> {
-        match self.drive.handle(frame, time) {
-            Some(Ok(reading)) => self.waiting = Some(reading),
-            Some(Err((EncoderFault::Jumped, reading))) => {
-                self.waiting = None;
-                if let Some(last) = self.last_drive {
-                    self.drive_offset = self.less(reading.position, last);
-                }
+    pub fn handle(&mut self, frame: &Frame, time: Time) -> Option<Counts> {
+        for (number, channel) in self.channels.iter_mut().enumerate() {
+            let heard = channel.handle(frame, time);
+            if let (0, Some(heard)) = (number, heard) {
+                self.waiting = heard.ok();
             }
-            Some(Err(_)) => self.waiting = None,
-            None => {}
         }
-        self.steering.handle(frame, time);
         self.sample(time)
     }
 
-    /// The difference of two counters of the driving wheel, modulo its range.
-    fn less(&self, position: u32, amount: u32) -> u32 {
-        self.drive.range.wrap(i64::from(position) - i64::from(amount))
-    }
-
-    fn sample(&mut self, now: Time) -> Option<EncoderSample> {
-        let reading = self.waiting?;
-        let steering = self.steering.at(reading.time)?;
+    fn sample(&mut self, now: Time) -> Option<Counts> {
+        let EncoderReading { time, .. } = self.waiting?;
+        let mut counts = [0; MOST_COUNTERS];
+        for (count, channel) in counts.iter_mut().zip(&self.channels) {
+            *count = channel.at(time)?;
+        }
         self.waiting = None;
         if self.faults(now).any() {
             return None;
         }
-        let drive = self.less(reading.position, self.drive_offset);
-        self.last_drive = Some(drive);
-        Some(EncoderSample { time: reading.time, drive, steering })
+        for (count, channel) in counts.iter().zip(&mut self.channels) {
+            channel.told = Some(*count);
+        }
+        Some(Counts { time, counts })
     }
 
     /// The next frame to send. Call until there is none.
     pub fn poll(&mut self, now: Time) -> Option<Frame> {
         if let Some(frame) = self.sync.as_mut().and_then(|sync| sync.poll(now)) {
-            self.drive.encoder.note_sync(now);
-            self.steering.encoder.note_sync(now);
+            self.channels.iter_mut().for_each(|channel| channel.encoder.note_sync(now));
             return Some(frame);
         }
-        let (frame, _) = self.drive.encoder.poll(now);
-        frame.or_else(|| self.steering.encoder.poll(now).0)
+        self.channels.iter_mut().find_map(|channel| channel.encoder.poll(now).0)
     }
 
-    /// The faults that the encoders have now.
+    /// The faults that the encoders have now: the first one of those that count turns, and of those that count angles.
     pub fn faults(&mut self, now: Time) -> EncoderFaults {
-        EncoderFaults { time: now, drive: self.drive.check(now), steering: self.steering.check(now) }
+        let mut faults = EncoderFaults { time: now, ..EncoderFaults::default() };
+        for channel in &mut self.channels {
+            let fault = channel.check(now);
+            let of = match channel.counted {
+                Counted::Turn => &mut faults.drive,
+                Counted::Steering => &mut faults.steering,
+            };
+            *of = of.or(fault);
+        }
+        faults
     }
 
     /// What there is to say of faults: when they change, and every [`FAULT_PERIOD`] seconds while there are any.
@@ -206,26 +238,18 @@ impl EncoderPair {
         })
     }
 
-    /// Where the master is with the encoders: driving wheel, steering.
-    #[must_use]
-    pub const fn states(&self) -> [EncoderState; 2] {
-        [self.drive.encoder.state(), self.steering.encoder.state()]
+    /// Where the master is with each encoder.
+    pub fn states(&self) -> impl Iterator<Item = EncoderState> + '_ {
+        self.encoders().map(Encoder::state)
     }
 
-    /// The encoders: driving wheel, steering.
-    #[must_use]
-    pub const fn encoders(&self) -> [&Encoder; 2] {
-        [&self.drive.encoder, &self.steering.encoder]
+    /// The encoders.
+    pub fn encoders(&self) -> impl Iterator<Item = &Encoder> + '_ {
+        self.channels.iter().map(|channel| &channel.encoder)
     }
 
     /// Others know that the vehicle stands still.
     pub fn expect_standstill(&mut self) {
-        self.drive.monitor.expect_standstill();
-        self.steering.monitor.expect_standstill();
-    }
-
-    /// Others know that the driving wheel turns at least so fast, ticks/s of either sign; 0 if nobody knows.
-    pub fn expect_motion(&mut self, drive_speed: f64, now: Time) {
-        self.drive.monitor.expect_motion(drive_speed, now);
+        self.channels.iter_mut().for_each(|channel| channel.monitor.expect_standstill());
     }
 }

@@ -1,12 +1,12 @@
-//! Two encoders as one measurement.
+//! The encoders of a vehicle as one measurement.
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, Reason};
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
-use agv_core::odometry::{CounterRange, Tricycle, Vehicle};
+use agv_core::odometry::{Counted, CounterRange, Tricycle, Vehicle};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
-use agv_wire::can::encoder_pair::{ChannelSettings, EncoderPair, FAULT_PERIOD};
+use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup, FAULT_PERIOD};
 use agv_wire::can::frame::Frame;
 use agv_wire::can::plausibility::PlausibilityLimits;
 
@@ -21,11 +21,18 @@ fn channel(number: u8, reporting: Reporting) -> ChannelSettings {
     ChannelSettings {
         encoder: EncoderSettings { reporting, ..EncoderSettings::new(NodeId::new(number).unwrap()) },
         limits: PlausibilityLimits::every(0.010, 20_000.0, 25_000.0),
+        counted: if number == 2 { Counted::Steering } else { Counted::Turn },
     }
 }
 
+/// The counters of driving wheel and steering.
+fn two(counts: Counts) -> EncoderSample {
+    let Counts { time, counts: [drive, steering, ..] } = counts;
+    EncoderSample { time, drive, steering }
+}
+
 struct Bench {
-    pair: EncoderPair,
+    group: EncoderGroup,
     nodes: [Node; 2],
     samples: Vec<EncoderSample>,
     syncs: usize,
@@ -33,13 +40,17 @@ struct Bench {
 
 impl Bench {
     fn new(reporting: Reporting) -> Self {
-        let pair = EncoderPair::new(&channel(1, reporting), &channel(2, reporting), 0.010, at(0));
-        Self { pair, nodes: [Node::new(1), Node::new(2)], samples: Vec::new(), syncs: 0 }
+        let group = EncoderGroup::new(&[channel(1, reporting), channel(2, reporting)], 0.010, at(0));
+        Self { group, nodes: [Node::new(1), Node::new(2)], samples: Vec::new(), syncs: 0 }
+    }
+
+    fn states(&self) -> Vec<EncoderState> {
+        self.group.states().collect()
     }
 
     fn poll(&mut self, now: Time) {
         for _ in 0..8 {
-            let Some(sent) = self.pair.poll(now) else { continue };
+            let Some(sent) = self.group.poll(now) else { continue };
             self.syncs += usize::from(sent == frame("080#"));
             for index in 0..2 {
                 for answer in self.nodes[index].handle(&sent) {
@@ -50,13 +61,13 @@ impl Bench {
     }
 
     fn hear(&mut self, frame: &Frame, now: Time) {
-        self.samples.extend(self.pair.handle(frame, now));
+        self.samples.extend(self.group.handle(frame, now).map(two));
     }
 
     fn start(reporting: Reporting) -> Self {
         let mut bench = Self::new(reporting);
         (0..30).for_each(|millisecond| bench.poll(at(millisecond)));
-        assert_eq!(bench.pair.states(), [EncoderState::Reporting; 2]);
+        assert_eq!(bench.states(), [EncoderState::Reporting; 2]);
         bench
     }
 
@@ -112,7 +123,7 @@ fn no_sample_while_an_encoder_is_faulty_and_no_false_way_after_a_jump() {
     for step in 0..100 {
         raw = if step == 40 { 5_000_000 } else { (raw + 50) % (1 << 24) };
         bench.report(millisecond, raw, 0, 0);
-        let faults = bench.pair.faults(at(millisecond));
+        let faults = bench.group.faults(at(millisecond));
         let expected = (40..=60).contains(&step).then_some(EncoderFault::Jumped);
         assert_eq!((faults.drive, faults.steering), (expected, None), "{step}");
         millisecond += 10;
@@ -139,13 +150,13 @@ fn one_missing_encoder_is_told_from_the_other() {
     }
     let count = bench.samples.len();
     // The steering spoke last at 120 ms.
-    assert!(!bench.pair.faults(at(145)).any());
+    assert!(!bench.group.faults(at(145)).any());
     let steering_fault = |faults: EncoderFaults| {
         assert_eq!(faults.drive, None);
         faults.steering
     };
-    assert_eq!(steering_fault(bench.pair.faults(at(146))), Some(EncoderFault::Late));
-    assert_eq!(steering_fault(bench.pair.faults(at(166))), Some(EncoderFault::Missing));
+    assert_eq!(steering_fault(bench.group.faults(at(146))), Some(EncoderFault::Late));
+    assert_eq!(steering_fault(bench.group.faults(at(166))), Some(EncoderFault::Missing));
     assert_eq!(count, 10);
 }
 
@@ -161,7 +172,7 @@ fn an_emergency_holds_until_it_is_over() {
         }
         bench.report(millisecond, 0, 0, 0);
         let expected = (50..=139).contains(&step).then_some(EncoderFault::Reported);
-        assert_eq!(bench.pair.faults(at(millisecond)).steering, expected, "{step}");
+        assert_eq!(bench.group.faults(at(millisecond)).steering, expected, "{step}");
     }
 }
 
@@ -189,18 +200,18 @@ fn an_encoder_whose_range_is_not_that_of_the_settings_gives_a_fault_and_no_sampl
             ChannelSettings { encoder: EncoderSettings { range, ..channel.encoder }, ..channel }
         };
         let mut bench = Bench::new(Reporting::Timer { period: 10 });
-        bench.pair = EncoderPair::new(&given(1, is_drive), &given(2, !is_drive), 0.010, at(0));
+        bench.group = EncoderGroup::new(&[given(1, is_drive), given(2, !is_drive)], 0.010, at(0));
         let node = &mut bench.nodes[usize::from(!is_drive)];
         match told {
             Some(told) => _ = node.objects.insert((0x6002, 0), (told, 4)),
             None => _ = node.objects.remove(&(0x6002, 0)),
         }
         (0..30).for_each(|millisecond| bench.poll(at(millisecond)));
-        assert_eq!(bench.pair.states(), [EncoderState::Reporting; 2]);
+        assert_eq!(bench.states(), [EncoderState::Reporting; 2]);
         for step in 0..100 {
             // Counters just below zero, where a wrong range becomes a wrong angle.
             bench.report(30 + 10 * step, 0x1F00, 0x1F00, 0);
-            let faults = bench.pair.faults(at(30 + 10 * step));
+            let faults = bench.group.faults(at(30 + 10 * step));
             let (its, other) = if is_drive { (faults.drive, faults.steering) } else { (faults.steering, faults.drive) };
             let expected = (!is_right).then_some(EncoderFault::WrongRange);
             assert_eq!((its, other), (expected, None), "{told:?} {set} {step}");
@@ -218,7 +229,7 @@ fn faults_are_told_when_they_change_and_while_they_last() {
         if millisecond % 10 == 0 && !is_silent {
             bench.report(millisecond, 0, 0, 0);
         }
-        told.extend(bench.pair.poll_faults(at(millisecond)));
+        told.extend(bench.group.poll_faults(at(millisecond)));
     }
     let reported: Vec<_> = told.iter().map(|faults| (faults.time, faults.drive)).collect();
     // The last reading was at 90 ms.
@@ -297,7 +308,7 @@ fn every_trouble_is_a_mode_with_its_reason_within_50_ms() {
             for sample in bench.samples.drain(..) {
                 localizer.handle(&Event::Encoders(sample));
             }
-            if let Some(faults) = bench.pair.poll_faults(now) {
+            if let Some(faults) = bench.group.poll_faults(now) {
                 localizer.handle(&Event::EncoderFaults(faults));
             }
             let output = localizer.outputs().pose;
@@ -309,5 +320,64 @@ fn every_trouble_is_a_mode_with_its_reason_within_50_ms() {
         let (millisecond, told) = changed.unwrap_or_else(|| panic!("{trouble:?} was not told"));
         assert_eq!(told, reason, "{trouble:?}");
         assert!(millisecond <= 1050, "{trouble:?}: {millisecond}");
+    }
+}
+
+/// Four encoders that are listened to: two wheels that drive and steer.
+fn four() -> (EncoderGroup, [Node; 4]) {
+    let channels = [1, 2, 3, 4].map(|number| {
+        let settings = channel(number, Reporting::Timer { period: 10 });
+        let encoder = EncoderSettings { is_managed: false, heartbeat: 0, ..settings.encoder };
+        let encoder = EncoderSettings { range: Some(CounterRange::BITS_24), ..encoder };
+        let counted = if number % 2 == 0 { Counted::Steering } else { Counted::Turn };
+        ChannelSettings { encoder, counted, ..settings }
+    });
+    (EncoderGroup::new(&channels, 0.010, at(0)), [1, 2, 3, 4].map(Node::new))
+}
+
+#[test]
+fn four_encoders_are_one_sample_at_the_time_of_the_first() {
+    let (mut group, nodes) = four();
+    let mut samples = Vec::new();
+    for step in 0..10u32 {
+        let counts = [100 * step, 5000 + step, 10 * step + 7, 9000 - step];
+        // Each a little later than the one before.
+        for (place, node) in nodes.iter().enumerate() {
+            let now = at(10 * u64::from(step) + 2 * place as u64);
+            samples.extend(group.handle(&node.position(counts[place]), now));
+        }
+    }
+    // At the first reading of the first encoder the others were not known yet; each of them lags by 2 ms more.
+    assert_eq!(samples.len(), 9);
+    for (step, sample) in (1..).zip(&samples) {
+        assert_eq!(sample.time, at(10 * u64::from(step)), "{step}");
+        assert_eq!(sample.counts[0], 100 * step);
+        let third = 10.0 * (f64::from(step) - 0.4) + 7.0;
+        assert!((f64::from(sample.counts[2]) - third).abs() <= 0.5, "{step}: {sample:?}");
+        assert!(sample.counts[1].abs_diff(5000 + step) <= 1 && sample.counts[3].abs_diff(9000 - step) <= 1);
+    }
+}
+
+#[test]
+fn a_jump_of_any_wheel_is_a_fault_of_the_drive_and_no_false_way_of_that_wheel() {
+    for jumping in 0..4 {
+        let (mut group, nodes) = four();
+        let (mut samples, mut told) = (Vec::new(), Vec::new());
+        for step in 0..100u32 {
+            for (place, node) in nodes.iter().enumerate() {
+                let jump = if place == jumping && step >= 40 { 3_000_000 } else { 0 };
+                samples.extend(group.handle(&node.position(50 * step + jump), at(30 + 10 * u64::from(step))));
+            }
+            let faults = group.faults(at(30 + 10 * u64::from(step)));
+            told.push((faults.drive, faults.steering));
+        }
+        let is_steering = jumping % 2 == 1;
+        let fault = Some(EncoderFault::Jumped);
+        assert_eq!(told[40], if is_steering { (None, fault) } else { (fault, None) }, "{jumping}");
+        assert_eq!((told[39], told[99]), ((None, None), (None, None)), "{jumping}");
+        // Behind the fault a way goes on from where it was, but for that of the jump; an angle is where it is.
+        let (first, last) = (samples[0].counts[jumping], samples.last().unwrap().counts[jumping]);
+        let moved = CounterRange::BITS_24.step(first, last);
+        assert_eq!(moved, if is_steering { 99 * 50 + 3_000_000 } else { 98 * 50 }, "{jumping}");
     }
 }

@@ -1,0 +1,86 @@
+//! Whether the wheels of a vehicle that has more of them than it needs fit each other.
+//!
+//! What does not fit is summed over some way and held against its deviation: the slip that is stated of every wheel, and what lasts of
+//! the errors of wheels and steering. More than that is a wheel that slips. The sum has a sign, so that what wanders to and
+//! fro is not taken for what goes one way.
+
+use crate::measurement::Time;
+use crate::odometry::Motion;
+
+/// Way over which what does not fit is summed, m; a second sum begins in the middle of each.
+const WINDOW: f64 = 0.3;
+/// A sum of more deviations is none of a vehicle in order.
+const GATE: f64 = 6.0;
+/// How long, s, what was found is told.
+const TOLD_FOR: f64 = 1.0;
+
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    slip: f64,
+    way: f64,
+}
+
+impl Window {
+    const EMPTY: Self = Self { slip: 0.0, way: 0.0 };
+}
+
+/// What a vehicle in order does not exceed: standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WheelErrors {
+    /// Slip of a wheel, m for a square root of a metre.
+    pub slip: f64,
+    /// What lasts: share of the way.
+    pub lasting: f64,
+}
+
+/// The sums, and until when a slip is told.
+#[derive(Clone, Debug)]
+pub struct RedundancyCheck {
+    windows: [Window; 2],
+    slips_until: Option<Time>,
+}
+
+impl RedundancyCheck {
+    /// A check that has seen nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { windows: [Window::EMPTY; 2], slips_until: None }
+    }
+
+    /// Forgets the way behind.
+    pub fn clear(&mut self) {
+        self.windows = [Window::EMPTY; 2];
+    }
+
+    /// Takes a motion, and what does not fit of it, m ([`crate::odometry::Step::slip`]).
+    pub fn travel(&mut self, motion: &Motion, slip: f64, errors: &WheelErrors) {
+        let [first, second] = &mut self.windows;
+        if first.way >= WINDOW {
+            *first = core::mem::replace(second, Window::EMPTY);
+        }
+        if first.way < 0.5 * WINDOW {
+            *second = Window::EMPTY;
+        }
+        for window in &mut self.windows {
+            window.slip += slip;
+            window.way += motion.distance;
+            let lasting = errors.lasting * window.way;
+            let expected = errors.slip * errors.slip * window.way + lasting * lasting;
+            if window.slip * window.slip > GATE * GATE * expected && expected > 0.0 {
+                self.slips_until = Some(motion.end.offset(TOLD_FOR));
+            }
+        }
+    }
+
+    /// Whether a wheel slips.
+    #[must_use]
+    pub fn slips(&self, now: Time) -> bool {
+        self.slips_until.is_some_and(|until| now <= until)
+    }
+}
+
+impl Default for RedundancyCheck {
+    fn default() -> Self {
+        Self::new()
+    }
+}

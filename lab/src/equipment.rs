@@ -1,0 +1,78 @@
+//! With which vehicle an experiment is made.
+
+use agv_core::odometry::Vehicle;
+use agv_host_sim::simulate::scenario::{MotionReport, Scenario, believed_parameters};
+use serde::Serialize;
+
+/// The vehicles, and what tells their motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum VehicleKind {
+    /// One wheel that steers and drives.
+    #[default]
+    Tricycle,
+    /// The same, whose own controller tells speed and steering angle.
+    TricycleSpeed,
+    /// A car whose own controller tells speed and steering angle.
+    CarSpeed,
+    /// Two driven wheels side by side.
+    Differential,
+    /// Two wheels that steer and drive.
+    BiSteerable,
+    /// A car with counters at its rear wheels.
+    Ackermann,
+    /// Three omnidirectional wheels.
+    Omni3,
+    /// Four omnidirectional wheels.
+    Omni4,
+    /// Four mecanum wheels.
+    Mecanum,
+    /// A vehicle whose own controller tells how far it has moved.
+    Increments,
+}
+
+impl VehicleKind {
+    /// What the simulated vehicle reports.
+    #[must_use]
+    pub const fn reports(self) -> MotionReport {
+        match self {
+            Self::Tricycle => MotionReport::Encoders,
+            Self::TricycleSpeed => MotionReport::TricycleSpeed,
+            Self::CarSpeed => MotionReport::Speed,
+            Self::Differential => MotionReport::Differential,
+            Self::BiSteerable => MotionReport::BiSteerable,
+            Self::Ackermann => MotionReport::Ackermann,
+            Self::Omni3 => MotionReport::ThreeOmnidirectional,
+            Self::Omni4 => MotionReport::Omnidirectional,
+            Self::Mecanum => MotionReport::Mecanum,
+            Self::Increments => MotionReport::Increments,
+        }
+    }
+}
+
+/// A vehicle, with a gyro or without. The standard one is a tricycle without.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::Args)]
+pub struct Equipment {
+    /// The vehicle.
+    #[arg(long, value_enum, default_value = "tricycle")]
+    pub vehicle: VehicleKind,
+    /// Whether it has a gyro, of the usual grade.
+    #[arg(long)]
+    pub gyro: bool,
+}
+
+impl Equipment {
+    /// Lets a scenario be driven with it.
+    pub fn apply(self, scenario: &mut Scenario) {
+        scenario.vehicle.reports = self.vehicle.reports();
+        scenario.gyro.fitted = self.gyro;
+    }
+
+    /// What the localiser believes of the standard vehicle of its kind.
+    #[must_use]
+    pub fn believed(self) -> Vehicle {
+        let mut scenario = Scenario::default();
+        self.apply(&mut scenario);
+        believed_parameters(&scenario).vehicle
+    }
+}
