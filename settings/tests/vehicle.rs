@@ -108,7 +108,8 @@ fn a_vehicle_of_any_kind_is_stored_and_read() {
 #[test]
 fn a_contradiction_is_named() {
     use VehicleKind::{Ackermann, BiSteerable, Differential, Increments, Mecanum, Omni3, TricycleSpeed};
-    let cases: [(VehicleKind, &[(&str, f64)], Option<&str>); 14] = [
+    type Case = (VehicleKind, &'static [(&'static str, f64)], Option<&'static str>);
+    let cases: [Case; 14] = [
         (Differential, &[("vehicle.wheel_2_scale", 0.0)], Some("vehicle.wheel_2_scale")),
         // It has no third wheel.
         (Differential, &[("vehicle.wheel_3_scale", 0.0)], None),

@@ -120,8 +120,8 @@ pub enum Bus {
 }
 
 enum Encoders {
-    Served(controller::Encoders),
-    Overheard(EncoderListener),
+    Served(Box<controller::Encoders>),
+    Overheard(Box<EncoderListener>),
 }
 
 /// Makes events of raw bytes.
@@ -177,8 +177,10 @@ impl<'a> EventMaker<'a> {
             return;
         }
         let encoders = self.encoders.get_or_insert_with(|| match bus {
-            Bus::Served => Encoders::Served(controller::Encoders::new(self.nodes, self.parameters, time)),
-            Bus::Overheard => Encoders::Overheard(EncoderListener::new(&channels(self.nodes, self.parameters), time)),
+            Bus::Served => Encoders::Served(Box::new(controller::Encoders::new(self.nodes, self.parameters, time))),
+            Bus::Overheard => {
+                Encoders::Overheard(Box::new(EncoderListener::new(&channels(self.nodes, self.parameters), time)))
+            }
         });
         match encoders {
             // The first record says when the bus was opened.
