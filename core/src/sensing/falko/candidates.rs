@@ -198,7 +198,7 @@ impl Candidates<'_> {
         };
         let before = fit(Side::before(self.scan, index, around.reach.before))?;
         let after = fit(Side::after(self.scan, index, around.reach.after))?;
-        let corner = Corner::between(before, after, &around.disc, &self.parameters)?;
+        let corner = Corner::between(before, after, &around.disc, self.parameters)?;
         let passes =
             self.parameters.gate.is_none_or(|gate| corner.passes(&gate, self.scan.bearing_step * around.disc.range));
         passes.then_some(corner)
