@@ -43,6 +43,7 @@ impl Transform<f64> {
     }
 
     /// The share `share` of the way to another one, each number by itself: for turns that are small.
+    #[inline]
     pub(crate) fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |from: f64, to: f64| from + share * (to - from);
         Self {
@@ -64,6 +65,7 @@ impl Transform<f64> {
     }
 
     /// The same in single precision.
+    #[inline]
     pub(crate) fn single(&self) -> Transform {
         Transform { sine: self.sine as f32, cosine: self.cosine as f32, shift: self.shift.map(|axis| axis as f32) }
     }

@@ -140,6 +140,7 @@ struct Segment {
 }
 
 impl Segment {
+    #[inline]
     fn transform(&self, time: f64) -> Transform<f64> {
         let share = ((time - self.start) / self.duration).clamp(0.0, 1.0);
         self.from.towards(&self.to, share)

@@ -1,6 +1,6 @@
 //! The points around a candidate (K 3.1.1), organised by beam.
 
-use super::PointScan;
+use super::{PointScan, PointView};
 use crate::geometry::ScanPoint;
 
 /// How many beams a neighbourhood reaches to each side at most.
@@ -28,70 +28,38 @@ struct Piece<'a> {
 
 impl<'a> Piece<'a> {
     #[inline(always)]
-    fn of<const BEAMS: usize>(scan: &'a PointScan<BEAMS>, start: usize, end: usize) -> Self {
+    fn of(scan: &PointView<'a>, start: usize, end: usize) -> Self {
         match (scan.points.get(start..end), scan.ranges.get(start..end)) {
             (Some(points), Some(ranges)) => Self { points, ranges },
             _ => Self::default(),
         }
     }
 
-    /// Index and relative position of the first return inside the disc.
+    /// Relative positions of the returns inside the disc, with their indices.
     #[inline(always)]
-    fn first_inside(self, disc: &Disc) -> Option<(usize, ScanPoint)> {
-        let mut rest = self.points.iter();
-        loop {
-            let relative = rest.find_map(|point| disc.holds(point))?;
-            // Counted only where it ends: most points at the rim are outside.
-            let index = self.points.len() - rest.len() - 1;
-            if self.ranges.get(index).is_some_and(|range| *range > 0.0) {
-                return Some((index, relative));
-            }
-        }
+    fn inside(self, disc: &Disc) -> impl DoubleEndedIterator<Item = (usize, ScanPoint)> {
+        let returns = self.points.iter().zip(self.ranges).enumerate().filter(|(_, (_, range))| **range > 0.0);
+        returns.filter_map(|(index, (point, _))| disc.holds(point).map(|relative| (index, relative)))
     }
-
-    /// Index and relative position of the last return inside the disc.
-    #[inline(always)]
-    fn last_inside(self, disc: &Disc) -> Option<(usize, ScanPoint)> {
-        let mut rest = self.points.iter();
-        loop {
-            let relative = rest.by_ref().rev().find_map(|point| disc.holds(point))?;
-            let index = rest.len();
-            if self.ranges.get(index).is_some_and(|range| *range > 0.0) {
-                return Some((index, relative));
-            }
-        }
-    }
-}
-
-/// What lies beyond the seam concerns few candidates; in the caller it would only slow the others down.
-#[cold]
-#[inline(never)]
-fn first_beyond_seam(piece: Piece<'_>, disc: &Disc) -> Option<(usize, ScanPoint)> {
-    piece.first_inside(disc)
-}
-
-/// The same after the candidate.
-#[cold]
-#[inline(never)]
-fn last_beyond_seam(piece: Piece<'_>, disc: &Disc) -> Option<(usize, ScanPoint)> {
-    piece.last_inside(disc)
 }
 
 impl<'a> Side<'a> {
     /// The `reach` beams before beam `index`.
     #[inline(always)]
-    pub(super) fn before<const BEAMS: usize>(scan: &'a PointScan<BEAMS>, index: usize, reach: usize) -> Self {
-        let Some(start) = index.checked_sub(reach) else {
-            let count = scan.ranges.len();
-            let first = Piece::of(scan, (count + index).saturating_sub(reach), count);
-            return Self { first, second: Piece::of(scan, 0, index) };
-        };
-        Self { first: Piece::default(), second: Piece::of(scan, start, index) }
+    pub(super) fn before(scan: &PointView<'a>, index: usize, reach: usize) -> Self {
+        match index.checked_sub(reach) {
+            Some(start) => Self { first: Piece::of(scan, start, index), second: Piece::default() },
+            None => {
+                let count = scan.ranges.len();
+                let first = Piece::of(scan, (count + index).saturating_sub(reach), count);
+                Self { first, second: Piece::of(scan, 0, index) }
+            }
+        }
     }
 
     /// The `reach` beams after beam `index`.
     #[inline(always)]
-    pub(super) fn after<const BEAMS: usize>(scan: &'a PointScan<BEAMS>, index: usize, reach: usize) -> Self {
+    pub(super) fn after(scan: &PointView<'a>, index: usize, reach: usize) -> Self {
         let count = scan.ranges.len();
         let end = index + 1 + reach;
         if end > count {
@@ -104,7 +72,9 @@ impl<'a> Side<'a> {
     // What a caller adds up stays in registers only if the loop is part of the caller.
     #[inline(always)]
     pub(super) fn visit(&self, disc: &Disc, mut visit: impl FnMut(ScanPoint)) {
-        for piece in [self.first, self.second] {
+        let (mut piece, mut next) = (self.first, Some(self.second));
+        // At most two pieces.
+        loop {
             for (point, range) in piece.points.iter().zip(piece.ranges) {
                 if let Some(relative) = disc.holds(point)
                     && *range > 0.0
@@ -112,32 +82,64 @@ impl<'a> Side<'a> {
                     visit(relative);
                 }
             }
+            let Some(second) = next.take() else { break };
+            piece = second;
         }
     }
 
     /// The first return inside the disc in order of beams, for a side that lies before the centre: beams to the
     /// centre, and position relative to it.
-    #[inline(always)]
-    pub(super) fn farthest_before(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
-        let nearer = self.second.points.len();
-        if !self.first.points.is_empty()
-            && let Some((index, relative)) = first_beyond_seam(self.first, disc)
-        {
-            return Some((self.first.points.len() - index + nearer, relative));
-        }
-        self.second.first_inside(disc).map(|(index, relative)| (nearer - index, relative))
+    fn farthest_before(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
+        let (first, second) = (self.first.points.len(), self.second.points.len());
+        let in_first = self.first.inside(disc).next().map(|(index, relative)| (first - index + second, relative));
+        in_first.or_else(|| self.second.inside(disc).next().map(|(index, relative)| (second - index, relative)))
     }
 
     /// The last return inside the disc, for a side that lies after the centre.
-    #[inline(always)]
-    pub(super) fn farthest_after(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
-        if !self.second.points.is_empty()
-            && let Some((index, relative)) = last_beyond_seam(self.second, disc)
-        {
-            return Some((self.first.points.len() + index + 1, relative));
-        }
-        self.first.last_inside(disc).map(|(index, relative)| (index + 1, relative))
+    fn farthest_after(&self, disc: &Disc) -> Option<(usize, ScanPoint)> {
+        let first = self.first.points.len();
+        let in_second = self.second.inside(disc).next_back().map(|(index, relative)| (first + index + 1, relative));
+        in_second.or_else(|| self.first.inside(disc).next_back().map(|(index, relative)| (index + 1, relative)))
     }
+}
+
+/// The first and the last return inside a disc, in order of beams, up to so many before and after the centre: beams to the centre,
+/// and position relative to it. None unless there is one on each side.
+#[inline(always)]
+pub(super) fn farthest(
+    scan: &PointView<'_>,
+    index: usize,
+    (before, after): (u16, u16),
+    disc: &Disc,
+) -> Option<[(usize, ScanPoint); 2]> {
+    let (before, after) = (usize::from(before), usize::from(after));
+    // Absent returns are at the place of the sensor, which is inside only if motion was corrected.
+    if disc.centre.norm_squared() > disc.radius * disc.radius
+        && let Some(start) = index.checked_sub(before)
+        && let Some(points) = scan.points.get(start..index + 1 + after)
+    {
+        // The centre itself is inside: the ways from both ends to it end there at the latest.
+        let first = points.iter().position(|point| disc.holds(point).is_some())?;
+        let last = points.iter().rposition(|point| disc.holds(point).is_some())?;
+        let sides = (first < before && last > before).then_some((before - first, last - before))?;
+        Some([(sides.0, points.get(first)? - disc.centre), (sides.1, points.get(last)? - disc.centre)])
+    } else {
+        farthest_of_any(scan, index, (before, after), disc)
+    }
+}
+
+/// The same across the seam, and where absent returns may be inside. It concerns few; in the caller it would slow the others down.
+#[cold]
+#[inline(never)]
+fn farthest_of_any(
+    scan: &PointView<'_>,
+    index: usize,
+    (before, after): (usize, usize),
+    disc: &Disc,
+) -> Option<[(usize, ScanPoint); 2]> {
+    let before = Side::before(scan, index, before).farthest_before(disc)?;
+    let after = Side::after(scan, index, after).farthest_after(disc)?;
+    Some([before, after])
 }
 
 /// The disc around a candidate that its neighbours lie in.
@@ -146,7 +148,7 @@ pub(super) struct Disc {
     pub centre: ScanPoint,
     /// Range of the centre, m.
     pub range: f32,
-    /// Radius, m; less than the range, so that absent returns are never inside.
+    /// Radius, m; less than the range.
     pub radius: f32,
 }
 
@@ -162,7 +164,7 @@ impl Disc {
 /// Number of beams to each side that may meet a disc whose radius is `sine` of its centre's range: those whose directions
 /// differ by less than asin(`sine`), or all of half a turn if the sensor is in the disc. Possibly a few more, never one less.
 #[inline]
-pub(super) fn beams_within(sine: f32, bearing_step: f32) -> usize {
+pub(super) fn beams_within(sine: f32, bearing_step: f32) -> u16 {
     let angle = if sine <= 0.8 {
         // Never below asin(x), and close to it for the small x of most neighbourhoods.
         sine * (1.0 + 0.25 * sine * sine)
@@ -172,7 +174,7 @@ pub(super) fn beams_within(sine: f32, bearing_step: f32) -> usize {
         core::f32::consts::PI
     };
     // As many as there are numbers, if beams hardly differ.
-    ((angle / bearing_step) as usize).saturating_add(1)
+    ((angle / bearing_step) as u16).saturating_add(1)
 }
 
 /// Calls `visit` with each return within `radius` (m, at most 0.8 of the range) of the return of beam `index`, relative to it,
@@ -190,7 +192,8 @@ pub fn visit_around<const BEAMS: usize>(
     let count = scan.ranges.len();
     let most = if scan.is_full_circle { ((count - 1) / 2, (count - 1) / 2) } else { (index, count - 1 - index) };
     let disc = Disc { centre, range, radius: radius.min(0.8 * range) };
-    let window = beams_within(disc.radius / range, scan.bearing_step);
-    Side::before(scan, index, window.min(most.0)).visit(&disc, &mut visit);
-    Side::after(scan, index, window.min(most.1)).visit(&disc, &mut visit);
+    let window = usize::from(beams_within(disc.radius / range, scan.bearing_step));
+    let view = scan.view();
+    Side::before(&view, index, window.min(most.0)).visit(&disc, &mut visit);
+    Side::after(&view, index, window.min(most.1)).visit(&disc, &mut visit);
 }

@@ -71,8 +71,6 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
     /// finite or lie outside `nearest..=farthest` (m) count as absent. Of a scan with more beams than there is room for, each
     /// [`stride`](Self::stride)th is kept.
     pub fn set(&mut self, scan: &Scan, nearest: f32, farthest: f32) {
-        self.points.clear();
-        self.ranges.clear();
         self.first_bearing = scan.first_bearing as f32;
         let stride = Self::stride(scan);
         let step = scan.bearing_step * stride as f64;
@@ -81,13 +79,15 @@ impl<const BEAMS: usize> PointScan<BEAMS> {
         self.is_full_circle = scan.is_full_circle();
         let (step_sine, step_cosine) = libm::sincos(step);
         let (mut sine, mut cosine) = libm::sincos(scan.first_bearing);
-        for beam in 0..BEAMS {
-            let Some(&range) = scan.ranges.get(beam * stride) else { break };
+        let count = scan.ranges.len().div_ceil(stride).min(BEAMS);
+        // There is room for so many.
+        let _ = self.points.resize(count, ScanPoint::zeros());
+        let _ = self.ranges.resize(count, 0.0);
+        let beams = self.points.iter_mut().zip(&mut self.ranges).zip(scan.ranges.iter().step_by(stride));
+        for ((point, kept), &range) in beams {
             let range = if range >= nearest && range <= farthest && range > 0.0 { range } else { 0.0 };
-            let point = ScanPoint::new(range * cosine as f32, range * sine as f32);
-            // The loop takes no more beams than there is room for.
-            let _ = self.points.push(point);
-            let _ = self.ranges.push(range);
+            *point = ScanPoint::new(range * cosine as f32, range * sine as f32);
+            *kept = range;
             (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
         }
     }

@@ -5,10 +5,10 @@
 //! other side of the jump is where a shadow begins; it moves with the sensor and marks nothing.
 
 use super::parameters::{EndPointParameters, Parameters};
-use super::runs::{Beams, Runs};
+use super::runs::{Beams, Lengths};
 use crate::geometry::ScanPoint;
 use crate::sensing::line::{Line, Moments, largest_variance};
-use crate::sensing::{Keypoint, KeypointKind, PointScan};
+use crate::sensing::{Keypoint, KeypointKind};
 
 /// To which side of its last beam a face ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,119 +28,120 @@ const TRUSTED: f32 = 5.0;
 /// The trusted line is fitted anew each time the face has grown by this factor.
 const GROWTH: f32 = 1.25;
 
-/// Finds the ends of the faces of a scan and gives each to `keep`.
-pub(super) fn find<const BEAMS: usize>(
-    scan: &PointScan<BEAMS>,
-    runs: &Runs<BEAMS>,
-    parameters: &Parameters,
-    wanted: &EndPointParameters,
-    crosses_seam: bool,
-    mut keep: impl FnMut(Keypoint),
-) {
-    let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
-    let lengths = runs.lengths(beams.ranges.len());
-    for (index, (&range, (before, after))) in beams.ranges.iter().zip(lengths).enumerate() {
-        // Most beams are inside a face.
-        let is_inside = before > 0 && after > 0;
-        let is_near = range > 0.0 && range <= parameters.farthest;
-        if is_inside || !is_near {
-            continue;
-        }
-        for (ends, own, back) in [(Ends::After, after, before), (Ends::Before, before, after)] {
-            let back = usize::from(back);
-            if own > 0 || back + 1 < usize::from(wanted.points) {
-                continue;
-            }
-            let away = |steps: usize| match ends {
-                Ends::After => beams.forth(index, steps),
-                Ends::Before => beams.back(index, steps),
-            };
-            // Where the field of view ends, the face need not.
-            if away(1).is_none() {
-                continue;
-            }
-            let background = (1..=FARTHEST_BACKGROUND)
-                .find_map(|steps| away(steps).and_then(|other| Some((steps, other, beams.range(other)?))));
-            if background.is_some_and(|(_, _, background)| background <= range) {
-                continue;
-            }
-            let background = background.map(|(steps, other, _)| (steps, other));
-            if let Some(keypoint) = end_of_face(scan, &beams, index, ends, back, background, parameters, wanted) {
-                keep(keypoint);
-            }
-        }
-    }
+/// The faces of a scan, and what is asked of their ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Faces<'a> {
+    pub beams: Beams<'a>,
+    /// Angle between neighbouring beams, rad.
+    pub bearing_step: f32,
+    pub runs: Lengths<'a>,
+    pub parameters: &'a Parameters,
+    pub wanted: &'a EndPointParameters,
 }
 
-#[allow(clippy::too_many_arguments, reason = "one face, seen from the loop above")]
-fn end_of_face<const BEAMS: usize>(
-    scan: &PointScan<BEAMS>,
-    beams: &Beams<'_>,
-    index: usize,
-    ends: Ends,
-    length: usize,
-    background: Option<(usize, usize)>,
-    parameters: &Parameters,
-    wanted: &EndPointParameters,
-) -> Option<Keypoint> {
-    let last = *scan.points.get(index)?;
-    let range = *scan.ranges.get(index)?;
-    let ray = last / last.norm().max(1e-6);
-    let (line, extent) = face_line(scan, beams, index, ends, length, wanted)?;
-    let normal = line.normal();
-    // Distance of the sensor from the line decides how far apart the beams meet it.
-    let distance = libm::fabsf(normal.dot(&(last + line.centroid)));
-    let slant = libm::fabsf(normal.dot(&ray));
-    if extent < wanted.shortest || line.mean_square() > wanted.residual * wanted.residual || slant < 0.05 {
-        return None;
-    }
-    let spacing = range * range * scan.bearing_step / distance.max(1e-3);
-    if spacing > wanted.spacing {
-        return None;
-    }
-    let offset = normal.dot(&line.centroid);
-    if libm::fabsf(offset) > 3.0 * wanted.residual {
-        return None;
-    }
-    let mut steps = 1;
-    if let Some((background_steps, other)) = background {
-        steps = background_steps;
-        let beyond = *scan.points.get(other)?;
-        if hides_too_little(&line, last, beyond, wanted.depth) {
-            return None;
+impl Faces<'_> {
+    /// Finds the ends of the faces and gives each to `keep`.
+    pub(super) fn find_ends(&self, mut keep: impl FnMut(Keypoint)) {
+        let least = self.wanted.points.saturating_sub(1);
+        // Most beams are inside a face.
+        let at_ends = self.runs.before.iter().zip(self.runs.after).enumerate();
+        for (index, (&before, &after)) in at_ends.filter(|(_, (before, after))| **before == 0 || **after == 0) {
+            if after == 0 && before >= least {
+                self.end(index, Ends::After, usize::from(before)).into_iter().for_each(&mut keep);
+            }
+            if before == 0 && after >= least {
+                self.end(index, Ends::Before, usize::from(after)).into_iter().for_each(&mut keep);
+            }
         }
     }
-    let gap = spacing * steps as f32;
-    if gap > 2.0 * wanted.spacing {
-        return None;
-    }
-    // Where the last beam meets the line: the range's own error drops out.
-    let foot = ray * (offset / normal.dot(&ray));
-    let outwards = if line.along.dot(&line.centroid) > 0.0 { -line.along } else { line.along };
-    let relative = foot + outwards * (0.5 * gap);
 
-    let across = line.variance_at(relative, ray, parameters.range_deviation * parameters.range_deviation);
-    // An error across the line moves the foot along the beam.
-    let along_beam = across / (slant * slant);
-    let along_face = gap * gap / 12.0;
-    let floor = parameters.deviation_floor * parameters.deviation_floor;
-    let covariance = [
-        along_beam * ray.x * ray.x + along_face * outwards.x * outwards.x + floor,
-        along_beam * ray.x * ray.y + along_face * outwards.x * outwards.y,
-        along_beam * ray.y * ray.y + along_face * outwards.y * outwards.y + floor,
-    ];
-    if largest_variance(covariance) > wanted.spacing * wanted.spacing {
-        return None;
+    /// The end of a face at its last beam, which has `length` beams of it on the other side. None if nothing says where it ends.
+    fn end(&self, index: usize, ends: Ends, length: usize) -> Option<Keypoint> {
+        let Self { beams, parameters, wanted, .. } = self;
+        let range = beams.range(index).filter(|range| *range <= parameters.farthest)?;
+        let away = |steps: usize| match ends {
+            Ends::After => beams.forth(index, steps),
+            Ends::Before => beams.back(index, steps),
+        };
+        // Where the field of view ends, the face need not.
+        away(1)?;
+        let background = (1..=FARTHEST_BACKGROUND)
+            .find_map(|steps| away(steps).and_then(|other| Some((steps, other, beams.range(other)?))));
+        if background.is_some_and(|(_, _, background)| background <= range) {
+            return None;
+        }
+        let (line, extent) = face_line(beams, index, ends, length, wanted)?;
+        let background = background.map(|(steps, other, _)| (steps, other));
+        self.end_of_line(index, range, &line, extent, background)
     }
-    Some(Keypoint {
-        kind: KeypointKind::EndPoint,
-        beam: index as u16,
-        position: last + relative,
-        covariance,
-        orientation: libm::atan2f(-outwards.y, -outwards.x),
-        radius: extent,
-        score: 0.0,
-    })
+
+    /// The same, if the face lies along a line and goes on for `extent` (m), and some beams on something is seen behind it.
+    fn end_of_line(
+        &self,
+        index: usize,
+        range: f32,
+        line: &Line,
+        extent: f32,
+        background: Option<(usize, usize)>,
+    ) -> Option<Keypoint> {
+        let Self { beams, parameters, wanted, .. } = self;
+        let last = *beams.points.get(index)?;
+        let ray = last / last.norm().max(1e-6);
+        let normal = line.normal();
+        // Distance of the sensor from the line decides how far apart the beams meet it.
+        let distance = libm::fabsf(normal.dot(&(last + line.centroid)));
+        let slant = libm::fabsf(normal.dot(&ray));
+        if extent < wanted.shortest || line.mean_square() > wanted.residual * wanted.residual || slant < 0.05 {
+            return None;
+        }
+        let spacing = range * range * self.bearing_step / distance.max(1e-3);
+        if spacing > wanted.spacing {
+            return None;
+        }
+        let offset = normal.dot(&line.centroid);
+        if libm::fabsf(offset) > 3.0 * wanted.residual {
+            return None;
+        }
+        let mut steps = 1;
+        if let Some((background_steps, other)) = background {
+            steps = background_steps;
+            let beyond = *beams.points.get(other)?;
+            if hides_too_little(line, last, beyond, wanted.depth) {
+                return None;
+            }
+        }
+        let gap = spacing * steps as f32;
+        if gap > 2.0 * wanted.spacing {
+            return None;
+        }
+        // Where the last beam meets the line: the range's own error drops out.
+        let foot = ray * (offset / normal.dot(&ray));
+        let outwards = if line.along.dot(&line.centroid) > 0.0 { -line.along } else { line.along };
+        let relative = foot + outwards * (0.5 * gap);
+
+        let across = line.variance_at(relative, ray, parameters.range_deviation * parameters.range_deviation);
+        // An error across the line moves the foot along the beam.
+        let along_beam = across / (slant * slant);
+        let along_face = gap * gap / 12.0;
+        let floor = parameters.deviation_floor * parameters.deviation_floor;
+        let covariance = [
+            along_beam * ray.x * ray.x + along_face * outwards.x * outwards.x + floor,
+            along_beam * ray.x * ray.y + along_face * outwards.x * outwards.y,
+            along_beam * ray.y * ray.y + along_face * outwards.y * outwards.y + floor,
+        ];
+        if largest_variance(covariance) > wanted.spacing * wanted.spacing {
+            return None;
+        }
+        Some(Keypoint {
+            kind: KeypointKind::EndPoint,
+            beam: index as u16,
+            position: last + relative,
+            covariance,
+            orientation: libm::atan2f(-outwards.y, -outwards.x),
+            radius: extent,
+            score: 0.0,
+        })
+    }
 }
 
 /// Whether what is seen beside the face lies less than `depth` (m) behind the line of the face.
@@ -155,45 +156,46 @@ fn hides_too_little(line: &Line, last: ScanPoint, beyond: ScanPoint, depth: f32)
 }
 
 /// The line through the face from its last beam inwards, relative to the last return, and how far it goes, m.
-fn face_line<const BEAMS: usize>(
-    scan: &PointScan<BEAMS>,
+fn face_line(
     beams: &Beams<'_>,
     index: usize,
     ends: Ends,
     length: usize,
     wanted: &EndPointParameters,
 ) -> Option<(Line, f32)> {
-    let last = *scan.points.get(index)?;
+    let last = *beams.points.get(index)?;
     let mut moments = Moments::default();
     let (mut trusted, mut renewal) = (None::<Line>, TRUSTED);
     let mut extent = 0.0_f32;
     let farthest = 3.0 * wanted.residual;
-    for steps in 0..=length {
-        let inwards = match ends {
-            Ends::After => beams.back(index, steps),
-            Ends::Before => beams.forth(index, steps),
-        };
-        let Some(inner) = inwards else { break };
-        if beams.range(inner).is_none() {
-            continue;
-        }
-        let relative = *scan.points.get(inner)? - last;
-        let reach = relative.norm();
-        if reach > wanted.length {
+    let mut inner = Some(index);
+    for _ in 0..=length {
+        let Some((point, range)) = inner.and_then(|inner| beams.points.get(inner).zip(beams.ranges.get(inner))) else {
             break;
-        }
-        if moments.count >= renewal {
-            trusted = moments.line();
-            renewal = GROWTH * moments.count;
-        }
-        if let Some(line) = &trusted {
-            // The face bends here: what lies behind is another one.
-            if libm::fabsf(line.normal().dot(&(relative - line.centroid))) > farthest {
+        };
+        if *range > 0.0 {
+            let relative = point - last;
+            let reach = relative.norm();
+            if reach > wanted.length {
                 break;
             }
+            if moments.count >= renewal {
+                trusted = moments.line();
+                renewal = GROWTH * moments.count;
+            }
+            if let Some(line) = &trusted {
+                // The face bends here: what lies behind is another one.
+                if libm::fabsf(line.normal().dot(&(relative - line.centroid))) > farthest {
+                    break;
+                }
+            }
+            moments.add(relative);
+            extent = extent.max(reach);
         }
-        moments.add(relative);
-        extent = extent.max(reach);
+        inner = inner.and_then(|inner| match ends {
+            Ends::After => beams.back(inner, 1),
+            Ends::Before => beams.forth(inner, 1),
+        });
     }
     if moments.count < f32::from(wanted.points) {
         return None;

@@ -9,6 +9,7 @@
 //! over counts of sectors. The printed sectors are measured from the sensor's first axis, so keypoints would depend on
 //! the sensor's heading; here they are measured from the corner's own orientation (K 3.2.3), which turns with it.
 
+mod candidates;
 mod corner;
 mod detector;
 mod end_point;

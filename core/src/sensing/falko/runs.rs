@@ -1,7 +1,7 @@
 //! Unbroken surfaces: where one ends, neighbourhoods end too.
 
 use crate::geometry::ScanPoint;
-use crate::sensing::PointScan;
+use crate::sensing::PointView;
 
 /// Absent returns that are bridged between two returns of one surface.
 const BRIDGED: usize = 2;
@@ -23,95 +23,103 @@ impl<const BEAMS: usize> Runs<BEAMS> {
         Self { before: [0; BEAMS], after: [0; BEAMS] }
     }
 
-    /// Beams before `index` on the same surface.
-    pub(super) fn before(&self, index: usize) -> usize {
-        self.before.get(index).copied().map_or(0, usize::from)
+    /// Those of the first `count` beams.
+    pub(super) fn lengths(&self, count: usize) -> Lengths<'_> {
+        // No scan has more beams than there is room for.
+        Lengths {
+            before: self.before.get(..count).unwrap_or_default(),
+            after: self.after.get(..count).unwrap_or_default(),
+        }
     }
 
-    /// Beams after `index` on the same surface.
-    pub(super) fn after(&self, index: usize) -> usize {
-        self.after.get(index).copied().map_or(0, usize::from)
-    }
-
-    /// Beams before and after each of the first `count` beams on the same surface.
-    pub(super) fn lengths(&self, count: usize) -> impl Iterator<Item = (u16, u16)> {
-        self.before.iter().copied().zip(self.after.iter().copied()).take(count)
+    /// No surface ends but where the field of view does.
+    pub(super) fn set_unbroken(&mut self, count: usize, crosses_seam: bool) {
+        let most = count.saturating_sub(1);
+        let lengths = self.before.iter_mut().zip(&mut self.after).take(count);
+        for (index, (before, after)) in lengths.enumerate() {
+            // No scan has more beams than that.
+            let (earlier, later) = if crosses_seam { (most, most) } else { (index, most - index) };
+            (*before, *after) = (earlier as u16, later as u16);
+        }
     }
 
     /// Finds the surfaces of a scan; a surface ends where the range departs from it by more than `jump` (m).
-    pub(super) fn find(&mut self, scan: &PointScan<BEAMS>, crosses_seam: bool, jump: f32) {
-        let beams = Beams { ranges: &scan.ranges, points: &scan.points, crosses_seam };
+    pub(super) fn find(&mut self, scan: &PointView<'_>, crosses_seam: bool, jump: f32) {
+        let beams = Beams { ranges: scan.ranges, points: scan.points, crosses_seam };
         let count = beams.ranges.len();
         // No scan has more beams than there is room for.
         let (Some(before), Some(after)) = (self.before.get_mut(..count), self.after.get_mut(..count)) else { return };
-        let most = count.saturating_sub(1);
-
-        let mut last = if crosses_seam { beams.before_first() } else { None };
-        for (index, (&range, before)) in beams.ranges.iter().zip(before.iter_mut()).enumerate() {
-            let linked = last.filter(|last| {
-                range > 0.0
-                    && last.steps <= BRIDGED + 1
-                    && (libm::fabsf(range - last.range) <= jump || !beams.is_broken(index, last.steps, jump))
-            });
-            *before = linked.map_or(0, |last| last.length_from(most));
-            last = Return::nearest(last, range, *before);
-        }
-        if crosses_seam {
-            // The second lap carries a surface across the seam.
-            for (&range, before) in beams.ranges.iter().zip(before.iter_mut()) {
-                if range > 0.0 {
-                    let Some(linked) = last.filter(|_| *before > 0) else { break };
-                    *before = linked.length_from(most);
+        before.fill(0);
+        after.fill(0);
+        let is_return = |range: &f32| *range > 0.0;
+        let Some(head) = beams.ranges.iter().position(is_return) else { return };
+        let mut last = (head, beams.ranges.get(head).copied().unwrap_or_default());
+        let (mut first, head) = (head, last);
+        for (index, &range) in beams.ranges.iter().enumerate() {
+            if is_return(&range) {
+                if !beams.is_linked(index.wrapping_sub(last.0), last.1, (index, range), jump) {
+                    set(before, after, beams.ranges, (first, last.0), (0, 0));
+                    first = index;
                 }
-                last = Return::nearest(last, range, *before);
+                last = (index, range);
             }
         }
-
-        let mut next = None::<Return>;
-        for lap in 0..if crosses_seam { 2 } else { 1 } {
-            for ((&range, &before), after) in beams.ranges.iter().zip(before.iter()).zip(after.iter_mut()).rev() {
-                let linked = next.filter(|_| range > 0.0);
-                *after = linked.map_or(0, |next| next.length_from(most));
-                next = Return::nearest(next, range, *after).filter(|next| next.steps > 1 || before > 0);
-                if lap > 0 && next.is_none() {
-                    break;
-                }
-            }
-        }
-    }
-}
-
-/// The nearest return on the way through the beams.
-#[derive(Clone, Copy)]
-struct Return {
-    /// Beams since then.
-    steps: usize,
-    /// Range, m.
-    range: f32,
-    /// Beams on its surface that were passed before.
-    length: u16,
-}
-
-impl Return {
-    /// The nearest return after one more beam.
-    #[inline]
-    fn nearest(last: Option<Self>, range: f32, length: u16) -> Option<Self> {
-        if range > 0.0 {
-            Some(Self { steps: 1, range, length })
+        let whole = count.saturating_sub(1);
+        let (last, last_range) = last;
+        let steps = count + head.0 - last;
+        if !crosses_seam || !beams.is_linked(steps, last_range, head, jump) {
+            set(before, after, beams.ranges, (first, last), (0, 0));
+        } else if first == head.0 {
+            set(before, after, beams.ranges, (first, last), (whole, whole));
         } else {
-            last.map(|last| Self { steps: last.steps + 1, ..last })
+            // The last surface and the first one are one.
+            let end = head.0 + after.get(head.0).copied().map_or(0, usize::from);
+            set(before, after, beams.ranges, (head.0, end), (count + head.0 - first, 0));
+            set(before, after, beams.ranges, (first, last), (0, count + end - last));
         }
     }
+}
 
-    /// Beams on the surface up to here, if it goes on.
-    #[inline]
-    fn length_from(self, most: usize) -> u16 {
-        (usize::from(self.length) + self.steps).min(most) as u16
+/// Sets how far the surface of the returns from beam `first` to `last` goes on, if there are `lead` beams of it before them and
+/// `trail` after them.
+#[inline]
+fn set(
+    before: &mut [u16],
+    after: &mut [u16],
+    ranges: &[f32],
+    (first, last): (usize, usize),
+    (lead, trail): (usize, usize),
+) {
+    let most = ranges.len().saturating_sub(1);
+    let beams = first..last + 1;
+    let (Some(before), Some(after)) = (before.get_mut(beams.clone()), after.get_mut(beams.clone())) else { return };
+    let ranges = ranges.get(beams).unwrap_or_default();
+    count_up(before.iter_mut().zip(ranges), lead, most);
+    count_up(after.iter_mut().zip(ranges).rev(), trail, most);
+}
+
+/// Numbers the returns, absent ones between them included, from a number on and up to `most`.
+#[inline]
+fn count_up<'a>(beams: impl Iterator<Item = (&'a mut u16, &'a f32)>, from: usize, most: usize) {
+    // No scan has more beams than that.
+    let (mut number, most) = (from as u32, most as u32);
+    for (slot, range) in beams {
+        *slot = if *range > 0.0 { number.min(most) as u16 } else { 0 };
+        number = number.wrapping_add(1);
     }
+}
+
+/// How far the surface of each beam of a scan goes on without a break.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lengths<'a> {
+    /// Beams before each beam on its surface.
+    pub before: &'a [u16],
+    /// Beams after each beam on its surface.
+    pub after: &'a [u16],
 }
 
 /// Ranges by beam, around the circle or not.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Beams<'a> {
     pub ranges: &'a [f32],
     pub points: &'a [ScanPoint],
@@ -153,11 +161,10 @@ impl Beams<'_> {
         self.points.get(index).map(|point| point.norm()).filter(|distance| *distance > 0.0)
     }
 
-    /// The last return of the scan, as seen from its first beam.
-    fn before_first(&self) -> Option<Return> {
-        let steps = (1..=BRIDGED + 1).find(|steps| self.back(0, *steps).and_then(|beam| self.range(beam)).is_some())?;
-        let range = self.range(self.back(0, steps)?)?;
-        Some(Return { steps, range, length: 0 })
+    /// Whether a return lies on the same surface as the last one before it, so many beams earlier, with that range (m).
+    #[inline]
+    fn is_linked(&self, steps: usize, last: f32, (index, range): (usize, f32), jump: f32) -> bool {
+        steps <= BRIDGED + 1 && (libm::fabsf(range - last) <= jump || !self.is_broken(index, steps, jump))
     }
 
     /// Whether the return of a beam lies on another surface than the one `gap` beams before, from whose range it departs by

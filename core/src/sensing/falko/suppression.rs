@@ -1,6 +1,6 @@
 //! Which of several candidates close to each other stays (K 3.1.1).
 
-use crate::sensing::PointScan;
+use crate::sensing::PointView;
 use crate::sensing::neighbourhood::beams_within;
 
 /// How good a candidate is; of two candidates the one with the smaller cost stays.
@@ -24,8 +24,8 @@ impl Cost {
 ///
 /// Order of beams decides only between candidates that are alike in cost and height, and then by which one comes
 /// first within the neighbourhood, so that the start of a full circle plays no part.
-pub(super) fn is_best_within<const BEAMS: usize>(
-    scan: &PointScan<BEAMS>,
+pub(super) fn is_best_within(
+    scan: &PointView<'_>,
     costs: &[Cost],
     index: usize,
     radius: f32,
@@ -36,7 +36,7 @@ pub(super) fn is_best_within<const BEAMS: usize>(
         return false;
     };
     let count = costs.len();
-    let reach = beams_within(radius / range, scan.bearing_step).min(count.saturating_sub(1) / 2);
+    let reach = usize::from(beams_within(radius / range, scan.bearing_step)).min(count.saturating_sub(1) / 2);
     let squared_radius = radius * radius;
     let beaten = |other: usize, wins_ties: bool| {
         let Some(cost) = costs.get(other).filter(|cost| cost.is_candidate()) else { return false };
@@ -57,8 +57,8 @@ pub(super) fn is_best_within<const BEAMS: usize>(
 /// The reference program's walk: calls `keep` with the beam of each candidate that stays, in order.
 ///
 /// `worst` is the largest cost of the scan; beams that are no candidates count as that bad.
-pub(super) fn walk<const BEAMS: usize>(
-    scan: &PointScan<BEAMS>,
+pub(super) fn walk(
+    scan: &PointView<'_>,
     costs: &[Cost],
     radius: f32,
     worst: f32,
