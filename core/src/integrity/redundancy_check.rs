@@ -7,13 +7,16 @@
 use crate::measurement::Time;
 use crate::odometry::Motion;
 
-/// Way over which what does not fit is summed, m; a second sum begins in the middle of each.
+/// Way over which what does not fit is summed, m.
 const WINDOW: f64 = 0.3;
-/// A sum of more deviations is none of a vehicle in order.
-const GATE: f64 = 6.0;
+/// So many sums, each of which begins behind the one before by its part of the way.
+const WINDOWS: usize = 4;
+/// A sum of more deviations is none of a vehicle in order: wheels that slip by all that is stated exceed it once in some 100 km.
+const GATE: f64 = 5.0;
 /// How long, s, what was found is told.
 const TOLD_FOR: f64 = 1.0;
 
+/// What was summed since a place.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     slip: f64,
@@ -36,7 +39,10 @@ pub struct WheelErrors {
 /// The sums, and until when a slip is told.
 #[derive(Clone, Debug)]
 pub struct RedundancyCheck {
-    windows: [Window; 2],
+    windows: [Window; WINDOWS],
+    /// The window that begins next, and the way since the last one began, m.
+    next: usize,
+    since: f64,
     slips_until: Option<Time>,
 }
 
@@ -44,23 +50,24 @@ impl RedundancyCheck {
     /// A check that has seen nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { windows: [Window::EMPTY; 2], slips_until: None }
+        Self { windows: [Window::EMPTY; WINDOWS], next: 0, since: 0.0, slips_until: None }
     }
 
     /// Forgets the way behind.
     pub fn clear(&mut self) {
-        self.windows = [Window::EMPTY; 2];
+        self.windows = [Window::EMPTY; WINDOWS];
     }
 
     /// Takes a motion, and what does not fit of it, m ([`crate::odometry::Step::slip`]).
     pub fn travel(&mut self, motion: &Motion, slip: f64, errors: &WheelErrors) {
-        let [first, second] = &mut self.windows;
-        if first.way >= WINDOW {
-            *first = core::mem::replace(second, Window::EMPTY);
+        if self.since >= WINDOW / WINDOWS as f64 {
+            // The oldest one is over.
+            if let Some(oldest) = self.windows.get_mut(self.next) {
+                *oldest = Window::EMPTY;
+            }
+            (self.next, self.since) = ((self.next + 1) % WINDOWS, 0.0);
         }
-        if first.way < 0.5 * WINDOW {
-            *second = Window::EMPTY;
-        }
+        self.since += motion.distance;
         for window in &mut self.windows {
             window.slip += slip;
             window.way += motion.distance;
