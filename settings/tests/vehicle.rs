@@ -104,11 +104,12 @@ fn a_vehicle_of_any_kind_is_stored_and_read() {
     }
 }
 
-/// Which leaf does not go with the others.
+/// A kind, settings, and the leaf that does not go with the others.
+type Case<'a> = (VehicleKind, &'a [(&'a str, f64)], Option<&'a str>);
+
 #[test]
 fn a_contradiction_is_named() {
     use VehicleKind::{Ackermann, BiSteerable, Differential, Increments, Mecanum, Omni3, TricycleSpeed};
-    type Case = (VehicleKind, &'static [(&'static str, f64)], Option<&'static str>);
     let cases: [Case; 14] = [
         (Differential, &[("vehicle.wheel_2_scale", 0.0)], Some("vehicle.wheel_2_scale")),
         // It has no third wheel.
