@@ -21,7 +21,6 @@ mod encoders;
 mod gyro;
 mod laser;
 mod localization;
-mod own_reports;
 mod progress;
 mod setting_objects;
 mod standstill;

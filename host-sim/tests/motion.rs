@@ -17,7 +17,7 @@ use agv_wire::can::encoder::Profile;
 const BEGIN: u64 = 1500;
 
 fn recording(reports: MotionReport) -> Recording {
-    let mut scenario = Scenario::read(Path::new("block_storage_p1")).unwrap();
+    let mut scenario = Scenario::read(Path::new("block_storage_p2")).unwrap();
     scenario.laser.scans = false;
     scenario.vehicle.reports = reports;
     simulate(&scenario).unwrap().recording

@@ -53,7 +53,16 @@ const HOUSES: [House; 8] = [
     House { folder: "wire", floors: &[&["can", "cola"], &["nav350"]] },
     House {
         folder: "settings",
-        floors: &[&["settings"], &["bus_load"], &["contradiction"], &["leaf"], &["leaves"], &["store"], &["service"]],
+        floors: &[
+            &["vehicle"],
+            &["settings"],
+            &["bus_load"],
+            &["contradiction"],
+            &["leaf"],
+            &["leaves"],
+            &["store"],
+            &["service"],
+        ],
     },
     House {
         folder: "lidar3d",
@@ -95,7 +104,7 @@ const HOUSES: [House; 8] = [
         ],
     },
     House { folder: "firmware", floors: &[&["app"], &["board"]] },
-    House { folder: "lab", floors: &[&["campaign"], &["evaluate", "trust"]] },
+    House { folder: "lab", floors: &[&["equipment"], &["campaign"], &["evaluate", "trust"]] },
 ];
 
 /// Rust sources under a folder, as paths relative to it.

@@ -18,13 +18,12 @@ use agv_wire::nav350::SensorFrame;
 use serde::{Deserialize, Serialize};
 
 use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose};
-use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like};
+use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like, write_flash};
 use crate::emulate::board::{ADDRESS, HOST};
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::EmulatedMotion;
 use crate::live::stream::LogCopy;
 use crate::log::Reader;
-use crate::provision::flash_image;
 use crate::recording::{Recording, truth_at};
 use crate::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
 
@@ -173,8 +172,7 @@ pub fn drive_in_chip(
     seconds: f64,
 ) -> Result<InChip, VehicleError> {
     let settings = settings_like(recording, LASER_PORT);
-    let flash = folder.join("flash.bin");
-    std::fs::write(&flash, flash_image(&settings, &recording.landmarks, None)?)?;
+    let flash = write_flash(folder, &settings, &recording.landmarks, None)?;
     let log_port = settings.network.log_port;
     let vehicle = Vehicle { flash: &flash, controller: ADDRESS, host: HOST, laser_port: LASER_PORT, log_port };
     let mut chip = Chip::start(program, &vehicle)?;

@@ -16,6 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use agv_settings::Settings;
 use agv_settings::store::KEY;
@@ -81,6 +82,18 @@ pub fn settings_like(recording: &Recording, laser_port: u16) -> Settings {
     settings
 }
 
+/// Writes the flash of a vehicle that is set up so into a folder, and says where.
+fn write_flash(
+    folder: &Path,
+    settings: &Settings,
+    landmarks: &[Landmark],
+    key: Option<&[u8; KEY]>,
+) -> Result<PathBuf, VehicleError> {
+    let path = folder.join("flash.bin");
+    std::fs::write(&path, flash_image(settings, landmarks, key)?)?;
+    Ok(path)
+}
+
 /// Lets the vehicle drive for `seconds` of a recording, or to its end. `watch` is called once, at the start, to look on
 /// and make trouble.
 ///
@@ -99,8 +112,7 @@ pub fn drive(
     let laser_port = listener.local_addr()?.port();
     let settings = settings_like(recording, laser_port);
     if options.provision {
-        let image = flash_image(&settings, &recording.landmarks, options.key.as_ref())?;
-        std::fs::write(options.folder.join("flash.bin"), image)?;
+        write_flash(options.folder, &settings, &recording.landmarks, options.key.as_ref())?;
     }
     let (board, bus) = Board::start(options.image, options.folder)?;
     let log = options.folder.join("stream.agvlog");

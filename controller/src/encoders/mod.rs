@@ -1,5 +1,7 @@
 //! What tells the vehicle's motion on the bus, and what other controllers say to the localiser there.
 
+mod own_reports;
+
 use agv_core::localizer::{Event, Parameters, PoseFix};
 use agv_core::measurement::{
     EncoderFaults, EncoderSample, GyroSample, MOST_WHEELS, PoseIncrement, SpeedSample, Time, WheelReading, WheelSample,
@@ -15,7 +17,7 @@ use agv_wire::can::motion_frames::MotionFrames;
 use agv_wire::can::plausibility::PlausibilityLimits;
 use heapless::Vec;
 
-use super::own_reports::OwnReports;
+use own_reports::OwnReports;
 
 /// Time between SYNC messages if encoders want them, s; and between their positions then.
 const SYNC_PERIOD: f64 = 0.010;

@@ -7,7 +7,7 @@ use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::motion_frames::{IncrementReports, MotionFrames, SpeedReports};
 use heapless::Vec;
 
-use super::encoders::{BusEvent, EncoderNodes, add};
+use super::{BusEvent, EncoderNodes, add};
 
 /// Silences after which a report is late and missing, in periods: those of encoders
 /// ([`agv_wire::can::plausibility::PlausibilityLimits::every`]).
