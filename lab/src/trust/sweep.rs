@@ -66,8 +66,8 @@ pub fn worst<'a>(kinds: &'a [Kind], rows: &[Row], runs: u64, first_seed: u64) ->
     kinds.iter().flat_map(of_kind).collect()
 }
 
-/// Makes those runs that are in a shard with that vehicle, on all cores, and returns them in order. `settings` changes what the controller believes from
-/// its defaults, and `done` is called after each run.
+/// Makes those runs that are in a shard with that vehicle, on all cores, and returns them in order. `settings` changes what the
+/// controller believes from its defaults, and `done` is called after each run.
 ///
 /// # Errors
 /// See [`CampaignError`]. A panic is no error but a row.
