@@ -7,7 +7,7 @@ use agv_core::maps::{Landmark, LandmarkKind};
 use serde::Serialize;
 
 use crate::drive::{Figures, kind_name, mode_name};
-use crate::replay::Comparison;
+use crate::replay::Comparisons;
 use crate::text_file::{self, TextFileError};
 
 /// How a line ended.
@@ -78,10 +78,11 @@ fn halt(line: &str) -> Option<Halt> {
     numbers?.try_into().ok()
 }
 
-/// All lines of the test of a vehicle with a `map`: of kinds that are not in it nothing is asked.
+/// All lines of the test of a vehicle with a `map`: of kinds that are not in it nothing is asked. `said` is what the log holds of what
+/// the vehicle has said.
 #[must_use]
-pub fn test(figures: &Figures, map: &[Landmark], outputs: Option<Comparison>, halts: &[Halt]) -> Vec<Line> {
-    let mut lines = vec![same_bits(outputs), never_lost(figures)];
+pub fn test(figures: &Figures, map: &[Landmark], said: &Comparisons, halts: &[Halt]) -> Vec<Line> {
+    let mut lines = vec![same_bits(said), never_lost(figures)];
     lines.extend(honest(figures, map));
     lines.extend(fitting(figures, map));
     lines.push(repeatable(halts));
@@ -96,17 +97,20 @@ fn is_mapped(map: &[Landmark], kind: LandmarkKind) -> bool {
     map.iter().any(|landmark| landmark.kind == kind)
 }
 
-fn same_bits(outputs: Option<Comparison>) -> Line {
-    let (verdict, found) = match outputs {
-        Some(Comparison { compared: 0, .. }) | None => {
-            (Verdict::NotMeasured, "the log holds no outputs of the vehicle".to_owned())
+/// A log in which nothing was published was written by a replay: its outputs say nothing of a vehicle.
+fn same_bits(said: &Comparisons) -> Line {
+    let (verdict, found) = match (said.outputs, said.published) {
+        (Some(outputs), Some(published)) if outputs.compared > 0 && published.compared > 0 => {
+            let differences = [outputs, published].into_iter().filter_map(|comparison| comparison.first_difference);
+            differences.min().map_or_else(
+                || {
+                    let (outputs, published) = (outputs.compared, published.compared);
+                    (Verdict::Pass, format!("{outputs} outputs and {published} published poses are equal, bit for bit"))
+                },
+                |event| (Verdict::Fail, format!("the outputs differ, first at event {event}")),
+            )
         }
-        Some(Comparison { compared, first_difference: None }) => {
-            (Verdict::Pass, format!("{compared} outputs are equal, bit for bit"))
-        }
-        Some(Comparison { first_difference: Some(event), .. }) => {
-            (Verdict::Fail, format!("the outputs differ, first at event {event}"))
-        }
+        _ => (Verdict::NotMeasured, "the log holds no outputs of a vehicle".to_owned()),
     };
     Line { what: "the same bits".to_owned(), verdict, found, must_be: "no difference" }
 }
@@ -181,6 +185,7 @@ fn repeatable(halts: &[Halt]) -> Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::replay::Comparison;
 
     /// A drive of which nothing is known.
     fn nothing() -> Figures {
@@ -200,13 +205,26 @@ mod tests {
 
     #[test]
     fn what_was_not_compared_never_passes() {
-        for outputs in [None, Some(Comparison { compared: 0, first_difference: None })] {
+        let nothing_compared = Some(Comparison { compared: 0, first_difference: None });
+        for outputs in [None, nothing_compared] {
+            let said = Comparisons { outputs, published: outputs };
             for halts in [&[][..], &[[0.0; 3]; 9]] {
-                let lines = test(&nothing(), &[], outputs, halts);
+                let lines = test(&nothing(), &[], &said, halts);
                 assert_eq!(lines.len(), 5);
                 assert!(lines.iter().all(|line| line.verdict == Verdict::NotMeasured), "{lines:?}");
             }
         }
+    }
+
+    #[test]
+    fn the_bits_are_those_of_a_vehicle() {
+        let equal = Some(Comparison { compared: 5, first_difference: None });
+        let other = Some(Comparison { compared: 5, first_difference: Some(3) });
+        let verdict = |outputs, published| same_bits(&Comparisons { outputs, published }).verdict;
+        assert_eq!(verdict(equal, equal), Verdict::Pass);
+        assert_eq!(verdict(equal, None), Verdict::NotMeasured);
+        assert_eq!(verdict(equal, other), Verdict::Fail);
+        assert_eq!(verdict(other, equal), Verdict::Fail);
     }
 
     #[test]

@@ -12,9 +12,12 @@ use std::time::{Duration, Instant};
 
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Mode, Relocalization};
+use agv_host_sim::acceptance::{self, Verdict};
+use agv_host_sim::drive::{Figures, Track};
 use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, ServiceError};
 use agv_host_sim::recording::Recording;
+use agv_host_sim::replay::Comparisons;
 use agv_host_sim::simulate::scenario::{MotionReport, Scenario};
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
@@ -72,6 +75,10 @@ fn assert_replayed(drive: &Drive, least: usize) {
     let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
     assert_eq!(published.first_difference, None);
     assert!(published.compared >= least / 2, "{} poses were published", published.compared);
+    let said = Comparisons { outputs: Some(comparison), published: Some(published) };
+    let figures = Figures::new(&contents.recording, &again, &Track::new(&contents.recording, &again));
+    let lines = acceptance::test(&figures, &contents.recording.landmarks, &said, &[]);
+    assert_eq!((&*lines[0].what, lines[0].verdict), ("the same bits", Verdict::Pass), "{lines:?}");
 }
 
 /// Waits until something is so, and says how long that took.

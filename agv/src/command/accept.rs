@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use agv_host_sim::acceptance::{self, Line, Verdict};
 use agv_host_sim::drive::{Figures, Track};
 use agv_host_sim::log::{self, Contents};
-use agv_host_sim::replay::{compare, replay};
+use agv_host_sim::replay::{Comparisons, replay};
 use anyhow::Context;
 use serde::Serialize;
 
@@ -49,16 +49,19 @@ impl Accept {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         let halts = self.halts.as_deref().map(acceptance::read_halts).transpose()?.unwrap_or_default();
-        let Contents { mut recording, outputs, .. } = log::read_contents(&self.log, |_| ())?;
+        let Contents { mut recording, outputs, publishing, .. } = log::read_contents(&self.log, |_| ())?;
         self.settings.apply(&mut recording.parameters)?;
         let running = progress::bar("replaying", recording.events.len() as u64);
         let replay = replay(&recording, |events| running.set_position(events as u64))
             .with_context(|| self.log.display().to_string())?;
         running.finish_and_clear();
-        let is_as_recorded = self.settings.is_empty() && !outputs.is_empty();
-        let comparison = is_as_recorded.then(|| compare(&outputs, &replay));
+        let said = if self.settings.is_empty() {
+            Comparisons::of(&outputs, &publishing, &recording, &replay)
+        } else {
+            Comparisons::default()
+        };
         let figures = Figures::new(&recording, &replay, &Track::new(&recording, &replay));
-        let lines = acceptance::test(&figures, &recording.landmarks, comparison, &halts);
+        let lines = acceptance::test(&figures, &recording.landmarks, &said, &halts);
         let verdict = overall(&lines);
         if self.json {
             println!("{}", serde_json::to_string_pretty(&Result { verdict, lines })?);
