@@ -65,7 +65,7 @@ impl Provision {
         doubts.iter().for_each(|doubt| note(&format!("agv: {doubt}")));
         let image = flash_image(&settings, &landmarks, Some(&key))?;
         output_file::write(&self.output, &image).with_context(|| self.output.display().to_string())?;
-        let changed = changed(&settings);
+        let changed = changed(&settings, &self.settings);
         if self.json {
             let settings: serde_json::Map<_, _> =
                 changed.iter().map(|[name, value]| (name.clone(), value.clone().into())).collect();
@@ -85,12 +85,12 @@ impl Provision {
     }
 }
 
-/// Settings that are not as they leave the factory, with their values.
-fn changed(settings: &Settings) -> Vec<[String; 2]> {
+/// Settings that were given or are not as they leave the factory, with their values.
+fn changed(settings: &Settings, given: &SettingArguments) -> Vec<[String; 2]> {
     let usual = Settings::default();
     let row = |leaf: &Leaf| {
         let value = leaf.get(settings)?;
-        (leaf.get(&usual) != Some(value)).then(|| {
+        (leaf.get(&usual) != Some(value) || given.has(leaf)).then(|| {
             [leaf.name.to_owned(), format!("{} {}", show_setting(leaf.name, value), leaf.unit).trim_end().to_owned()]
         })
     };

@@ -34,6 +34,11 @@ impl SettingArguments {
         self.set.iter().filter_map(|text| Leaf::named(text.split_once('=')?.0))
     }
 
+    /// Whether a setting is among them.
+    pub fn has(&self, leaf: &Leaf) -> bool {
+        self.leaves().any(|given| given.name == leaf.name)
+    }
+
     /// Changes settings.
     pub fn change(&self, settings: &mut Settings) -> anyhow::Result<()> {
         self.set.iter().try_for_each(|text| change(settings, text))?;

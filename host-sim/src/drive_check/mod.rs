@@ -4,6 +4,7 @@ mod calibration;
 mod timing;
 
 use agv_core::localizer::Mode;
+use agv_core::maps::{Landmark, LandmarkKind};
 use serde::Serialize;
 
 use crate::calibrate::causes::{Explanation, explain};
@@ -112,16 +113,32 @@ fn what_is_missing(recording: &Recording, log: &str) -> Vec<Finding> {
         findings.push(Finding::new("the laser says nothing in this log", "agv nav350 probe HOST"));
     }
     if !has(|event| matches!(event, RecordedEvent::SetPose(_))) {
-        findings.push(Finding::new(
-            "nobody has told the vehicle where it starts",
-            format!("agv replay {log} --relocalise reflectors, or --start X,Y,HEADING"),
-        ));
+        findings.push(Finding::new("nobody has told the vehicle where it starts", start_remedy(recording, log)));
     }
     if recording.landmarks.is_empty() {
-        findings
-            .push(Finding::new("the log has no map", format!("agv replay {log} --map MAP, or --landmarks dynamic")));
+        let start =
+            if recording.truth.is_empty() && recording.references.is_empty() { "" } else { " --start recorded" };
+        findings.push(Finding::new(
+            "the log has no map",
+            format!("agv replay {log} --map MAP, or agv replay {log}{start} --landmarks dynamic"),
+        ));
     }
     findings
+}
+
+/// How a replay learns where the vehicle starts: by the map's reflectors, by other poses of the log, or from whoever knows it.
+fn start_remedy(recording: &Recording, log: &str) -> String {
+    let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
+    let sees_reflectors = recording.events.iter().any(|event| matches!(event, RecordedEvent::Reflectors(_)));
+    let mut ways = Vec::new();
+    if sees_reflectors && recording.landmarks.iter().any(is_reflector) {
+        ways.push("--relocalise reflectors");
+    }
+    if !(recording.truth.is_empty() && recording.references.is_empty()) {
+        ways.push("--start recorded");
+    }
+    ways.push("--start X,Y,HEADING");
+    format!("agv replay {log} {}", ways.join(", or "))
 }
 
 /// What is to be said if neither the vehicle as it is believed to be nor any other one explains the drive.
@@ -152,7 +169,13 @@ fn place(recording: &Recording, log: &str) -> Option<Finding> {
     match find_start(&first) {
         Err(StartSearchError::Unknown) => Some(Finding::new(
             "no place of the map looks like what is seen: it is the map of another place, or the reflectors were moved",
-            format!("agv map {log} --output new.csv --kind reflectors --slam, then agv replay {log} --map new.csv"),
+            if recording.events.iter().any(|event| matches!(event, RecordedEvent::Scan(_))) {
+                format!("agv map {log} --output new.csv --kind reflectors --slam, then agv replay {log} --map new.csv")
+            } else {
+                format!(
+                    "agv replay {log} --map MAP; a map of this place is made from a drive that is recorded with scans"
+                )
+            },
         )),
         Err(StartSearchError::Ambiguous) => Some(Finding::new(
             "two places of the map look like what is seen",
