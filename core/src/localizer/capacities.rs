@@ -5,7 +5,9 @@ use core::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use crate::filter::{PoseAndSlots, Slots, packed_entries, slot_states};
-use crate::sources::{Contours, FeatureFinder, FindContours, FindFeatures, LandmarkMaps, Maps, NoContours};
+use crate::sources::{
+    Contours, FeatureFinder, FindContours, FindFeatures, LandmarkMaps, Lent, MapKeeping, Maps, NoContours, Own,
+};
 
 /// The memory of a localiser. [`CapacitiesOf`] makes it of numbers.
 pub trait Capacities: Clone + Debug {
@@ -20,7 +22,8 @@ pub trait Capacities: Clone + Debug {
 }
 
 /// Room for `BEAMS` beams of a scan, `REFLECTORS` and `FEATURES` landmarks of the fixed maps, `DYNAMIC` landmarks that are
-/// found while driving, in the filter's state for `S`, and for contours as `K` says.
+/// found while driving, in the filter's state for `S`, and for contours as `K` says. The localiser has its fixed maps
+/// as `M` says: a copy ([`Own`]), or lent ([`Lent`]).
 #[derive(Clone, Copy, Debug)]
 pub struct CapacitiesOf<
     const BEAMS: usize,
@@ -29,16 +32,18 @@ pub struct CapacitiesOf<
     const DYNAMIC: usize,
     S = SlamSlots,
     K = NoContours,
->(core::marker::PhantomData<(S, K)>);
+    M = Own,
+>(core::marker::PhantomData<(S, K, M)>);
 
-impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, S, K> Capacities
-    for CapacitiesOf<BEAMS, REFLECTORS, FEATURES, DYNAMIC, S, K>
+impl<const BEAMS: usize, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize, S, K, M> Capacities
+    for CapacitiesOf<BEAMS, REFLECTORS, FEATURES, DYNAMIC, S, K, M>
 where
     S: Slots,
     K: FindContours,
+    M: MapKeeping,
 {
     type Slots = S;
-    type Maps = Maps<REFLECTORS, FEATURES, DYNAMIC>;
+    type Maps = Maps<M::Maps<REFLECTORS, FEATURES>, DYNAMIC>;
     type Features = FeatureFinder<BEAMS>;
     type Contours = K;
 }
@@ -57,6 +62,9 @@ pub type ContourCapacities<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, 
 
 /// The same without contours.
 pub type SlamCapacities = CapacitiesOf<1440, 1000, 1000, 256>;
+
+/// The same with a map that is lent for `'m`.
+pub type SlamWithLentMap<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, NoContours, Lent<'m>>;
 
 /// The same without contours and without a map in the state: [`super::Parameters::maps`] must not ask for one.
 pub type VehicleCapacities = CapacitiesOf<1440, 1000, 1000, 256, NoSlots>;

@@ -14,13 +14,13 @@ use crate::filter::{Ekf, Timeline};
 use crate::geometry::{Point, Pose, wrap};
 use crate::integrity::separation::SolutionSeparation;
 use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, WheelErrors, is_sure};
-use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, MapError, MapView, Verdict};
+use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, LendError, MapError, MapView, Verdict};
 use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
 use crate::odometry::{Coasting, GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::sensing::detect_reflectors;
 use crate::sources::{
-    Aid, AidOutcome, FindContours, FindFeatures, GyroSource, LandmarkMaps, Source, Statuses, Workspace, correct_by_aid,
-    see_reflectors,
+    AddLandmarks, Aid, AidOutcome, FindContours, FindFeatures, GyroSource, LandmarkMaps, LendLandmarks, Source,
+    Statuses, Workspace, correct_by_aid, see_reflectors,
 };
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
@@ -72,6 +72,46 @@ const LONGEST_LEAD: f64 = 0.5;
 
 /// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
 const LONGEST_BRIDGE: f64 = 1.0;
+
+impl<C: Capacities> Localizer<C>
+where
+    C::Maps: AddLandmarks,
+{
+    /// Adds landmarks to the fixed maps, each to the one of its kind.
+    ///
+    /// # Errors
+    /// [`MapError`] if a landmark does not fit; those before it are in the map.
+    pub fn add_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
+        self.maps.add(landmarks)
+    }
+
+    /// Replaces all landmarks of the fixed maps, also while the vehicle drives: what is seen next is compared with the new
+    /// ones. What was found while driving remains, as it may be on none of them.
+    ///
+    /// # Errors
+    /// [`MapError`] if the landmarks do not fit; the maps are as before then.
+    pub fn replace_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
+        self.maps.replace(landmarks)?;
+        self.slam.forget_given();
+        Ok(())
+    }
+}
+
+impl<'m, C: Capacities> Localizer<C>
+where
+    C::Maps: LendLandmarks<'m>,
+{
+    /// Takes landmarks, reflectors and then features ([`crate::maps::put_reflectors_first`]), as the fixed maps instead of those
+    /// before, also while the vehicle drives. They stay where they are.
+    ///
+    /// # Errors
+    /// [`LendError`] if the landmarks do not fit or are in another order; the maps are as before then.
+    pub fn lend_landmarks(&mut self, landmarks: &'m [Landmark]) -> Result<(), LendError> {
+        self.maps.lend(landmarks)?;
+        self.slam.forget_given();
+        Ok(())
+    }
+}
 
 impl<C: Capacities> Localizer<C> {
     /// How much it has room for.
@@ -126,25 +166,6 @@ impl<C: Capacities> Localizer<C> {
     fn separation(parameters: &Parameters) -> SolutionSeparation {
         let gyro = parameters.uses_gyro().then_some(&parameters.gyro);
         SolutionSeparation::with_gyro(parameters.assumed, parameters.vehicle.steering_lever(), gyro)
-    }
-
-    /// Adds landmarks to the fixed maps, each to the one of its kind.
-    ///
-    /// # Errors
-    /// [`MapError`] if a landmark does not fit; those before it are in the map.
-    pub fn add_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
-        self.maps.add(landmarks)
-    }
-
-    /// Replaces all landmarks of the fixed maps, also while the vehicle drives: what is seen next is compared with the new
-    /// ones. What was found while driving remains, as it may be on none of them.
-    ///
-    /// # Errors
-    /// [`MapError`] if the landmarks do not fit; the maps are as before then.
-    pub fn replace_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
-        self.maps.replace(landmarks)?;
-        self.slam.forget_given();
-        Ok(())
     }
 
     /// What the localiser believes of its vehicle and its sensors.

@@ -24,8 +24,8 @@ mod supervisor;
 
 pub use bounds::{ParameterError, bounds};
 pub use capacities::{
-    Capacities, CapacitiesOf, ContourCapacities, SlamCapacities, SlamSlots, StatedCapacities, VehicleCapacities,
-    VehicleWithContours,
+    Capacities, CapacitiesOf, ContourCapacities, SlamCapacities, SlamSlots, SlamWithLentMap, StatedCapacities,
+    VehicleCapacities, VehicleWithContours,
 };
 pub use event::{AnyEvent, AsReflectors, AsScan, Event, kind};
 pub use lasers::Lasers;

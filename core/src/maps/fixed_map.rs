@@ -16,7 +16,7 @@ pub enum MapError {
 }
 
 /// Edge of a cell of the index, m: about the distance between reflectors, and well above the radius of association.
-const CELL: f64 = 2.0;
+pub(super) const CELL: f64 = 2.0;
 
 /// Up to `LANDMARKS` landmarks with a spatial index.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ impl<const LANDMARKS: usize> FixedMap<LANDMARKS> {
     #[inline]
     #[must_use]
     pub fn view(&self) -> MapView<'_> {
-        MapView { landmarks: &self.landmarks, grid: self.grid.view() }
+        MapView::new(&self.landmarks, self.grid.view())
     }
 
     /// See [`MapView::nearest`].
@@ -94,6 +94,11 @@ pub struct MapView<'a> {
 }
 
 impl<'a> MapView<'a> {
+    #[inline]
+    pub(super) fn new(landmarks: &'a [Landmark], grid: GridView<'a>) -> Self {
+        Self { landmarks, grid }
+    }
+
     /// All landmarks, in the order in which they were added.
     #[must_use]
     pub fn landmarks(&self) -> &'a [Landmark] {

@@ -50,3 +50,18 @@ impl Landmark {
         Point::new(self.x, self.y)
     }
 }
+
+/// Moves reflectors before features; those of a kind keep their order.
+pub fn put_reflectors_first(landmarks: &mut [Landmark]) {
+    let mut reflectors = 0;
+    for index in 0..landmarks.len() {
+        let is_reflector = |landmark: &Landmark| landmark.kind == LandmarkKind::Reflector;
+        if !landmarks.get(index).is_some_and(is_reflector) {
+            continue;
+        }
+        if let Some(stretch) = landmarks.get_mut(reflectors..=index) {
+            stretch.rotate_right(1);
+        }
+        reflectors += 1;
+    }
+}

@@ -5,9 +5,11 @@ mod dynamic_map;
 mod fixed_map;
 mod grid;
 mod landmark;
+mod lent_map;
 
 pub use association::{Match, NearestNeighbour, Verdict};
 pub use dynamic_map::{DynamicLandmark, DynamicMap, DynamicMapParameters, DynamicMapView};
 pub use fixed_map::{FixedMap, MapError, MapView};
 pub use grid::{Grid, GridView};
-pub use landmark::{Landmark, LandmarkKind};
+pub use landmark::{Landmark, LandmarkKind, put_reflectors_first};
+pub use lent_map::{LendError, LentMap};

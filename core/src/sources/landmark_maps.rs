@@ -1,19 +1,33 @@
 //! The maps that the localiser compares its observations with.
 
 use core::fmt::Debug;
+use core::marker::PhantomData;
 
 use crate::geometry::Point;
 use crate::maps::{
-    DynamicLandmark, DynamicMap, DynamicMapParameters, DynamicMapView, FixedMap, Landmark, LandmarkKind, MapError,
-    MapView,
+    DynamicLandmark, DynamicMap, DynamicMapParameters, DynamicMapView, FixedMap, Landmark, LandmarkKind, LendError,
+    LentMap, MapError, MapView,
 };
 
 /// The fixed maps and the dynamic one.
 #[derive(Clone, Debug)]
-pub struct Maps<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> {
+pub struct Maps<F, const DYNAMIC: usize> {
+    fixed: F,
+    dynamic: DynamicMap<DYNAMIC>,
+}
+
+/// Fixed maps of which the localiser has a copy.
+#[derive(Clone, Debug)]
+pub struct OwnMaps<const REFLECTORS: usize, const FEATURES: usize> {
     reflectors: FixedMap<REFLECTORS>,
     features: FixedMap<FEATURES>,
-    dynamic: DynamicMap<DYNAMIC>,
+}
+
+/// Fixed maps that stay where they are kept.
+#[derive(Clone, Debug)]
+pub struct LentMaps<'m, const REFLECTORS: usize, const FEATURES: usize> {
+    reflectors: LentMap<'m, REFLECTORS>,
+    features: LentMap<'m, FEATURES>,
 }
 
 /// What is compared with what is seen.
@@ -22,6 +36,43 @@ pub(crate) struct MapViews<'a> {
     pub reflectors: MapView<'a>,
     pub features: MapView<'a>,
     pub dynamic: DynamicMapView<'a>,
+}
+
+/// The fixed map of reflectors, and that of natural features.
+pub trait FixedMaps: Clone + Debug {
+    /// Landmarks, at the most.
+    const LANDMARKS: usize;
+
+    /// Empty maps.
+    fn new() -> Self;
+
+    /// The reflectors.
+    fn reflectors(&self) -> MapView<'_>;
+
+    /// The natural features.
+    fn features(&self) -> MapView<'_>;
+}
+
+/// How a localiser has its fixed maps: [`Own`], or [`Lent`].
+pub trait MapKeeping: Clone + Debug {
+    /// Maps of so many reflectors and features.
+    type Maps<const REFLECTORS: usize, const FEATURES: usize>: FixedMaps;
+}
+
+/// The localiser has a copy of its map.
+#[derive(Clone, Copy, Debug)]
+pub struct Own;
+
+/// The map is lent to the localiser for `'m`: it stands in memory once.
+#[derive(Clone, Copy, Debug)]
+pub struct Lent<'m>(PhantomData<&'m Landmark>);
+
+impl MapKeeping for Own {
+    type Maps<const REFLECTORS: usize, const FEATURES: usize> = OwnMaps<REFLECTORS, FEATURES>;
+}
+
+impl<'m> MapKeeping for Lent<'m> {
+    type Maps<const REFLECTORS: usize, const FEATURES: usize> = LentMaps<'m, REFLECTORS, FEATURES>;
 }
 
 /// [`Maps`] of any capacities.
@@ -41,6 +92,18 @@ pub trait LandmarkMaps: Clone + Debug {
     /// The dynamic map.
     fn dynamic(&self) -> DynamicMapView<'_>;
 
+    /// All landmarks of the dynamic map.
+    fn found(&self) -> &[DynamicLandmark];
+
+    /// Forgets what was found.
+    fn forget_found(&mut self);
+
+    /// Brings the dynamic map up to date by the features of one scan: positions in W, m, with the landmark that each belongs to.
+    fn find(&mut self, features: impl Iterator<Item = (LandmarkKind, Point, Option<u16>)>);
+}
+
+/// Maps to which landmarks are copied.
+pub trait AddLandmarks: LandmarkMaps {
     /// Adds landmarks to the fixed maps, each to the one of its kind.
     ///
     /// # Errors
@@ -52,29 +115,27 @@ pub trait LandmarkMaps: Clone + Debug {
     /// # Errors
     /// [`MapError`] if the landmarks do not fit; the maps are as before then.
     fn replace(&mut self, landmarks: &[Landmark]) -> Result<(), MapError>;
+}
 
-    /// All landmarks of the dynamic map.
-    fn found(&self) -> &[DynamicLandmark];
-
-    /// Forgets what was found.
-    fn forget_found(&mut self);
-
-    /// Brings the dynamic map up to date by the features of one scan: positions in W, m, with the landmark that each belongs to.
-    fn find(&mut self, features: impl Iterator<Item = (LandmarkKind, Point, Option<u16>)>);
+/// Maps to which landmarks are lent for `'m`.
+pub trait LendLandmarks<'m>: LandmarkMaps {
+    /// Takes these landmarks instead of those before: reflectors, then features.
+    ///
+    /// # Errors
+    /// [`LendError`] if they do not fit or are in another order; the maps are as before then.
+    fn lend(&mut self, landmarks: &'m [Landmark]) -> Result<(), LendError>;
 }
 
 fn is_reflector(landmark: &Landmark) -> bool {
     landmark.kind == LandmarkKind::Reflector
 }
 
-impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> LandmarkMaps
-    for Maps<REFLECTORS, FEATURES, DYNAMIC>
-{
-    const FIXED: usize = REFLECTORS + FEATURES;
+impl<const REFLECTORS: usize, const FEATURES: usize> FixedMaps for OwnMaps<REFLECTORS, FEATURES> {
+    const LANDMARKS: usize = REFLECTORS + FEATURES;
 
     #[inline(always)]
-    fn new(dynamic: DynamicMapParameters) -> Self {
-        Self { reflectors: FixedMap::new(), features: FixedMap::new(), dynamic: DynamicMap::new(dynamic) }
+    fn new() -> Self {
+        Self { reflectors: FixedMap::new(), features: FixedMap::new() }
     }
 
     #[inline]
@@ -86,40 +147,48 @@ impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> Landm
     fn features(&self) -> MapView<'_> {
         self.features.view()
     }
+}
+
+impl<const REFLECTORS: usize, const FEATURES: usize> FixedMaps for LentMaps<'_, REFLECTORS, FEATURES> {
+    const LANDMARKS: usize = REFLECTORS + FEATURES;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self { reflectors: LentMap::new(), features: LentMap::new() }
+    }
+
+    #[inline]
+    fn reflectors(&self) -> MapView<'_> {
+        self.reflectors.view()
+    }
+
+    #[inline]
+    fn features(&self) -> MapView<'_> {
+        self.features.view()
+    }
+}
+
+impl<F: FixedMaps, const DYNAMIC: usize> LandmarkMaps for Maps<F, DYNAMIC> {
+    const FIXED: usize = F::LANDMARKS;
+
+    #[inline(always)]
+    fn new(dynamic: DynamicMapParameters) -> Self {
+        Self { fixed: F::new(), dynamic: DynamicMap::new(dynamic) }
+    }
+
+    #[inline]
+    fn reflectors(&self) -> MapView<'_> {
+        self.fixed.reflectors()
+    }
+
+    #[inline]
+    fn features(&self) -> MapView<'_> {
+        self.fixed.features()
+    }
 
     #[inline]
     fn dynamic(&self) -> DynamicMapView<'_> {
         self.dynamic.view()
-    }
-
-    fn add(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
-        // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
-        let mut rest = landmarks;
-        while let Some(first) = rest.first() {
-            let are_reflectors = is_reflector(first);
-            let length = rest.iter().take_while(|landmark| is_reflector(landmark) == are_reflectors).count();
-            let Some((run, others)) = rest.split_at_checked(length) else { break };
-            if are_reflectors {
-                self.reflectors.extend(run)?;
-            } else {
-                self.features.extend(run)?;
-            }
-            rest = others;
-        }
-        Ok(())
-    }
-
-    fn replace(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
-        if !landmarks.iter().all(Landmark::is_finite) {
-            return Err(MapError::NotFinite);
-        }
-        let reflectors = landmarks.iter().filter(|landmark| is_reflector(landmark)).count();
-        if reflectors > REFLECTORS || landmarks.len() - reflectors > FEATURES {
-            return Err(MapError::Full);
-        }
-        self.reflectors.clear();
-        self.features.clear();
-        self.add(landmarks)
     }
 
     fn found(&self) -> &[DynamicLandmark] {
@@ -139,5 +208,56 @@ impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> Landm
             }
         }
         self.dynamic.finish();
+    }
+}
+
+impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> AddLandmarks
+    for Maps<OwnMaps<REFLECTORS, FEATURES>, DYNAMIC>
+{
+    fn add(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
+        // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
+        let mut rest = landmarks;
+        while let Some(first) = rest.first() {
+            let are_reflectors = is_reflector(first);
+            let length = rest.iter().take_while(|landmark| is_reflector(landmark) == are_reflectors).count();
+            let Some((run, others)) = rest.split_at_checked(length) else { break };
+            if are_reflectors {
+                self.fixed.reflectors.extend(run)?;
+            } else {
+                self.fixed.features.extend(run)?;
+            }
+            rest = others;
+        }
+        Ok(())
+    }
+
+    fn replace(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
+        if !landmarks.iter().all(Landmark::is_finite) {
+            return Err(MapError::NotFinite);
+        }
+        let reflectors = landmarks.iter().filter(|landmark| is_reflector(landmark)).count();
+        if reflectors > REFLECTORS || landmarks.len() - reflectors > FEATURES {
+            return Err(MapError::Full);
+        }
+        self.fixed.reflectors.clear();
+        self.fixed.features.clear();
+        self.add(landmarks)
+    }
+}
+
+impl<'m, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> LendLandmarks<'m>
+    for Maps<LentMaps<'m, REFLECTORS, FEATURES>, DYNAMIC>
+{
+    fn lend(&mut self, landmarks: &'m [Landmark]) -> Result<(), LendError> {
+        let count = landmarks.iter().take_while(|landmark| is_reflector(landmark)).count();
+        let Some((reflectors, features)) = landmarks.split_at_checked(count) else { return Err(LendError::Order) };
+        if features.iter().any(is_reflector) {
+            return Err(LendError::Order);
+        }
+        let mut lent = LentMaps::new();
+        lent.reflectors.lend(reflectors)?;
+        lent.features.lend(features)?;
+        self.fixed = lent;
+        Ok(())
     }
 }

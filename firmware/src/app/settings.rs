@@ -1,6 +1,6 @@
 //! What the flash tells at the start.
 
-use agv_core::maps::Landmark;
+use agv_core::maps::{Landmark, put_reflectors_first};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
 use agv_settings::store::{LANDMARKS, Store};
@@ -50,6 +50,7 @@ pub fn read<F: NorFlash>(flash: F, map: &'static mut KeptMap, panic: &'static st
         }
         key = store.key();
     }
+    put_reflectors_first(map);
     if settings.parameters.maps.slam && !has_slots {
         exchange::set_settings_sound(false);
         defmt::error!("settings: maps.slam is switched off, because this image has no room for it");

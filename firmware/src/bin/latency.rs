@@ -17,7 +17,6 @@ use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
 use agv_firmware::board::an500::log_file::LogBuffer;
 use agv_firmware::board::an500::{panic, time_driver, uart};
-use agv_firmware::board::{Board, Current};
 use agv_settings::Settings;
 use cortex_m_semihosting::{debug, hprintln};
 use defmt_semihosting as _;
@@ -33,7 +32,8 @@ fn on_panic(info: &PanicInfo) -> ! {
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
-type Capacities = <Current as Board>::Capacities;
+/// The board's, but with a copy of the map, which comes in pieces.
+type Capacities = localizer::SlamCapacities;
 type Localizer = localizer::Localizer<Capacities>;
 type Localization = localize::Localization<Capacities>;
 

@@ -199,7 +199,7 @@ fn start() -> Vehicle {
     let landmarks = controller.landmarks;
     let (settings, controller) = share(controller);
     let localizer = build_localizer(&settings.parameters);
-    if localizer.add_landmarks(landmarks).is_err() {
+    if localizer.lend_landmarks(landmarks).is_err() {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
         exchange::set_settings_sound(false);
     }

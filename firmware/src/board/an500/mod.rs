@@ -12,7 +12,7 @@ pub mod time_driver;
 pub mod uart;
 pub mod watchdog;
 
-use agv_core::localizer::SlamCapacities;
+use agv_core::localizer::SlamWithLentMap;
 use defmt_semihosting as _;
 use embassy_executor::SendSpawner;
 
@@ -30,7 +30,7 @@ impl Board for An500 {
     const NAME: &'static str = "MPS2 AN500";
     const RUNS_WHILE_FLASH_WORKS: bool = true;
 
-    type Capacities = SlamCapacities;
+    type Capacities = SlamWithLentMap<'static>;
     type CanParts = SlcanPort;
     type Can = SlcanPort;
     type Ethernet = Lan9118;

@@ -6,6 +6,7 @@
 
 use agv_core::filter::{PoseAndSlots, packed_entries, slot_states};
 use agv_core::localizer::CapacitiesOf;
+use agv_core::sources::{Lent, NoContours};
 use embassy_stm32::Config;
 use embassy_stm32::pac::RCC;
 use embassy_stm32::rcc::{Pll, PllDiv, PllMul, SupplyConfig, VoltageScale};
@@ -31,7 +32,7 @@ impl Chip for Stm32h723 {
         Region { base: 0x3800_0000, size: 16 * 1024 },
     ];
 
-    type Capacities = CapacitiesOf<1440, 500, 500, 128, NoSlots>;
+    type Capacities = CapacitiesOf<1440, 500, 500, 128, NoSlots, NoContours, Lent<'static>>;
 
     fn enable_memories() {
         RCC.ahb2enr().modify(|enabled| enabled.set_sram1en(true));

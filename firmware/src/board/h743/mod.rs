@@ -4,7 +4,7 @@
 //! or 400 MHz where the silicon allows no more.
 #![allow(unsafe_code, reason = "a register of the buses has no name in the library")]
 
-use agv_core::localizer::SlamCapacities;
+use agv_core::localizer::SlamWithLentMap;
 use embassy_stm32::Config;
 use embassy_stm32::pac::{DBGMCU, RCC};
 use embassy_stm32::rcc::{Pll, PllDiv, PllMul, VoltageScale};
@@ -38,7 +38,7 @@ impl Chip for Stm32h743 {
         Region { base: 0x3800_0000, size: 64 * 1024 },
     ];
 
-    type Capacities = SlamCapacities;
+    type Capacities = SlamWithLentMap<'static>;
 
     fn enable_memories() {
         RCC.ahb2enr().modify(|enabled| {

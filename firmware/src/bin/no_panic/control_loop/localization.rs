@@ -83,8 +83,9 @@ impl Localization {
     /// One event, logged, handled and searched with, and a slice of the search.
     pub fn step(&mut self) {
         let event = event();
-        let Self { localization, frame, .. } = self;
-        let _ = black_box(localization.localizer_mut().add_landmarks(part(&LANDMARKS)));
+        let Self { localization, small, frame, .. } = self;
+        let _ = black_box(localization.localizer_mut().lend_landmarks(part(&LANDMARKS)));
+        let _ = black_box(small.add_landmarks(part(&LANDMARKS)));
         localization.index();
         localization.handle(&event, |record| log(frame, record));
         localization.hear(
