@@ -31,9 +31,13 @@ const ALL: [(&str, &str); 9] = [
 /// # Errors
 /// There is neither, or the file cannot be read.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
-    std::fs::read_to_string(path).or_else(|problem| match by_name(path) {
-        Some(text) if problem.kind() == io::ErrorKind::NotFound => Ok(text.to_owned()),
-        _ => Err(problem),
+    let problem = match std::fs::read_to_string(path) {
+        Err(problem) if problem.kind() == io::ErrorKind::NotFound => problem,
+        outcome => return outcome,
+    };
+    by_name(path).map(str::to_owned).ok_or_else(|| {
+        let names = ALL.map(|(name, _)| name).join(", ");
+        io::Error::new(problem.kind(), format!("there is no such file; with the program come {names}"))
     })
 }
 
@@ -72,6 +76,7 @@ mod tests {
         assert_eq!(read_to_string(&file).unwrap(), "seed = 3");
         assert!(read_to_string(Path::new("people")).unwrap().contains("people"));
         assert!(read_to_string(Path::new("faults.toml")).unwrap().contains("[[fault]]"));
-        assert!(read_to_string(Path::new("no_such_thing")).is_err());
+        let problem = read_to_string(Path::new("wherehouse_hall")).unwrap_err();
+        assert!(problem.to_string().contains("trust, warehouse_hall"), "{problem}");
     }
 }
