@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod carpark;
 pub mod carpark_starts;
 pub mod contour_map;
+pub mod contour_worlds;
 mod contours;
 pub mod demonstration;
 pub mod falko;

@@ -3,6 +3,7 @@
 mod calibration;
 mod carpark;
 mod contour_map;
+mod contour_starts;
 mod falko;
 mod features;
 mod gyro;
@@ -51,6 +52,7 @@ enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
     ContourMap(contour_map::ContourMap),
+    ContourStarts(contour_starts::ContourStarts),
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
     Features(features::Features),
@@ -74,6 +76,7 @@ impl Evaluate {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::ContourMap(experiment) => experiment.run(),
+            Experiment::ContourStarts(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
             Experiment::Features(experiment) => experiment.run(),
