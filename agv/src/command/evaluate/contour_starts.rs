@@ -4,8 +4,16 @@ use agv_lab::evaluate::contour_worlds::{SiteKind, run};
 
 use crate::command::progress;
 
+const HELP: &str = "\
+An answer is right within 0.1 m and 1 degree. Two fit where a pose that was named has nine tenths of the true one's overlap.
+
+Examples:
+  agv evaluate contour-starts --starts 200
+  agv evaluate contour-starts --starts 1000 --seed 100000 --only corridor --json";
+
 /// How often a vehicle that is switched on in a kept map of contours finds itself, in simulated worlds.
 #[derive(clap::Args)]
+#[command(after_help = HELP)]
 pub struct ContourStarts {
     /// Starts in worlds of each kind.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
@@ -34,7 +42,29 @@ impl ContourStarts {
             }
         }
         bar.finish_and_clear();
-        println!("{}", serde_json::to_string_pretty(&outcomes)?);
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&outcomes)?);
+            return Ok(());
+        }
+        println!(
+            "world      moved  starts  right  wrong  ambiguous  two fit  unknown  right of the rest  s, 95 %  effort, most"
+        );
+        for outcome in outcomes {
+            println!(
+                "{:<10} {:>4.0} % {:>7} {:>6} {:>6} {:>10} {:>8} {:>8} {:>16.2} % {:>8.2} {:>13.0}",
+                outcome.world,
+                100.0 * outcome.moved_share,
+                outcome.starts,
+                outcome.right,
+                outcome.wrong,
+                outcome.ambiguous,
+                outcome.two_fit,
+                outcome.unknown,
+                100.0 * outcome.right_share,
+                outcome.seconds.p95,
+                outcome.effort.max,
+            );
+        }
         Ok(())
     }
 }

@@ -121,7 +121,7 @@ impl CoarseSearch {
         let unmixed = self.sought.clone();
         for (place, point) in self.sought.iter_mut().enumerate() {
             // Prime, and no divisor of the count.
-            let number = if count % STRIDE == 0 { place } else { place * STRIDE % count };
+            let number = if count.is_multiple_of(STRIDE) { place } else { place * STRIDE % count };
             if let Some(other) = unmixed.get(number) {
                 *point = *other;
             }

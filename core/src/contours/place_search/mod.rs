@@ -369,11 +369,6 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
         }
     }
 
-    #[doc(hidden)]
-    pub fn describe(&self) -> impl core::fmt::Debug + '_ {
-        (self.coarse.places().first(), self.coarse.places().len(), self.coarse.is_crowded(), self.best.as_slice())
-    }
-
     fn answer(&self) -> PlaceAnswer {
         let Some(best) = self.best.first() else { return PlaceAnswer::Unknown };
         let second = self.best.get(1).filter(|second| second.overlap() >= AS_GOOD * best.overlap());
