@@ -75,9 +75,9 @@ const NODES: usize = 7 * (LEVELS - 1) + 1;
 pub(super) struct CoarseSearch {
     sought: Vec<SurfacePoint, SOUGHT>,
     branch: Branch,
-    /// The heading of the coarsest scale that is looked at, and its next cell there.
+    /// The heading of the coarsest scale that is looked at, and its next cell there; none before the points are turned to it.
     heading: u16,
-    cell: i32,
+    cell: Option<i32>,
     places: Vec<Place, PLACES>,
     /// Hits of the best place that was left out.
     left_out: usize,
@@ -89,7 +89,7 @@ impl CoarseSearch {
             sought: Vec::new(),
             branch: Branch { headings: [const { [const { Vec::new() }; FINE] }; LEVELS] },
             heading: 0,
-            cell: 0,
+            cell: None,
             places: Vec::new(),
             left_out: 0,
         }
@@ -99,7 +99,7 @@ impl CoarseSearch {
     pub(super) fn begin(&mut self, points: &[SurfacePoint]) -> bool {
         self.sought.clear();
         self.places.clear();
-        (self.heading, self.cell, self.left_out) = (0, 0, 0);
+        (self.heading, self.cell, self.left_out) = (0, None, 0);
         for spacing in SPACINGS {
             self.sought.clear();
             let is_all = points.iter().filter(|point| point.position.norm() <= REACH).all(|point| {
@@ -149,20 +149,21 @@ impl CoarseSearch {
     pub(super) fn advance<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, effort: &mut i64) -> bool {
         let coarsest = grid.level(LEVELS - 1);
         while usize::from(self.heading) * FINE < usize::from(HEADINGS) {
-            if self.cell == 0 {
+            if *effort <= 0 {
+                return true;
+            }
+            let Some(cell) = self.cell else {
                 *effort -= HEADING_EFFORT;
                 self.turn(grid.cell());
+                self.cell = Some(0);
+                continue;
+            };
+            if cell < coarsest.columns() * coarsest.rows() {
+                self.look(grid, (cell % coarsest.columns(), cell / coarsest.columns()), effort);
+                self.cell = Some(cell + 1);
+            } else {
+                (self.heading, self.cell) = (self.heading + 1, None);
             }
-            while self.cell < coarsest.columns() * coarsest.rows() {
-                if *effort <= 0 {
-                    return true;
-                }
-                let (column, row) = (self.cell % coarsest.columns(), self.cell / coarsest.columns());
-                self.look(grid, (column, row), effort);
-                self.cell += 1;
-            }
-            self.cell = 0;
-            self.heading += 1;
         }
         let needed = self.needed();
         self.places.retain(|place| place.hits >= needed);
