@@ -8,6 +8,7 @@ pub mod contour_map;
 pub mod contour_worlds;
 mod contours;
 pub mod demonstration;
+pub mod drives;
 pub mod falko;
 pub mod features;
 pub mod gyro;

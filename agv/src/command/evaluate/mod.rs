@@ -4,6 +4,7 @@ mod calibration;
 mod carpark;
 mod contour_map;
 mod contour_starts;
+mod drives;
 mod falko;
 mod features;
 mod gyro;
@@ -53,6 +54,7 @@ enum Experiment {
     Carpark(carpark::Carpark),
     ContourMap(contour_map::ContourMap),
     ContourStarts(contour_starts::ContourStarts),
+    Drives(drives::Drives),
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
     Features(features::Features),
@@ -77,6 +79,7 @@ impl Evaluate {
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::ContourMap(experiment) => experiment.run(),
             Experiment::ContourStarts(experiment) => experiment.run(),
+            Experiment::Drives(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
             Experiment::Features(experiment) => experiment.run(),
