@@ -1,5 +1,5 @@
 //! Finding the pose of a vehicle that is switched on in a kept map of contours, in slices.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
