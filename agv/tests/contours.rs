@@ -70,7 +70,12 @@ fn a_real_drive_is_localised_in_a_map_of_its_contours() {
         assert!(made.status.success(), "{}", text(&made.stderr));
         let summary: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
         assert_eq!(json_keys(&summary), ["bytes", "points"]);
-        let (median, p95, lost) = replayed(&log, &map, &["--start", "recorded"]);
-        assert!(median < 0.06 && p95 < 0.2 && lost == 0.0, "{name}: {median} m, {p95} m, lost for {lost} s");
+        for start in [["--start", "recorded"], ["--relocalise", "contours"]] {
+            let (median, p95, lost) = replayed(&log, &map, &start);
+            assert!(
+                median < 0.06 && p95 < 0.2 && lost == 0.0,
+                "{name}, {start:?}: {median} m, {p95} m, lost for {lost} s"
+            );
+        }
     }
 }

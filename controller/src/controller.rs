@@ -50,7 +50,7 @@ impl<B> LaserOrder<B> {
 ///
 /// `log` is given all that a log of the drive holds, in its order.
 #[derive(Debug)]
-pub struct Controller<L = Localizer> {
+pub struct Controller<L: Localize = Localizer> {
     laser: Laser<TELEGRAM>,
     revolution: Revolution,
     bus: Bus,

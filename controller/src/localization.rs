@@ -3,6 +3,7 @@
 use agv_core::localizer::{Event, Localize, StartSearch};
 use agv_core::odometry::{GyroErrors, OdometryBias};
 use agv_core::record::{Output, Published, Record};
+use agv_core::sources::FindContours;
 use agv_core::state::{PoseOutput, Relocalization};
 use agv_settings::Settings;
 use agv_wire::nav350::Revolution;
@@ -27,9 +28,9 @@ pub struct Estimate {
 /// One event in, outputs out, and a search in the time between events. What is told and answered, and what was published
 /// meanwhile, is handed to `log` as records of a log.
 #[derive(Clone, Debug)]
-pub struct Localization<L> {
+pub struct Localization<L: Localize> {
     localizer: L,
-    search: StartSearch,
+    search: StartSearch<<L::Contours as FindContours>::Places>,
     answered: u32,
     told: u32,
 }
@@ -56,9 +57,10 @@ impl<L: Localize> Localization<L> {
         &mut self.localizer
     }
 
-    /// Makes ready for the reflectors that the localiser has.
+    /// Makes ready for the reflectors and the contours that the localiser has.
     pub fn index(&mut self) {
         self.search.index(self.localizer.reflectors());
+        self.search.forget_contours();
     }
 
     /// Takes an event that the bus has told, or somebody else.
@@ -113,7 +115,8 @@ impl<L: Localize> Localization<L> {
     /// Goes on with the search for a pose for a slice of time, and returns whether there is more to do. A pose that is found
     /// is an event like any other, so that a replay of the log needs no search.
     pub fn search(&mut self, log: impl FnMut(&Record)) -> bool {
-        let (is_busy, found) = self.search.advance(self.localizer.reflectors());
+        let contours = self.localizer.contours();
+        let (is_busy, found) = self.search.advance(self.localizer.reflectors(), contours.as_ref());
         if let Some(fix) = found {
             self.handle(&Event::SetPose(fix), log);
         }

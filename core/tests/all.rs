@@ -3,6 +3,7 @@
 mod alert_limits;
 mod calibration;
 mod contour_source;
+mod contour_start;
 mod contours;
 mod counters;
 mod covariance_repair;

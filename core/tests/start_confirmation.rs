@@ -104,7 +104,7 @@ impl Start {
     fn search(&mut self) -> Option<PoseFix> {
         (0..=EFFORT_A_REVOLUTION)
             .map_while(|_| {
-                let (goes_on, fix) = self.search.advance(self.map.view());
+                let (goes_on, fix) = self.search.advance(self.map.view(), None);
                 (goes_on || fix.is_some()).then_some(fix)
             })
             .find_map(|fix| fix)

@@ -55,7 +55,7 @@ impl Search {
     /// Slices until there is nothing more to do.
     fn found(&mut self) -> Option<PoseFix> {
         for _ in 0..=EFFORT_A_REVOLUTION / 2_000 {
-            let (goes_on, fix) = self.search.advance(self.map.view());
+            let (goes_on, fix) = self.search.advance(self.map.view(), None);
             if fix.is_some() || !goes_on {
                 return fix;
             }
@@ -75,7 +75,7 @@ fn a_vehicle_that_does_not_know_where_it_is_finds_it() {
     for mode in [Mode::NotLocalised, Mode::Lost] {
         let mut search = Search::new(&reflectors(), true);
         search.mode = mode;
-        assert_eq!(search.search.advance(search.map.view()), (false, None), "nothing has been seen");
+        assert_eq!(search.search.advance(search.map.view(), None), (false, None), "nothing has been seen");
         for _ in 0..7 {
             search.see(&view(&pose));
             assert_eq!((search.found(), search.search.state()), (None, Relocalization::Searching));

@@ -36,6 +36,7 @@ Examples:
   agv replay intel.agvlog --start recorded --landmarks dynamic
   agv replay drive.agvlog --landmarks none --output odometry.agvlog
   agv replay drive.agvlog --relocalise reflectors
+  agv replay drive.agvlog --map contours.csv --relocalise contours
   agv replay tail.agvlog --like drive.agvlog --start recorded --output whole.agvlog
   agv replay drive.agvlog --relocalise lidar3d --places street.places3d --scans drive.pcap
 
@@ -181,10 +182,6 @@ impl Replay {
     /// Changes what the log says to what is wanted. A map of contours is given back.
     fn prepare(&self, recording: &mut Recording, answers: &[RecordedOutput]) -> anyhow::Result<Option<ContourMap>> {
         let of_log = || self.log.display().to_string();
-        self.relocalisation.apply(recording).with_context(of_log)?;
-        if let Some(start) = self.start {
-            set_start(recording, answers, start).with_context(of_log)?;
-        }
         self.settings.apply(&mut recording.parameters)?;
         if let Some(path) = &self.vehicle {
             let vehicle = VehicleFile::read(path)?;
@@ -213,6 +210,10 @@ impl Replay {
         // Of an odometry that others have recorded nobody has stated the noise.
         if contours.is_some() && recording.parameters.vehicle == Vehicle::Increments {
             recording.parameters.odometry_noise = odometry_noise(recording).with_context(of_log)?;
+        }
+        self.relocalisation.apply(recording, contours.as_ref()).with_context(of_log)?;
+        if let Some(start) = self.start {
+            set_start(recording, answers, start).with_context(of_log)?;
         }
         Ok(contours)
     }

@@ -103,32 +103,104 @@ impl<'a> KeptMap<'a> {
 
     /// Fills a submap with what is around a place, from near to far. The submap says whether there was room for all.
     pub fn load<const ROOM: usize>(&self, place: (i16, i16), submap: &mut Submap<ROOM>) {
-        let (row, column) = (i32::from(place.0), i32::from(place.1));
-        let middle = |index: i32| (f64::from(index) + 0.5) * TILE;
-        submap.begin(&Pose::new(middle(column), middle(row), 0.0));
-        for ring in 0..=AROUND {
-            for down in -ring..=ring {
-                for right in -ring..=ring {
-                    if down.abs().max(right.abs()) == ring {
-                        self.load_tile((row + down, column + right), (down, right), submap);
-                    }
-                }
-            }
+        submap.begin(&middle(place));
+        for number in 0..TILES_AROUND {
+            let _ = self.load_part(place, number, (0, usize::MAX), submap);
         }
     }
 
-    fn load_tile<const ROOM: usize>(&self, place: (i32, i32), offset: (i32, i32), submap: &mut Submap<ROOM>) {
-        let (Ok(row), Ok(column)) = (i16::try_from(place.0), i16::try_from(place.1)) else { return };
-        let Ok(number) = self.tiles.binary_search_by(|tile| tile.place.cmp(&(row, column))) else { return };
-        let Some(tile) = self.tiles.get(number) else { return };
+    /// Adds some points of one of the tiles around a place, of which the nearest one has number 0, to a submap that was begun in
+    /// the middle of that place: `count` of them from `first` on. How many were added.
+    fn load_part<const ROOM: usize>(
+        &self,
+        place: (i16, i16),
+        number: usize,
+        (first, count): (usize, usize),
+        submap: &mut Submap<ROOM>,
+    ) -> usize {
+        let (down, right) = beside(number as i32);
+        let row = i16::try_from(i32::from(place.0) + down);
+        let column = i16::try_from(i32::from(place.1) + right);
+        let (Ok(row), Ok(column)) = (row, column) else { return 0 };
+        let Ok(found) = self.tiles.binary_search_by(|tile| tile.place.cmp(&(row, column))) else { return 0 };
+        let Some(tile) = self.tiles.get(found) else { return 0 };
         let corner = |steps: i32| (f64::from(steps) - 0.5) as f32 * TILE as f32;
-        let shift = ScanPoint::new(corner(offset.1), corner(offset.0));
-        let first = tile.first as usize;
-        for point in self.points.get(first..first + usize::from(tile.count)).unwrap_or_default() {
+        let shift = ScanPoint::new(corner(right), corner(down));
+        let points = self.points_of(tile).iter().skip(first).take(count);
+        let added = points.len();
+        for point in points {
             let point = point.unpacked();
             submap.add_point(&SurfacePoint { position: point.position + shift, ..point });
         }
+        added
     }
+
+    /// All tiles, in order of their places.
+    pub(super) const fn tiles(&self) -> &'a [Tile] {
+        self.tiles
+    }
+
+    /// The points of a tile.
+    pub(super) fn points_of(&self, tile: &Tile) -> &'a [KeptPoint] {
+        let first = tile.first as usize;
+        self.points.get(first..first + usize::from(tile.count)).unwrap_or_default()
+    }
+}
+
+/// The tiles around a place by number, ring by ring: rows and columns away.
+fn beside(number: i32) -> (i32, i32) {
+    let mut ring = 0;
+    // Rings 0 to `ring` have the square of 2 ring + 1 tiles.
+    while ring < AROUND && number >= (2 * ring + 1) * (2 * ring + 1) {
+        ring += 1;
+    }
+    let side = 2 * ring + 1;
+    let place = if ring == 0 { 0 } else { number - (side - 2) * (side - 2) };
+    let between = 2 * (side - 2).max(0);
+    if place < side {
+        (-ring, place - ring)
+    } else if place < side + between {
+        let inside = place - side;
+        (1 - ring + inside / 2, if inside % 2 == 0 { -ring } else { ring })
+    } else {
+        (ring, place - side - between - ring)
+    }
+}
+
+/// Tiles that are loaded.
+const TILES_AROUND: usize = ((2 * AROUND + 1) * (2 * AROUND + 1)) as usize;
+
+/// Loading the surfaces around a place, some points at a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Loading {
+    place: (i16, i16),
+    tile: usize,
+    point: usize,
+}
+
+impl Loading {
+    /// Begins to load what is around a position, m; None if it is beyond all tiles.
+    pub(super) fn begin<const ROOM: usize>(x: f64, y: f64, submap: &mut Submap<ROOM>) -> Option<Self> {
+        let place = Tile::place_of(x, y)?;
+        submap.begin(&middle(place));
+        Some(Self { place, tile: 0, point: 0 })
+    }
+
+    /// Adds at most `count` points of one tile; whether there are more.
+    pub(super) fn step<const ROOM: usize>(&mut self, map: &KeptMap, count: usize, submap: &mut Submap<ROOM>) -> bool {
+        if map.load_part(self.place, self.tile, (self.point, count), submap) < count {
+            (self.tile, self.point) = (self.tile + 1, 0);
+        } else {
+            self.point += count;
+        }
+        self.tile < TILES_AROUND
+    }
+}
+
+/// The middle of a tile.
+fn middle((row, column): (i16, i16)) -> Pose {
+    let middle = |index: i16| (f64::from(index) + 0.5) * TILE;
+    Pose::new(middle(column), middle(row), 0.0)
 }
 
 /// What is around the vehicle of a map that is larger, in a submap with room for `ROOM` points.

@@ -153,7 +153,7 @@ fn in_map<const ROOM: usize>(
 }
 
 /// The axis along which the normals say least, if that is too little.
-fn weak_axis([xx, xy, yy]: [f32; 3]) -> Option<ScanPoint> {
+pub(super) fn weak_axis([xx, xy, yy]: [f32; 3]) -> Option<ScanPoint> {
     let (trace, gap) = (xx + yy, libm::sqrtf((xx - yy) * (xx - yy) + 4.0 * xy * xy));
     if trace - gap >= LEAST_SHARE * (trace + gap) {
         return None;

@@ -97,13 +97,39 @@ impl Sums {
     }
 }
 
-/// Moves a scan, which is taken to be at `start` in the frame of the submap, to where its points lie on surfaces. None if too few do.
-#[must_use]
-pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, start: &Pose) -> Option<Refinement> {
-    let (position, heading) = (1.0 / (START.0 * START.0), 1.0 / (START.1 * START.1));
-    let mut pose = *start;
-    let mut outcome = None;
-    for iteration in 0..ITERATIONS {
+/// Moving a scan to where its points lie on surfaces, an iteration at a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refining {
+    start: Pose,
+    pose: Pose,
+    iteration: usize,
+    outcome: Option<Refinement>,
+}
+
+impl Refining {
+    /// A scan that is taken to be at `start` in the frame of the submap.
+    pub(super) const fn new(start: Pose) -> Self {
+        Self { start, pose: start, iteration: 0, outcome: None }
+    }
+
+    /// What was found so far.
+    pub(super) fn outcome(&self) -> Option<Refinement> {
+        self.outcome.filter(|found| found.pose.is_finite())
+    }
+
+    /// One iteration; whether another one is due.
+    pub(super) fn step<const ROOM: usize>(&mut self, points: &[SurfacePoint], map: &Submap<ROOM>) -> bool {
+        let goes_on = self.try_step(points, map);
+        if goes_on.is_none() {
+            self.outcome = None;
+        }
+        goes_on.unwrap_or(false)
+    }
+
+    /// None if too few points lie on surfaces.
+    fn try_step<const ROOM: usize>(&mut self, points: &[SurfacePoint], map: &Submap<ROOM>) -> Option<bool> {
+        let (position, heading) = (1.0 / (START.0 * START.0), 1.0 / (START.1 * START.1));
+        let Self { start, pose, iteration, .. } = *self;
         let reach = if iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
         let transform = Transform::of(&pose);
         let mut sums = Sums::default();
@@ -118,11 +144,23 @@ pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, st
         let moved = Vector3::new(pose.x - start.x, pose.y - start.y, difference(pose.theta, start.theta));
         let gradient = Vector3::from(sums.gradient.map(f64::from)) + prior.component_mul(&moved);
         let step = (information + Matrix3::from_diagonal(&prior)).try_inverse()? * gradient;
-        pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
-        outcome = Some(Refinement { pose, information, directions: sums.directions, inliers: sums.inliers });
-        if iteration >= FAR_ITERATIONS && step.amax() < SMALL {
+        let pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
+        self.pose = pose;
+        self.iteration += 1;
+        self.outcome = Some(Refinement { pose, information, directions: sums.directions, inliers: sums.inliers });
+        let is_settled = iteration >= FAR_ITERATIONS && step.amax() < SMALL;
+        Some(!is_settled && self.iteration < ITERATIONS)
+    }
+}
+
+/// Moves a scan, which is taken to be at `start` in the frame of the submap, to where its points lie on surfaces. None if too few do.
+#[must_use]
+pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, start: &Pose) -> Option<Refinement> {
+    let mut refining = Refining::new(*start);
+    for _ in 0..ITERATIONS {
+        if !refining.step(points, map) {
             break;
         }
     }
-    outcome.filter(|found| found.pose.is_finite())
+    refining.outcome()
 }

@@ -86,6 +86,17 @@ impl<const ROOM: usize> Submap<ROOM> {
         self.has_cut
     }
 
+    /// Whether a position of its own frame is not too far away.
+    #[must_use]
+    pub fn reaches(position: &ScanPoint) -> bool {
+        libm::fabsf(position.x) < HALF && libm::fabsf(position.y) < HALF
+    }
+
+    /// Some of its points: at most `count` from number `first` on.
+    pub(super) fn points(&self, first: usize, count: usize) -> impl Iterator<Item = SurfacePoint> + '_ {
+        self.entries.iter().skip(first).take(count).map(|entry| entry.point.unpacked())
+    }
+
     /// The grid for the search.
     #[must_use]
     pub const fn grid(&self) -> &LikelihoodGrid {
@@ -102,8 +113,7 @@ impl<const ROOM: usize> Submap<ROOM> {
 
     /// Adds a point of its own frame, unless it is in it already or too far away.
     pub fn add_point(&mut self, point: &SurfacePoint) {
-        let is_inside = libm::fabsf(point.position.x) < HALF && libm::fabsf(point.position.y) < HALF;
-        if !is_inside || self.nearest(point, SAME).is_some() {
+        if !Self::reaches(&point.position) || self.nearest(point, SAME).is_some() {
             return;
         }
         let (Some(packed), Some(first)) = (PackedPoint::of(point), self.first_mut(&point.position)) else { return };

@@ -23,6 +23,12 @@ impl<C: Capacities> Localizer<C> {
         self.contours.set_map(map);
     }
 
+    /// The map of contours, if scans are compared with one.
+    #[must_use]
+    pub fn contours(&self) -> Option<<C::Contours as FindContours>::Map> {
+        self.contours.map().filter(|_| self.parameters.sources.contours)
+    }
+
     /// Whether scans are compared with a map of contours.
     pub(super) fn uses_contours(&self) -> bool {
         self.parameters.sources.contours && self.contours.has_map()

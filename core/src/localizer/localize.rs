@@ -3,9 +3,13 @@
 use super::{Event, Outputs};
 use crate::maps::MapView;
 use crate::odometry::{GyroErrors, OdometryBias};
+use crate::sources::FindContours;
 
 /// What a controller wants of its localiser, whatever the localiser has room for.
 pub trait Localize {
+    /// Its contours, of any capacity.
+    type Contours: FindContours;
+
     /// See [`super::Localizer::handle`].
     fn handle(&mut self, event: &Event) -> &Outputs;
 
@@ -20,9 +24,14 @@ pub trait Localize {
 
     /// See [`super::Localizer::reflectors`].
     fn reflectors(&self) -> MapView<'_>;
+
+    /// See [`super::Localizer::contours`].
+    fn contours(&self) -> Option<<Self::Contours as FindContours>::Map>;
 }
 
 impl<L: Localize> Localize for &mut L {
+    type Contours = L::Contours;
+
     fn handle(&mut self, event: &Event) -> &Outputs {
         (**self).handle(event)
     }
@@ -41,5 +50,8 @@ impl<L: Localize> Localize for &mut L {
 
     fn reflectors(&self) -> MapView<'_> {
         (**self).reflectors()
+    }
+    fn contours(&self) -> Option<<Self::Contours as FindContours>::Map> {
+        (**self).contours()
     }
 }

@@ -676,6 +676,8 @@ impl<C: Capacities> Localizer<C> {
 }
 
 impl<C: Capacities> Localize for Localizer<C> {
+    type Contours = C::Contours;
+
     fn handle(&mut self, event: &Event) -> &Outputs {
         self.handle(event)
     }
@@ -694,6 +696,10 @@ impl<C: Capacities> Localize for Localizer<C> {
 
     fn reflectors(&self) -> MapView<'_> {
         self.reflectors()
+    }
+
+    fn contours(&self) -> Option<<C::Contours as FindContours>::Map> {
+        self.contours()
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod bounds;
 mod capacities;
+mod contour_start_finder;
 mod contours;
 mod event;
 mod evidence;
@@ -19,6 +20,7 @@ mod separate;
 mod slam;
 mod start_confirmation;
 mod start_finder;
+mod start_odometry;
 mod start_search;
 mod supervisor;
 
@@ -27,6 +29,7 @@ pub use capacities::{
     Capacities, CapacitiesOf, ContourCapacities, SlamCapacities, SlamSlots, SlamWithLentMap, StatedCapacities,
     VehicleCapacities, VehicleWithContours,
 };
+pub use contour_start_finder::ContourStartFinder;
 pub use event::{AnyEvent, AsReflectors, AsScan, Event, kind};
 pub use lasers::Lasers;
 pub use localize::Localize;
@@ -37,7 +40,7 @@ pub use parameters::{Limits, Parameters};
 
 pub use start_confirmation::StartRule;
 pub use start_finder::{StartFinder, StartState};
-pub use start_search::{EFFORT_A_REVOLUTION, StartSearch};
+pub use start_search::{CONTOUR_EFFORT_A_REVOLUTION, EFFORT_A_REVOLUTION, StartSearch};
 
 pub use crate::measurement::PoseFix;
 pub use crate::sources::{

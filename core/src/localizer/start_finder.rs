@@ -6,10 +6,10 @@
 use heapless::Vec;
 
 use super::start_confirmation::{Belief, Look, StartConfirmation, StartRule};
+use super::start_odometry::{Moved, Sight, StartOdometry};
 use super::{Event, Parameters, PoseFix};
 use crate::geometry::{Point, Pose};
-use crate::measurement::{LaserId, ReflectorObservation, Scan, Time};
-use crate::odometry::{Motion, OdometryError, RecentMotion, VehicleOdometer};
+use crate::measurement::{LaserId, ReflectorObservation, Scan};
 use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
     RelocalizationParameters, RelocalizationProgress,
@@ -38,12 +38,6 @@ pub enum StartState {
 /// Most reflectors of one revolution.
 const OBSERVATIONS: usize = 64;
 
-/// Distance after which what was seen before is forgotten, m: the odometry has then carried it too far.
-const LONGEST_DISTANCE: f64 = 10.0;
-
-/// Silence after which the odometry says nothing of the present, s.
-const LONGEST_SILENCE: f64 = 0.3;
-
 /// A found pose is not surer than this, m and rad: reflectors are passed by a moving vehicle.
 const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 
@@ -51,24 +45,15 @@ const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 #[derive(Clone, Debug)]
 pub struct StartFinder<const SEEN: usize = 64> {
     parameters: Parameters,
-    odometer: VehicleOdometer,
-    recent: RecentMotion,
-    /// Nothing that was seen before is placed, as nobody knows how the vehicle moved.
-    known_from: Option<Time>,
-    /// Whether an encoder fails: then nobody knows how the vehicle moves.
-    is_blind: bool,
+    odometry: StartOdometry,
     /// Reflectors in R as it was at the end of the last motion.
     snapshot: ReflectorSnapshot<SEEN>,
     relocalizer: ReflectorRelocalizer<SEEN>,
     /// Where the odometry had R when the search began, and how many revolutions had been seen; none if no search is under way.
     begun: Option<(Pose, u16)>,
     confirmation: StartConfirmation,
-    /// Where the odometry has R, how far it has come, m, and how many revolutions were seen since nothing was known.
-    odometry_pose: Pose,
-    distance: f64,
+    /// How many revolutions were seen since nothing was known.
     revolutions: u16,
-    /// Whether the odometry has said something since the last revolution.
-    has_spoken: bool,
     found: Vec<ReflectorObservation, OBSERVATIONS>,
 }
 
@@ -77,18 +62,12 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     #[must_use]
     pub fn new(parameters: Parameters, search: RelocalizationParameters, rule: StartRule) -> Self {
         Self {
-            odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
-            recent: RecentMotion::standing(Time::default()),
-            known_from: None,
-            is_blind: false,
+            odometry: StartOdometry::new(&parameters),
             snapshot: ReflectorSnapshot::new(),
             relocalizer: ReflectorRelocalizer::new(search),
             begun: None,
             confirmation: StartConfirmation::new(rule),
-            odometry_pose: Pose::default(),
-            distance: 0.0,
             revolutions: 0,
-            has_spoken: false,
             found: Vec::new(),
             parameters,
         }
@@ -96,25 +75,16 @@ impl<const SEEN: usize> StartFinder<SEEN> {
 
     /// Takes one event. A revolution begins a search unless one is under way.
     pub fn handle(&mut self, event: &Event, reflectors: &IndexedReflectors) {
+        match self.odometry.take(event) {
+            Moved::By(motion) => {
+                let covariance = &motion.covariance;
+                let shift = 0.5 * (covariance.m11 + covariance.m22);
+                self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
+            }
+            Moved::Anew => self.begin_anew(),
+            Moved::Nothing => {}
+        }
         match event {
-            Event::Encoders(sample) => {
-                let motion = self.odometer.encoders(sample);
-                self.travel(sample.time, motion);
-            }
-            Event::Speed(sample) => {
-                let motion = self.odometer.speed(sample);
-                self.travel(sample.time, motion);
-            }
-            Event::Increment(increment) => {
-                let motion = self.odometer.increment(increment);
-                self.travel(increment.time, motion);
-            }
-            Event::Wheels(sample) => {
-                let motion = self.odometer.wheels(sample);
-                self.travel(sample.time, motion);
-            }
-            // What was seen is carried for ten metres at most.
-            Event::Gyro(_) => {}
             Event::Reflectors(seen) => self.revolution(seen.laser, seen.observations, reflectors),
             Event::Scan(scan) => {
                 if let Some(detection) = self.parameters.reflectors.detection
@@ -127,88 +97,46 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 }
                 self.look_through(scan, reflectors);
             }
-            Event::EncoderFaults(faults) => {
-                self.forget();
-                self.is_blind = faults.drive.is_some() || faults.steering.is_some();
-            }
-            Event::SetPose(_) => self.forget(),
+            _ => {}
         }
     }
 
     /// Forgets what was seen and how the vehicle moved; a search that is under way is given up.
     pub fn forget(&mut self) {
-        self.odometer.restart();
-        self.has_spoken = false;
-        self.stand(Time::default());
-        self.known_from = None;
+        self.odometry.forget();
+        self.begin_anew();
     }
 
-    /// Begins with a vehicle that stands at `time`, as nobody says otherwise.
-    fn stand(&mut self, time: Time) {
+    fn begin_anew(&mut self) {
         self.snapshot.clear();
         self.begun = None;
         self.confirmation.forget();
-        self.odometry_pose = Pose::default();
-        self.distance = 0.0;
         self.revolutions = 0;
-        self.recent = RecentMotion::standing(time);
-        self.known_from = Some(time);
-    }
-
-    fn travel(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
-        self.has_spoken = true;
-        self.is_blind = false;
-        match motion {
-            Ok(motion) => {
-                let covariance = &motion.covariance;
-                let shift = 0.5 * (covariance.m11 + covariance.m22);
-                self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
-                self.odometry_pose = self.odometry_pose.compose(&motion.displacement);
-                self.distance += motion.distance;
-                self.recent.add(&motion);
-                self.known_from.get_or_insert(motion.start);
-                if self.distance > LONGEST_DISTANCE {
-                    self.forget();
-                }
-            }
-            // What was seen before cannot be carried on.
-            Err(OdometryError::First | OdometryError::Implausible | OdometryError::Pause) => self.stand(time),
-            Err(OdometryError::OutOfOrder | OdometryError::WrongVehicle) => {}
-        }
     }
 
     fn revolution(&mut self, laser: LaserId, observations: &[ReflectorObservation], reflectors: &IndexedReflectors) {
-        if self.is_blind {
-            return;
+        match self.odometry.see(observations.first().map(|first| first.time)) {
+            Sight::Usable => {}
+            Sight::Anew => self.begin_anew(),
+            Sight::Useless => return,
         }
-        if let Some(first) = observations.first()
-            && first.time.since(self.recent.end()) > LONGEST_SILENCE
-        {
-            // An odometry that speaks tells the time; the clock of the laser does not.
-            if core::mem::take(&mut self.has_spoken) {
-                return;
-            }
-            self.odometer.restart();
-            self.stand(first.time);
-        }
-        self.has_spoken = false;
         self.see(laser, observations);
         self.revolutions = self.revolutions.saturating_add(1);
         if self.begun.is_none() {
             self.relocalizer.begin(&self.snapshot, reflectors);
-            self.begun = Some((self.odometry_pose, self.revolutions));
+            self.begun = Some((*self.odometry.pose(), self.revolutions));
         }
     }
 
     /// Looks through the places of reflectors that should be there.
     fn look_through(&mut self, scan: &Scan, reflectors: &IndexedReflectors) {
         let (Some(pose), Some(mount)) =
-            (self.confirmation.pose(&self.odometry_pose), self.parameters.lasers.mount(scan.laser))
+            (self.confirmation.pose(self.odometry.pose()), self.parameters.lasers.mount(scan.laser))
         else {
             return;
         };
         let middle = scan.start.offset(0.5 * scan.end().since(scan.start));
-        let sensor = pose.compose(&self.recent.pose_at(middle)).compose(mount);
+        let sensor = pose.compose(&self.odometry.recent().pose_at(middle)).compose(mount);
         self.confirmation.look_through(scan, &sensor, reflectors.map());
     }
 
@@ -223,8 +151,8 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         self.begun = None;
         if let ReflectorAnswer::Found(fix) = answer {
             let look = Look { pose: fix.pose, odometry, revolutions };
-            let belief = self.confirmation.take(&look, &self.odometry_pose, &self.snapshot, reflectors);
-            let fix = self.fix(&fix, &odometry.between(&self.odometry_pose));
+            let belief = self.confirmation.take(&look, self.odometry.pose(), &self.snapshot, reflectors);
+            let fix = self.fix(&fix, &odometry.between(self.odometry.pose()));
             return match belief {
                 Belief::Confirmed => StartState::Found(fix),
                 Belief::Open => StartState::Unconfirmed(fix),
@@ -232,7 +160,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             };
         }
         self.confirmation.forget();
-        let since = odometry.between(&self.odometry_pose);
+        let since = odometry.between(self.odometry.pose());
         match answer {
             ReflectorAnswer::Ambiguous(one, other) => {
                 StartState::Ambiguous(one.pose.compose(&since), other.pose.compose(&since))
@@ -250,13 +178,15 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             bearing: believed.bearing_deviation as f32,
             ..ReflectorNoise::default()
         };
-        let (Some(known_from), Some(mount)) = (self.known_from, self.parameters.lasers.mount(laser)) else { return };
+        let (Some(known_from), Some(mount)) = (self.odometry.known_from(), self.parameters.lasers.mount(laser)) else {
+            return;
+        };
         for observation in observations.iter().filter(|observation| observation.time >= known_from) {
             let range = f64::from(observation.range);
             let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
             let in_robot = mount.transform(&Point::new(range * cosine, range * sine));
             // The vehicle goes on, or has come here, as it has moved of late.
-            let position = self.recent.pose_at(observation.time).transform(&in_robot);
+            let position = self.odometry.recent().pose_at(observation.time).transform(&in_robot);
             self.snapshot.see(&position, range, &noise);
         }
     }
@@ -265,7 +195,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
         let covariance = &fix.covariance;
         let position = libm::sqrt(covariance.m11.max(covariance.m22));
         PoseFix {
-            time: self.recent.end(),
+            time: self.odometry.recent().end(),
             pose: fix.pose.compose(since),
             position_deviation: position.max(LEAST_DEVIATION.0),
             heading_deviation: libm::sqrt(covariance.m33).max(LEAST_DEVIATION.1),

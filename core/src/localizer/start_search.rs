@@ -1,8 +1,9 @@
 //! The search for the pose of a vehicle that does not know where it is, in slices between events.
 
-use super::{Event, Mode, Parameters, PoseFix, StartFinder, StartRule, StartState};
+use super::{ContourStartFinder, Event, Mode, Parameters, PoseFix, StartFinder, StartRule, StartState};
 use crate::maps::MapView;
 use crate::relocalization::{ReflectorIndex, RelocalizationParameters};
+use crate::sources::{FindPlaces, NoPlaces};
 use crate::state::Relocalization;
 
 /// Words of the rough picture of where reflectors are: 4 kB, cells of about half a metre in a hall of 100 m x 60 m.
@@ -15,18 +16,27 @@ const SLICE: u32 = 2_000;
 /// that needs more goes on in the next revolution.
 pub const EFFORT_A_REVOLUTION: u32 = 1_600_000;
 
-/// Searches among the reflectors of the map while the localiser has no pose.
+/// Effort of a slice among contours, and at most in the time of one revolution: as long as those among reflectors.
+const CONTOUR_SLICE: u32 = 3_000;
+
+/// See [`EFFORT_A_REVOLUTION`].
+pub const CONTOUR_EFFORT_A_REVOLUTION: u32 = 2_400_000;
+
+/// Searches among the reflectors of the map, and in a map of contours, while the localiser has no pose.
 #[derive(Clone, Debug)]
-pub struct StartSearch {
+pub struct StartSearch<P: FindPlaces = NoPlaces> {
     finder: StartFinder,
     index: ReflectorIndex<WORDS>,
     is_wanted: bool,
     /// What is left of the effort of this revolution.
     left: u32,
+    contours: ContourStartFinder<P>,
+    /// The same among contours.
+    contours_left: u32,
     state: Relocalization,
 }
 
-impl StartSearch {
+impl<P: FindPlaces> StartSearch<P> {
     /// A search that has seen nothing.
     #[must_use]
     #[inline(always)]
@@ -36,6 +46,8 @@ impl StartSearch {
             index: ReflectorIndex::new(),
             is_wanted,
             left: 0,
+            contours: ContourStartFinder::new(*parameters),
+            contours_left: 0,
             state: Relocalization::Idle,
         }
     }
@@ -43,6 +55,11 @@ impl StartSearch {
     /// Makes ready for the reflectors that the localiser has.
     pub fn index(&mut self, reflectors: MapView) {
         self.index.build(reflectors);
+    }
+
+    /// The localiser has another map of contours.
+    pub fn forget_contours(&mut self) {
+        self.contours.forget_map();
     }
 
     /// How far it has come.
@@ -60,32 +77,74 @@ impl StartSearch {
             if matches!(event, Event::Reflectors(_) | Event::Scan(_)) {
                 self.left = EFFORT_A_REVOLUTION;
             }
+            if P::IS_THERE {
+                self.contours.handle(event);
+                if matches!(event, Event::Scan(_)) {
+                    self.contours_left = CONTOUR_EFFORT_A_REVOLUTION;
+                }
+            }
         } else if self.state != Relocalization::Idle {
             self.finder.forget();
+            self.contours.forget();
             self.state = Relocalization::Idle;
         }
     }
 
-    /// Searches for a while. Whether there is more to do, and the pose if it is found.
-    pub fn advance(&mut self, reflectors: MapView) -> (bool, Option<PoseFix>) {
+    /// Searches for a while. Whether there is more to do, and the pose if it is found. The map of contours, if there is one, is looked at
+    /// where the reflectors have not told it.
+    pub fn advance(&mut self, reflectors: MapView, contours: Option<&P::Map>) -> (bool, Option<PoseFix>) {
+        let has_reflectors = !reflectors.landmarks().is_empty();
+        if has_reflectors || contours.is_none() {
+            let (is_busy, found) = self.advance_among_reflectors(reflectors);
+            if found.is_some() || is_busy {
+                return (is_busy, found);
+            }
+        }
+        match contours {
+            Some(map) => self.advance_among_contours(map, !has_reflectors),
+            None => (false, None),
+        }
+    }
+
+    fn advance_among_reflectors(&mut self, reflectors: MapView) -> (bool, Option<PoseFix>) {
         if self.left == 0 {
             return (false, None);
         }
         self.left = self.left.saturating_sub(SLICE);
         let reflectors = self.index.of(reflectors);
         let state = self.finder.search(&reflectors, SLICE);
-        // While it searches anew, the last answer stands.
-        self.state = match (&state, self.state) {
-            (StartState::Searching, Relocalization::Idle) => Relocalization::Searching,
-            (StartState::Searching | StartState::Waiting, before) => before,
-            (StartState::Found(_) | StartState::Unconfirmed(_), _) => Relocalization::Searching,
-            (StartState::Ambiguous(..), _) => Relocalization::Ambiguous,
-            (StartState::TooFew, _) => Relocalization::TooFew,
-            (StartState::Unknown, _) => Relocalization::Unknown,
-        };
+        self.state = told(&state, self.state);
         match state {
             StartState::Found(fix) => (true, Some(fix)),
             state => (state == StartState::Searching, None),
         }
+    }
+
+    /// What contours say is told unless reflectors are there to tell it.
+    fn advance_among_contours(&mut self, map: &P::Map, is_told: bool) -> (bool, Option<PoseFix>) {
+        if self.contours_left == 0 {
+            return (false, None);
+        }
+        self.contours_left = self.contours_left.saturating_sub(CONTOUR_SLICE);
+        let state = self.contours.search(map, CONTOUR_SLICE);
+        if is_told {
+            self.state = told(&state, self.state);
+        }
+        match state {
+            StartState::Found(fix) => (true, Some(fix)),
+            state => (state == StartState::Searching, None),
+        }
+    }
+}
+
+/// What is said of a search. While it searches anew, the last answer stands.
+fn told(state: &StartState, before: Relocalization) -> Relocalization {
+    match (state, before) {
+        (StartState::Searching, Relocalization::Idle) => Relocalization::Searching,
+        (StartState::Searching | StartState::Waiting, before) => before,
+        (StartState::Found(_) | StartState::Unconfirmed(_), _) => Relocalization::Searching,
+        (StartState::Ambiguous(..), _) => Relocalization::Ambiguous,
+        (StartState::TooFew, _) => Relocalization::TooFew,
+        (StartState::Unknown, _) => Relocalization::Unknown,
     }
 }

@@ -5,6 +5,7 @@ use core::fmt::Debug;
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
+use super::places::{FindPlaces, NoPlaces, Places};
 use crate::contours::{
     ContourMatch, KeptMap, Prediction, SurfacePoint, Surroundings, align, align_nearby, find_surface_points,
 };
@@ -55,6 +56,9 @@ pub trait FindContours: Clone + Debug {
     /// A map as it is lent.
     type Map: Copy + Debug;
 
+    /// What searches a start in the map.
+    type Places: FindPlaces<Map = Self::Map>;
+
     /// Points of the surroundings, at the most.
     const POINTS: usize;
 
@@ -64,8 +68,13 @@ pub trait FindContours: Clone + Debug {
     /// Takes another map, or none.
     fn set_map(&mut self, map: Option<Self::Map>);
 
+    /// The map.
+    fn map(&self) -> Option<Self::Map>;
+
     /// Whether there is a map.
-    fn has_map(&self) -> bool;
+    fn has_map(&self) -> bool {
+        self.map().is_some()
+    }
 
     /// Takes the points of a scan and finds where it was taken. None if the map says nothing of it.
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch>;
@@ -79,6 +88,7 @@ pub trait FindContours: Clone + Debug {
 
 impl<'m, const POINTS: usize, const ROOM: usize> FindContours for Contours<'m, POINTS, ROOM> {
     type Map = KeptMap<'m>;
+    type Places = Places<'m, POINTS, ROOM>;
 
     const POINTS: usize = ROOM;
 
@@ -92,8 +102,8 @@ impl<'m, const POINTS: usize, const ROOM: usize> FindContours for Contours<'m, P
         self.surroundings.forget();
     }
 
-    fn has_map(&self) -> bool {
-        self.map.is_some()
+    fn map(&self) -> Option<KeptMap<'m>> {
+        self.map
     }
 
     #[inline(never)]
@@ -113,6 +123,7 @@ impl<'m, const POINTS: usize, const ROOM: usize> FindContours for Contours<'m, P
 
 impl FindContours for NoContours {
     type Map = core::convert::Infallible;
+    type Places = NoPlaces;
 
     const POINTS: usize = 0;
 
@@ -122,8 +133,8 @@ impl FindContours for NoContours {
 
     fn set_map(&mut self, _: Option<Self::Map>) {}
 
-    fn has_map(&self) -> bool {
-        false
+    fn map(&self) -> Option<Self::Map> {
+        None
     }
 
     fn locate(&mut self, _: PointView<'_>, _: &Prediction) -> Option<ContourMatch> {

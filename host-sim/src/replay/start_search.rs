@@ -1,8 +1,10 @@
 //! Where a drive begins, found as the controller finds it: by the reflectors that are seen.
 
-use agv_core::localizer::{PoseFix, StartFinder, StartRule, StartState};
+use agv_core::contours::KeptMap;
+use agv_core::localizer::{ContourStartFinder, PoseFix, StartFinder, StartRule, StartState};
 use agv_core::maps::{FixedMap, Landmark, LandmarkKind, MapError};
 use agv_core::relocalization::{ReflectorIndex, RelocalizationParameters};
+use agv_core::sources::Places;
 
 use crate::recording::Recording;
 
@@ -22,7 +24,7 @@ pub enum StartSearchError {
     #[error("two poses fit what is seen equally")]
     Ambiguous,
     /// There is nothing to tell it by.
-    #[error("too few reflectors are seen")]
+    #[error("too little is seen that the map has")]
     TooFew,
     /// The map does not explain what is seen.
     #[error("no place of the map looks like what is seen")]
@@ -59,6 +61,29 @@ pub fn find_start(recording: &Recording) -> Result<(usize, PoseFix), StartSearch
     for (number, event) in recording.events.iter().enumerate().filter(|(_, event)| !event.is_told()) {
         finder.handle(&event.view(), &reflectors);
         match finder.search(&reflectors, u32::MAX) {
+            StartState::Found(fix) => return Ok((number, fix)),
+            StartState::Ambiguous(..) => reason = StartSearchError::Ambiguous,
+            StartState::Unknown => reason = StartSearchError::Unknown,
+            StartState::TooFew => reason = StartSearchError::TooFew,
+            StartState::Waiting | StartState::Searching | StartState::Unconfirmed(_) => {}
+        }
+    }
+    Err(reason)
+}
+
+/// What finds a start in a map of contours, of the capacities of the vehicle.
+pub type ContourFinder<'m> = ContourStartFinder<Places<'m, 400, 6144>>;
+
+/// The same by a map of contours.
+///
+/// # Errors
+/// See [`StartSearchError`].
+pub fn find_start_by_contours(recording: &Recording, map: &KeptMap<'_>) -> Result<(usize, PoseFix), StartSearchError> {
+    let mut finder = Box::new(ContourFinder::new(recording.parameters));
+    let mut reason = StartSearchError::TooFew;
+    for (number, event) in recording.events.iter().enumerate().filter(|(_, event)| !event.is_told()) {
+        finder.handle(&event.view());
+        match finder.search(map, u32::MAX) {
             StartState::Found(fix) => return Ok((number, fix)),
             StartState::Ambiguous(..) => reason = StartSearchError::Ambiguous,
             StartState::Unknown => reason = StartSearchError::Unknown,

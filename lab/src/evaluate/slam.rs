@@ -196,7 +196,7 @@ pub fn run(
 }
 
 /// Errors of poses after the best rigid fit of their positions to the true ones.
-fn fitted(poses: &[Pose], truth: &[Pose]) -> Vec<Pose> {
+pub(super) fn fitted(poses: &[Pose], truth: &[Pose]) -> Vec<Pose> {
     let fit = fit(poses, truth);
     poses.iter().zip(truth).map(|(pose, truth)| truth.between(&fit.compose(pose))).collect()
 }

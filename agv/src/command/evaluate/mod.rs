@@ -3,6 +3,8 @@
 mod calibration;
 mod carpark;
 mod contour_map;
+mod contour_starts;
+mod drives;
 mod falko;
 mod features;
 mod gyro;
@@ -51,6 +53,8 @@ enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
     ContourMap(contour_map::ContourMap),
+    ContourStarts(contour_starts::ContourStarts),
+    Drives(drives::Drives),
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
     Features(features::Features),
@@ -74,6 +78,8 @@ impl Evaluate {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::ContourMap(experiment) => experiment.run(),
+            Experiment::ContourStarts(experiment) => experiment.run(),
+            Experiment::Drives(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
             Experiment::Features(experiment) => experiment.run(),

@@ -22,7 +22,7 @@ pub struct DriveChoice {
 
 /// Buildings.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum DriveSet {
+pub enum DriveSet {
     /// An office in Freiburg.
     #[value(name = "freiburg-079")]
     Freiburg079,
@@ -43,12 +43,22 @@ impl DriveSet {
             Self::Fhw => "fhw-corrected.log.gz",
         }
     }
+
+    /// Its name and its log.
+    pub fn log(self) -> anyhow::Result<(String, PathBuf)> {
+        let name = self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        Ok((name, folder()?.join(self.file())))
+    }
+}
+
+/// The folder of these recordings.
+fn folder() -> anyhow::Result<PathBuf> {
+    Ok(data::folder().context("set AGV_DATA to the folder of recordings")?.join("scans2d"))
 }
 
 impl DriveChoice {
     /// Reads the drive.
     pub fn read(&self) -> anyhow::Result<OfficeDrive> {
-        let folder = || anyhow::Ok(data::folder().context("set AGV_DATA to the folder of recordings")?.join("scans2d"));
         let log = match (&self.log, self.set) {
             (Some(log), _) => log.clone(),
             (None, Some(set)) => folder()?.join(set.file()),

@@ -8,8 +8,9 @@ use agv_core::localizer::PoseFix;
 use agv_host_sim::lidar3d::Source;
 use agv_host_sim::lidar3d::place_map;
 use agv_host_sim::lidar3d::place_search::PlaceSearch;
+use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::recording::{RecordedEvent, Recording};
-use agv_host_sim::replay::find_start;
+use agv_host_sim::replay::{find_start, find_start_by_contours};
 use anyhow::{Context, bail};
 
 use super::arguments::SensorArguments;
@@ -51,6 +52,8 @@ pub struct Relocalisation {
 enum By {
     /// The reflectors of the map, as the controller does it.
     Reflectors,
+    /// The surfaces of a map of contours, as the controller does it.
+    Contours,
     /// Multi-beam lidar.
     Lidar3d,
 }
@@ -72,10 +75,17 @@ impl Relocalisation {
     }
 
     /// Replaces the poses that a recording tells by the one that is found. Does nothing if nobody asks.
-    pub fn apply(&self, recording: &mut Recording) -> anyhow::Result<()> {
+    pub fn apply(&self, recording: &mut Recording, contours: Option<&ContourMap>) -> anyhow::Result<()> {
         let (before, fix) = match (self.relocalise, &self.places, &self.scans) {
             (Some(By::Reflectors), _, _) => {
                 let (event, fix) = find_start(recording).context("the vehicle does not find itself")?;
+                (event + 1, fix)
+            }
+            (Some(By::Contours), _, _) => {
+                let map = contours.context("--relocalise contours: no map of contours is given (--map)")?;
+                let map = map.view().ok().context("the map of contours is damaged")?;
+                let (event, fix) =
+                    find_start_by_contours(recording, &map).context("the vehicle does not find itself")?;
                 (event + 1, fix)
             }
             (Some(By::Lidar3d), Some(path), Some(source)) => (0, self.fix(recording, path, source)?),

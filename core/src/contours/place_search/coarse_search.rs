@@ -1,0 +1,258 @@
+//! All places of a map at which a scan may have been taken, roughly: from coarse to fine, by what cannot be excluded.
+
+use core::f64::consts::TAU;
+
+use heapless::Vec;
+
+use super::place_grid::{LEVELS, Offset, PlaceGrid, facing};
+use crate::contours::SurfacePoint;
+use crate::geometry::{Pose, Transform, difference, wrap};
+use crate::order::insertion_sort_by;
+
+/// Points that are looked for.
+const SOUGHT: usize = 48;
+
+/// Fewest that say something of a place.
+const FEWEST: usize = 12;
+
+/// They are so far apart, m: the least distance at which there are no more of them,
+const SPACINGS: [f32; 4] = [0.4, 0.8, 1.6, 3.2];
+
+/// and no further away, m: the error of the heading moves them by less than a cell.
+const REACH: f32 = 20.0;
+
+/// Headings that are tried at the finest scale.
+const HEADINGS: u16 = 512;
+
+/// Headings at the finest scale within one at the coarsest.
+const FINE: usize = 1 << (LEVELS - 1);
+
+/// Share of the points that must be able to lie on surfaces,
+const LEAST_SHARE: f32 = 0.6;
+
+/// and of those of the best place.
+const AS_GOOD: f32 = 0.87;
+
+/// Places that are kept.
+pub(super) const PLACES: usize = 192;
+
+/// Places closer than this are one: cells of the finest scale along each axis, and rad.
+const SAME: (f64, f64) = (2.5, 0.12);
+
+/// Points of a scan that follow one another are so many apart.
+const STRIDE: usize = 19;
+
+/// What a heading of the coarsest scale costs, in points that are looked up: its offsets.
+const HEADING_EFFORT: i64 = 2500;
+
+/// A place, and how many of the points may lie on surfaces there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub pose: Pose,
+    pub hits: usize,
+}
+
+/// The points of a scan at the headings of one branch: one of the coarsest scale, and those of finer scales within it.
+#[derive(Clone, Debug)]
+struct Branch {
+    headings: [[Vec<Offset, SOUGHT>; FINE]; LEVELS],
+}
+
+/// A cell at a scale and a heading, by its number within that of the coarsest scale.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    level: usize,
+    branch: usize,
+    column: i32,
+    row: i32,
+}
+
+/// Nodes that wait: seven of each scale but the coarsest, and one more.
+const NODES: usize = 7 * (LEVELS - 1) + 1;
+
+/// Searches a grid.
+#[derive(Clone, Debug)]
+pub(super) struct CoarseSearch {
+    sought: Vec<SurfacePoint, SOUGHT>,
+    branch: Branch,
+    /// The heading of the coarsest scale that is looked at, and its next cell there; none before the points are turned to it.
+    heading: u16,
+    cell: Option<i32>,
+    places: Vec<Place, PLACES>,
+    /// Hits of the best place that was left out.
+    left_out: usize,
+}
+
+impl CoarseSearch {
+    pub(super) const fn new() -> Self {
+        Self {
+            sought: Vec::new(),
+            branch: Branch { headings: [const { [const { Vec::new() }; FINE] }; LEVELS] },
+            heading: 0,
+            cell: None,
+            places: Vec::new(),
+            left_out: 0,
+        }
+    }
+
+    /// Begins with the points of a scan. False if they are too few.
+    pub(super) fn begin(&mut self, points: &[SurfacePoint]) -> bool {
+        self.sought.clear();
+        self.places.clear();
+        (self.heading, self.cell, self.left_out) = (0, None, 0);
+        for spacing in SPACINGS {
+            self.sought.clear();
+            let is_all = points.iter().filter(|point| point.position.norm() <= REACH).all(|point| {
+                let is_near =
+                    |other: &SurfacePoint| (other.position - point.position).norm_squared() < spacing * spacing;
+                self.sought.iter().any(is_near) || self.sought.push(*point).is_ok()
+            });
+            if is_all {
+                break;
+            }
+        }
+        self.mix();
+        self.sought.len() >= FEWEST
+    }
+
+    /// Brings the points into an order in which the first ones are of all directions.
+    fn mix(&mut self) {
+        let count = self.sought.len();
+        let unmixed = self.sought.clone();
+        for (place, point) in self.sought.iter_mut().enumerate() {
+            // Prime, and no divisor of the count.
+            let number = if count.is_multiple_of(STRIDE) { place } else { place * STRIDE % count };
+            if let Some(other) = unmixed.get(number) {
+                *point = *other;
+            }
+        }
+    }
+
+    /// The places that were found, the best first.
+    pub(super) fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// Whether a place was left out that is about as good as those that are kept.
+    pub(super) fn is_crowded(&self) -> bool {
+        self.left_out >= self.needed()
+    }
+
+    /// Fewest points that must be able to lie on surfaces.
+    fn needed(&self) -> usize {
+        let best = self.places.first().map_or(0, |best| best.hits);
+        let share = |share: f32, of: usize| libm::ceilf(share * of as f32) as usize;
+        share(LEAST_SHARE, self.sought.len()).max(share(AS_GOOD, best))
+    }
+
+    /// Looks at cells of the coarsest scale, as far as the effort goes: points that are looked up. Whether there is more to do.
+    pub(super) fn advance<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, effort: &mut i64) -> bool {
+        let coarsest = grid.level(LEVELS - 1);
+        while usize::from(self.heading) * FINE < usize::from(HEADINGS) {
+            if *effort <= 0 {
+                return true;
+            }
+            let Some(cell) = self.cell else {
+                *effort -= HEADING_EFFORT;
+                self.turn(grid.cell());
+                self.cell = Some(0);
+                continue;
+            };
+            if cell < coarsest.columns() * coarsest.rows() {
+                self.look(grid, (cell % coarsest.columns(), cell / coarsest.columns()), effort);
+                self.cell = Some(cell + 1);
+            } else {
+                (self.heading, self.cell) = (self.heading + 1, None);
+            }
+        }
+        let needed = self.needed();
+        self.places.retain(|place| place.hits >= needed);
+        false
+    }
+
+    /// Looks at one cell of the coarsest scale, and at those within it that cannot be excluded: each has two headings and four cells.
+    fn look<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, (column, row): (i32, i32), effort: &mut i64) {
+        let mut nodes: Vec<Node, NODES> = Vec::new();
+        let _ = nodes.push(Node { level: LEVELS - 1, branch: 0, column, row });
+        // No more than all nodes within the first one.
+        while let Some(node) = nodes.pop() {
+            let Node { level, branch, column, row } = node;
+            let Some(offsets) = self.branch.headings.get(level).and_then(|headings| headings.get(branch)) else {
+                return;
+            };
+            let (hits, looked_up) = grid.level(level).hits(offsets, (column, row), self.needed().max(1));
+            *effort -= i64::from(looked_up);
+            if hits == 0 {
+                continue;
+            }
+            let Some(finer) = level.checked_sub(1) else {
+                let middle = grid.middle(column, row);
+                let theta = wrap(self.heading_of(0, branch));
+                self.keep(Place { pose: Pose { x: middle.x, y: middle.y, theta }, hits }, grid.cell());
+                continue;
+            };
+            let within = grid.level(finer);
+            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let (column, row) = (2 * column + x, 2 * row + y);
+                if column < within.columns() && row < within.rows() {
+                    for branch in [2 * branch, 2 * branch + 1] {
+                        // There is room: one is taken before eight come.
+                        let _ = nodes.push(Node { level: finer, branch, column, row });
+                    }
+                }
+            }
+        }
+    }
+
+    /// The middle of a heading, rad.
+    fn heading_of(&self, level: usize, branch: usize) -> f64 {
+        let first = f64::from(self.heading) * FINE as f64;
+        let width = f64::from(1 << level);
+        (first + (branch as f64 + 0.5) * width) * (TAU / f64::from(HEADINGS))
+    }
+
+    /// Turns the points to the headings of a branch.
+    fn turn(&mut self, cell: f64) {
+        for level in 0..LEVELS {
+            let per_metre = (1.0 / (cell * f64::from(1 << level))) as f32;
+            for branch in 0..FINE >> level {
+                let turned = Transform::of(&Pose { theta: self.heading_of(level, branch), ..Pose::default() });
+                let offset = |point: &SurfacePoint| {
+                    let moved = point.moved(&turned);
+                    let count = |length: f32| libm::floorf(length * per_metre + 0.5) as i16;
+                    Offset {
+                        column: count(moved.position.x),
+                        row: count(moved.position.y),
+                        facing: facing(&moved.normal),
+                    }
+                };
+                if let Some(offsets) = self.branch.headings.get_mut(level).and_then(|all| all.get_mut(branch)) {
+                    offsets.clear();
+                    // Both have the same room.
+                    offsets.extend(self.sought.iter().map(offset));
+                }
+            }
+        }
+    }
+
+    /// Keeps a place among the best distinct ones.
+    fn keep(&mut self, place: Place, cell: f64) {
+        let is_same = |other: &Place| {
+            let reach = SAME.0 * cell;
+            libm::fabs(other.pose.x - place.pose.x) < reach
+                && libm::fabs(other.pose.y - place.pose.y) < reach
+                && libm::fabs(difference(other.pose.theta, place.pose.theta)) < SAME.1
+        };
+        if let Some(same) = self.places.iter_mut().find(|other| is_same(other)) {
+            if place.hits <= same.hits {
+                return;
+            }
+            *same = place;
+        } else if self.places.push(place).is_err() {
+            let Some(last) = self.places.last_mut() else { return };
+            let worse = if place.hits > last.hits { core::mem::replace(last, place) } else { place };
+            self.left_out = self.left_out.max(worse.hits);
+        }
+        insertion_sort_by(&mut self.places, |a, b| b.hits.cmp(&a.hits));
+    }
+}

@@ -1,0 +1,392 @@
+//! Where in a kept map a scan was taken, with no prior: in steps, none of which takes long.
+//!
+//! All places are looked at from coarse to fine, by what cannot be excluded. Those that remain are laid onto the surfaces, and judged from
+//! both sides: how much of the scan lies on surfaces of the map, and how many of the surfaces that should be in sight the scan shows,
+//! rather than the free space behind them. Only a clear gap to the second makes an answer.
+
+mod coarse_search;
+mod place_grid;
+mod range_profile;
+
+use heapless::Vec;
+use nalgebra::Matrix3;
+
+use coarse_search::{CoarseSearch, PLACES, Place};
+use place_grid::PlaceGrid;
+use range_profile::{InSight, RangeProfile};
+
+use super::kept_map::Loading;
+use super::matcher::weak_axis;
+use super::refinement::Refining;
+use super::{KeptMap, SearchResult, SearchWindow, Submap, SurfacePoint, TILE, find_surface_points, search};
+use crate::geometry::{Point, Pose, ScanPoint, Transform, difference, wrap};
+use crate::sensing::PointView;
+
+/// Where a scan may have been taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaceFix {
+    /// Pose of the frame of the scan's points in that of the map.
+    pub pose: Pose,
+    /// Inverse of its covariance (x, y, theta) if points err independently.
+    pub information: Matrix3<f64>,
+    /// Share of the scan's points that lie on surfaces of the map.
+    pub share: f32,
+    /// Share of the surfaces of the map that should be in sight and that the scan shows.
+    pub shown: f32,
+    /// The unit vector along which the surfaces do not say where it is.
+    pub free_axis: Option<ScanPoint>,
+}
+
+impl PlaceFix {
+    /// How well scan and map agree there, from 0 to 1.
+    #[must_use]
+    pub fn overlap(&self) -> f32 {
+        self.share * self.shown
+    }
+
+    /// Whether another pose is about the same place.
+    fn is_same(&self, other: &Pose) -> bool {
+        let apart = self.pose.position() - other.position();
+        apart.norm() < SAME.0 && libm::fabs(difference(self.pose.theta, other.theta)) < SAME.1
+    }
+}
+
+/// What a search ends in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlaceAnswer {
+    /// Scan and map agree at one place, and nowhere else nearly as well.
+    Found(PlaceFix),
+    /// They agree at two places, or all along a corridor.
+    Ambiguous(PlaceFix, PlaceFix),
+    /// Too few surfaces are seen to tell.
+    TooFew,
+    /// They agree nowhere.
+    Unknown,
+}
+
+/// Whether a search has ended.
+#[expect(clippy::large_enum_variant, reason = "there is no heap, and one such value at a time")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlaceProgress {
+    /// There is more to look at.
+    Searching,
+    /// All has been looked at.
+    Done(PlaceAnswer),
+}
+
+/// Poses closer than this are one place, m and rad.
+const SAME: (f64, f64) = (0.3, 0.1);
+
+/// A place is believed only if so much of the scan lies on surfaces,
+const LEAST_SHARE: f32 = 0.55;
+
+/// of at least so many points within its reach,
+const FEWEST: usize = 40;
+
+/// and so many of the surfaces in sight are shown.
+const LEAST_SHOWN: f32 = 0.55;
+
+/// A place is as good as the best one if they agree there this much as well.
+const AS_GOOD: f32 = 0.9;
+
+/// Two places of a corridor, for whoever asks: along its axis, m.
+const ALONG: f64 = 1.0;
+
+/// Turns to each side of a place that are searched, and the angle between them, rad.
+const TURNS: i32 = 3;
+const TURN: f64 = 0.03;
+
+/// What is searched at each of them.
+const WINDOW: SearchWindow = SearchWindow { shifts: 2, shift: 3, turns: 0, turn: 0.0, distance: 10.0 };
+
+/// A place is laid onto the surfaces if the search gives it so much of what it gave the best one before.
+const PROMISING: f32 = 0.8;
+
+/// Points of a map, or of a submap, that are taken in one step.
+const POINTS_A_STEP: usize = 64;
+
+/// What the steps cost, in points that are looked up in a grid, about 15 instructions each.
+const MARK_EFFORT: i64 = 40 * POINTS_A_STEP as i64;
+const LOAD_EFFORT: i64 = 25 * POINTS_A_STEP as i64;
+const TURN_EFFORT: i64 = 2_500;
+const REFINE_EFFORT: i64 = 4_000;
+const LOOK_EFFORT: i64 = 15 * POINTS_A_STEP as i64;
+
+/// What is to be done next.
+#[derive(Clone, Copy, Debug)]
+enum Step {
+    /// Nothing: there is no scan, or the search has ended.
+    None,
+    /// Marking points of a tile in the grid.
+    Mark { tile: usize, point: usize },
+    /// Looking at the cells of the grid.
+    Search,
+    /// Choosing the next place.
+    Choose,
+    /// Loading what is around a place.
+    Load(usize, Loading),
+    /// Searching around it.
+    Turn { place: usize, turn: i32, best: SearchResult },
+    /// Laying the scan onto the surfaces.
+    Refine(usize, Refining),
+    /// Looking for surfaces that should be in sight.
+    Look { fix: PlaceFix, point: usize, found: InSight },
+    /// Telling the answer.
+    Answer,
+}
+
+/// Searches in maps of which `ROOM` points are around a place at the most, by `POINTS` points of a scan, with `CELLS` cells for all of the
+/// map.
+#[derive(Clone, Debug)]
+pub struct PlaceSearch<const POINTS: usize = 400, const ROOM: usize = 6144, const CELLS: usize = 49_152> {
+    grid: PlaceGrid<CELLS>,
+    has_grid: bool,
+    points: Vec<SurfacePoint, POINTS>,
+    profile: RangeProfile,
+    coarse: CoarseSearch,
+    submap: Submap<ROOM>,
+    step: Step,
+    /// Places that have been looked at.
+    done: [bool; PLACES],
+    best: Vec<PlaceFix, 2>,
+    /// The best score of a search around a place.
+    score: f32,
+    /// Effort that was spent beyond what was allowed.
+    debt: u32,
+}
+
+impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POINTS, ROOM, CELLS> {
+    /// A search with nothing to do.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            grid: PlaceGrid::new(),
+            has_grid: false,
+            points: Vec::new(),
+            profile: RangeProfile::new(),
+            coarse: CoarseSearch::new(),
+            submap: Submap::new(),
+            step: Step::None,
+            done: [false; PLACES],
+            best: Vec::new(),
+            score: 0.0,
+            debt: 0,
+        }
+    }
+
+    /// The map has been replaced; a search that is under way is given up.
+    pub fn forget_map(&mut self) {
+        self.has_grid = false;
+        self.step = Step::None;
+    }
+
+    /// Begins to search where a scan was taken; one that is under way is given up.
+    pub fn begin(&mut self, scan: PointView<'_>) {
+        find_surface_points(scan, &mut self.points);
+        self.profile.set(scan);
+        self.best.clear();
+        self.score = 0.0;
+        self.done = [false; PLACES];
+        self.debt = 0;
+        let is_enough = self.coarse.begin(&self.points);
+        self.step = match (is_enough, self.has_grid) {
+            (false, _) => Step::None,
+            (true, true) => Step::Search,
+            (true, false) => Step::Mark { tile: 0, point: 0 },
+        };
+    }
+
+    /// Goes on until `effort` is spent: a point that is looked up is one, about 15 instructions. What the last step, of at most some
+    /// thousand, takes beyond it is spent of the next call's.
+    pub fn advance(&mut self, map: &KeptMap, effort: u32) -> PlaceProgress {
+        let mut left = i64::from(effort) - i64::from(self.debt);
+        self.debt = 0;
+        while left > 0 {
+            let next = match self.step {
+                Step::None => return PlaceProgress::Done(PlaceAnswer::TooFew),
+                Step::Answer => {
+                    self.step = Step::None;
+                    return PlaceProgress::Done(self.answer());
+                }
+                Step::Mark { tile, point } => self.mark(map, (tile, point), &mut left),
+                Step::Search if self.coarse.advance(&self.grid, &mut left) => Step::Search,
+                Step::Search | Step::Choose => self.choose(),
+                Step::Load(place, loading) => self.load(map, place, loading, &mut left),
+                Step::Turn { place, turn, best } => self.turn(place, turn, best, &mut left),
+                Step::Refine(place, refining) => self.refine(place, refining, &mut left),
+                Step::Look { fix, point, found } => self.look(&fix, point, found, &mut left),
+            };
+            self.step = next;
+        }
+        self.debt = u32::try_from(-left).unwrap_or(u32::MAX);
+        PlaceProgress::Searching
+    }
+
+    fn mark(&mut self, map: &KeptMap, (tile, point): (usize, usize), left: &mut i64) -> Step {
+        if (tile, point) == (0, 0) && !self.grid.begin(map) {
+            return Step::Answer;
+        }
+        let Some(at) = map.tiles().get(tile) else {
+            self.has_grid = true;
+            return Step::Search;
+        };
+        let corner = Point::new(f64::from(at.place.1), f64::from(at.place.0)) * TILE;
+        let points = map.points_of(at);
+        for kept in points.iter().skip(point).take(POINTS_A_STEP) {
+            let surface = kept.unpacked();
+            self.grid.add(&(corner + surface.position.cast::<f64>()), &surface);
+        }
+        *left -= MARK_EFFORT;
+        let next = point + POINTS_A_STEP;
+        if next < points.len() { Step::Mark { tile, point: next } } else { Step::Mark { tile: tile + 1, point: 0 } }
+    }
+
+    /// The next place: one that is within what is loaded, or else the best.
+    fn choose(&mut self) -> Step {
+        let origin = *self.submap.origin();
+        let is_loaded = |place: &Place| {
+            let apart = place.pose.position() - origin.position();
+            !self.submap.is_empty() && apart.amax() < TILE
+        };
+        let mut open = self.coarse.places().iter().zip(self.done).enumerate().filter(|(_, (_, is_done))| !is_done);
+        let first = open.clone().next();
+        let loaded = open.find(|(_, (place, _))| is_loaded(place));
+        let Some((number, (place, _))) = loaded.or(first) else { return Step::Answer };
+        let place = *place;
+        if let Some(done) = self.done.get_mut(number) {
+            *done = true;
+        }
+        if loaded.is_some() {
+            return self.first_turn(number);
+        }
+        match Loading::begin(place.pose.x, place.pose.y, &mut self.submap) {
+            Some(loading) => Step::Load(number, loading),
+            None => Step::Choose,
+        }
+    }
+
+    fn load(&mut self, map: &KeptMap, place: usize, mut loading: Loading, left: &mut i64) -> Step {
+        *left -= LOAD_EFFORT;
+        if loading.step(map, POINTS_A_STEP, &mut self.submap) {
+            Step::Load(place, loading)
+        } else {
+            self.first_turn(place)
+        }
+    }
+
+    fn first_turn(&self, place: usize) -> Step {
+        match self.coarse.places().get(place) {
+            Some(found) => {
+                let best = SearchResult { pose: self.submap.origin().between(&found.pose), score: -1.0 };
+                Step::Turn { place, turn: -TURNS, best }
+            }
+            None => Step::Choose,
+        }
+    }
+
+    fn turn(&mut self, place: usize, turn: i32, best: SearchResult, left: &mut i64) -> Step {
+        let Some(found) = self.coarse.places().get(place) else { return Step::Choose };
+        *left -= TURN_EFFORT;
+        let around = self.submap.origin().between(&found.pose);
+        let around = Pose { theta: wrap(around.theta + f64::from(turn) * TURN), ..around };
+        let result = search(&self.points, self.submap.grid(), &around, &WINDOW);
+        let best = if result.score > best.score { result } else { best };
+        if turn < TURNS {
+            return Step::Turn { place, turn: turn + 1, best };
+        }
+        // What is beyond the reach of the grid is not found in it.
+        let reached = self.reached(&best.pose).filter(|is_reached| *is_reached).count();
+        let score = best.score * self.points.len() as f32 / reached.max(1) as f32;
+        if reached < FEWEST || score < PROMISING * self.score {
+            return Step::Choose;
+        }
+        self.score = self.score.max(score);
+        Step::Refine(place, Refining::new(best.pose))
+    }
+
+    /// Whether the points of the scan are within the reach of the submap, in whose frame it is at a pose.
+    fn reached(&self, pose: &Pose) -> impl Iterator<Item = bool> {
+        let transform = Transform::of(pose);
+        self.points.iter().map(move |point| Submap::<ROOM>::reaches(&transform.apply(&point.position)))
+    }
+
+    /// Points further away that have surfaces near.
+    fn far_hits(&self, pose: &Pose) -> usize {
+        let in_map = self.submap.origin().compose(pose);
+        let far = self.points.iter().zip(self.reached(pose)).filter(|(_, is_reached)| !is_reached);
+        far.filter(|(point, _)| self.grid.is_near(&in_map.transform(&point.position.cast()))).count()
+    }
+
+    fn refine(&mut self, place: usize, mut refining: Refining, left: &mut i64) -> Step {
+        *left -= REFINE_EFFORT;
+        if refining.step(&self.points, &self.submap) {
+            return Step::Refine(place, refining);
+        }
+        let Some(found) = refining.outcome() else { return Step::Choose };
+        let on_surfaces = found.inliers as usize + self.far_hits(&found.pose);
+        let share = (on_surfaces as f32 / self.points.len().max(1) as f32).min(1.0);
+        if share < LEAST_SHARE {
+            return Step::Choose;
+        }
+        let free_axis = weak_axis(found.directions);
+        let fix = PlaceFix { pose: found.pose, information: found.information, share, shown: 0.0, free_axis };
+        Step::Look { fix, point: 0, found: InSight::default() }
+    }
+
+    fn look(&mut self, fix: &PlaceFix, point: usize, mut found: InSight, left: &mut i64) -> Step {
+        *left -= LOOK_EFFORT;
+        let to_laser = Transform::of(&fix.pose.inverse());
+        let mut seen = 0;
+        for surface in self.submap.points(point, POINTS_A_STEP) {
+            self.profile.look(&surface, &to_laser, &mut found);
+            seen += 1;
+        }
+        if seen == POINTS_A_STEP {
+            return Step::Look { fix: *fix, point: point + seen, found };
+        }
+        if found.share() >= LEAST_SHOWN {
+            let pose = self.submap.origin().compose(&fix.pose);
+            self.keep(PlaceFix { pose, shown: found.share(), ..*fix });
+        }
+        Step::Choose
+    }
+
+    /// Keeps the best two that are not the same place.
+    fn keep(&mut self, fix: PlaceFix) {
+        if let Some(same) = self.best.iter_mut().find(|other| other.is_same(&fix.pose)) {
+            if fix.overlap() > same.overlap() {
+                *same = fix;
+            }
+        } else if self.best.push(fix).is_err()
+            && let Some(last) = self.best.last_mut().filter(|last| fix.overlap() > last.overlap())
+        {
+            *last = fix;
+        }
+        if let [first, second] = self.best.as_mut_slice()
+            && second.overlap() > first.overlap()
+        {
+            core::mem::swap(first, second);
+        }
+    }
+
+    fn answer(&self) -> PlaceAnswer {
+        let Some(best) = self.best.first() else { return PlaceAnswer::Unknown };
+        let second = self.best.get(1).filter(|second| second.overlap() >= AS_GOOD * best.overlap());
+        match (second, best.free_axis) {
+            (Some(second), _) => PlaceAnswer::Ambiguous(*best, *second),
+            (None, Some(axis)) => {
+                let (x, y) = (best.pose.x + ALONG * f64::from(axis.x), best.pose.y + ALONG * f64::from(axis.y));
+                PlaceAnswer::Ambiguous(*best, PlaceFix { pose: Pose { x, y, ..best.pose }, ..*best })
+            }
+            // One that was not looked at may be as good.
+            (None, None) if self.coarse.is_crowded() => PlaceAnswer::Unknown,
+            (None, None) => PlaceAnswer::Found(*best),
+        }
+    }
+}
+
+impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> Default for PlaceSearch<POINTS, ROOM, CELLS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,200 @@
+//! Finding the pose of a vehicle that is switched on in a kept map of contours, in slices.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use agv_core::contours::{KeptMap, KeptPoint, PlaceAnswer, PlaceProgress, PlaceSearch, SurfacePoint, TILE, Tile};
+use agv_core::geometry::{Point, Pose};
+use agv_core::localizer::{Event, Mode, Parameters, PoseFix, StartSearch};
+use agv_core::maps::FixedMap;
+use agv_core::measurement::{LaserId, PoseIncrement, Scan, Time};
+use agv_core::odometry::Vehicle;
+use agv_core::sensing::PointScan;
+use agv_core::sources::Places;
+use agv_core::state::Relocalization;
+
+use super::support::walls::{Noise, Walls, corridor, range, room, surfaces};
+
+const BEAMS: usize = 720;
+const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
+
+type Search = PlaceSearch<400, 4096, 16_384>;
+
+/// A map of walls. It stays in memory as long as the test runs.
+fn map(walls: &Walls) -> KeptMap<'static> {
+    let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
+    for (position, normal) in surfaces(walls, 0.1) {
+        let place = Tile::place_of(position.x, position.y).unwrap();
+        let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
+        let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
+        by_tile.entry(place).or_default().push(KeptPoint::of(&point));
+    }
+    let (mut tiles, mut points) = (Vec::new(), Vec::new());
+    for (place, found) in by_tile {
+        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
+        points.extend(found);
+    }
+    KeptMap::new(tiles.leak(), points.leak()).unwrap()
+}
+
+fn ranges(walls: &Walls, laser: &Pose, noise: &mut Noise) -> Vec<f32> {
+    let bearing = |beam: usize| laser.theta - PI + TAU * beam as f64 / BEAMS as f64;
+    (0..BEAMS).map(|beam| range(walls, &Pose { theta: bearing(beam), ..*laser }, noise)).collect()
+}
+
+fn scan(ranges: &[f32], start: Time) -> Scan<'_> {
+    Scan {
+        laser: LaserId::FIRST,
+        start,
+        beam_interval: 0.0,
+        first_bearing: -PI,
+        bearing_step: TAU / BEAMS as f64,
+        ranges,
+        intensities: &[],
+    }
+}
+
+/// The answer to a scan of a laser in walls, and the number of slices of so much effort.
+fn answer(search: &mut Search, walls: &Walls, map: &KeptMap, laser: &Pose, slice: u32) -> (PlaceAnswer, usize) {
+    let ranges = ranges(walls, laser, &mut Noise(7));
+    let mut points: Box<PointScan<BEAMS>> = Box::default();
+    points.set(&scan(&ranges, Time::default()), 0.05, 60.0);
+    search.begin(points.view());
+    for slices in 1..1_000_000 {
+        if let PlaceProgress::Done(answer) = search.advance(map, slice) {
+            return (answer, slices);
+        }
+    }
+    panic!("the search does not end");
+}
+
+fn is_near(found: &Pose, truth: &Pose) -> bool {
+    let error = truth.between(found);
+    error.position().norm() < 0.03 && error.theta.abs() < 0.01
+}
+
+#[test]
+fn a_laser_is_found_wherever_it_is_in_a_room_and_however_it_is_turned() {
+    let map = map(&room());
+    let mut search: Box<Search> = Box::default();
+    let mut noise = Noise(3);
+    for _ in 0..20 {
+        let place = Pose::new(-1.0 + 7.0 * noise.uniform(), -2.0 + 6.0 * noise.uniform(), TAU * noise.uniform());
+        let (found, _) = answer(&mut search, &room(), &map, &place, 3000);
+        assert!(matches!(found, PlaceAnswer::Found(fix) if is_near(&fix.pose, &place)), "{place:?}: {found:?}");
+    }
+}
+
+#[test]
+fn slices_of_any_length_give_the_same_answer_and_none_does_nothing() {
+    let map = map(&room());
+    let place = Pose::new(1.0, 2.0, 0.7);
+    let whole = answer(&mut Box::<Search>::default(), &room(), &map, &place, u32::MAX);
+    assert_eq!(whole.1, 1);
+    for slice in [100, 1000, 10_000] {
+        let (found, slices) = answer(&mut Box::<Search>::default(), &room(), &map, &place, slice);
+        assert_eq!(found, whole.0, "slices of {slice}");
+        assert!(slices > 10, "slices of {slice}: {slices}");
+    }
+}
+
+#[test]
+fn a_room_that_is_its_own_image_is_ambiguous() {
+    let walls = vec![[0.0, 0.0, 12.0, 0.0], [12.0, 0.0, 12.0, 8.0], [12.0, 8.0, 0.0, 8.0], [0.0, 8.0, 0.0, 0.0]];
+    let place = Pose::new(4.0, 3.0, 0.5);
+    let (found, _) = answer(&mut Box::default(), &walls, &map(&walls), &place, 3000);
+    let PlaceAnswer::Ambiguous(one, other) = found else { panic!("{found:?}") };
+    let image = Pose::new(8.0, 5.0, 0.5 + PI);
+    for sought in [place, image] {
+        assert!(is_near(&one.pose, &sought) || is_near(&other.pose, &sought), "{found:?}");
+    }
+}
+
+#[test]
+fn along_a_plain_corridor_no_place_is_told() {
+    let (found, _) =
+        answer(&mut Box::default(), &corridor(None), &map(&corridor(None)), &Pose::new(3.0, 0.2, 0.1), 3000);
+    assert!(!matches!(found, PlaceAnswer::Found(_)), "{found:?}");
+}
+
+/// The room has no nook and no cupboard, and stands elsewhere: the map's room looks much like it.
+#[test]
+fn where_the_free_space_of_the_map_is_taken_nothing_is_found() {
+    let walls = vec![[0.0, 0.0, 5.0, 0.0], [5.0, 0.0, 5.0, 3.0], [5.0, 3.0, 0.0, 3.0], [0.0, 3.0, 0.0, 0.0]];
+    let (found, _) = answer(&mut Box::default(), &walls, &map(&room()), &Pose::new(2.0, 1.5, 0.3), 3000);
+    assert!(!matches!(found, PlaceAnswer::Found(_)), "{found:?}");
+}
+
+#[test]
+fn without_a_map_or_surfaces_nothing_is_found() {
+    let empty = KeptMap::new(&[], &[]).unwrap();
+    let place = Pose::new(1.0, 2.0, 0.7);
+    assert_eq!(answer(&mut Box::default(), &room(), &empty, &place, 3000).0, PlaceAnswer::Unknown);
+    let nothing = Walls::new();
+    assert_eq!(answer(&mut Box::default(), &nothing, &map(&room()), &place, 3000).0, PlaceAnswer::TooFew);
+}
+
+/// What a controller does: events, and slices of the search in between.
+struct Switched {
+    search: Box<StartSearch<Places<'static, 400, 4096>>>,
+    map: KeptMap<'static>,
+    time: f64,
+    pose: Pose,
+    noise: Noise,
+}
+
+impl Switched {
+    fn new(map: KeptMap<'static>, pose: Pose) -> Self {
+        let search = Box::new(StartSearch::new(&Parameters::new(Vehicle::Increments, LASER), true));
+        Self { search, map, time: 1.0, pose, noise: Noise(11) }
+    }
+
+    /// Moves, sees a revolution, and searches as long as there is time for it.
+    fn revolve(&mut self, walls: &Walls, step: &Pose) -> Option<PoseFix> {
+        let reflectors = Box::new(FixedMap::<4>::new());
+        self.time += 0.125;
+        self.pose = self.pose.compose(step);
+        let time = Time::from_seconds(self.time);
+        let moved = Event::Increment(PoseIncrement { time, displacement: *step });
+        self.search.handle(&moved, Mode::NotLocalised, reflectors.view());
+        let ranges = ranges(walls, &self.pose.compose(&LASER), &mut self.noise);
+        self.search.handle(&Event::Scan(scan(&ranges, time)), Mode::NotLocalised, reflectors.view());
+        for _ in 0..10_000 {
+            let (is_busy, found) = self.search.advance(reflectors.view(), Some(&self.map));
+            if found.is_some() || !is_busy {
+                return found;
+            }
+        }
+        panic!("there is no end to a revolution");
+    }
+}
+
+#[test]
+fn a_vehicle_finds_itself_by_two_looks_while_it_stands_and_while_it_moves() {
+    for step in [Pose::default(), Pose::new(0.05, 0.0, 0.01)] {
+        let mut vehicle = Switched::new(map(&room()), Pose::new(0.5, 1.0, -0.6));
+        let mut found = None;
+        for revolution in 0..20 {
+            found = vehicle.revolve(&room(), &step);
+            if found.is_some() {
+                assert!(revolution > 0, "one look is not enough");
+                break;
+            }
+            assert_ne!(vehicle.search.state(), Relocalization::Unknown, "{step:?}");
+        }
+        let fix = found.unwrap();
+        assert!(is_near(&fix.pose, &vehicle.pose), "{fix:?} instead of {:?}", vehicle.pose);
+        assert_eq!(fix.time, Time::from_seconds(vehicle.time));
+    }
+}
+
+#[test]
+fn an_ambiguous_start_is_told_and_no_pose() {
+    let walls = vec![[0.0, 0.0, 12.0, 0.0], [12.0, 0.0, 12.0, 8.0], [12.0, 8.0, 0.0, 8.0], [0.0, 8.0, 0.0, 0.0]];
+    let mut vehicle = Switched::new(map(&walls), Pose::new(4.0, 3.0, 0.5));
+    for _ in 0..6 {
+        assert_eq!(vehicle.revolve(&walls, &Pose::default()), None);
+    }
+    assert_eq!(vehicle.search.state(), Relocalization::Ambiguous);
+}
