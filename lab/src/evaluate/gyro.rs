@@ -17,6 +17,7 @@ use agv_host_sim::simulate::scenario::{
     PathKind, PathOptions, PoseOptions, ReflectorShape, Scenario, Shapes, Slip, WorldOptions,
 };
 use agv_host_sim::simulate::{SimulateError, simulate};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::campaign::fault::{Fault, FaultKind};
@@ -139,28 +140,74 @@ struct Drive {
     is_alarmed: bool,
 }
 
-/// Drives each kind with seeds from `seed` on. `step` is called after each drive.
+/// What is to be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GyroOptions {
+    /// Drives of each kind.
+    pub drives: u32,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Whether lost headings are measured.
+    pub headings: bool,
+    /// Whether slips are measured.
+    pub slips: bool,
+    /// With this vehicle alone.
+    pub only: Option<VehicleKind>,
+}
+
+impl GyroOptions {
+    fn vehicles(&self) -> impl Iterator<Item = VehicleKind> {
+        let only = self.only;
+        let given = only.filter(|only| !VEHICLES.contains(only));
+        VEHICLES.into_iter().filter(move |vehicle| only.is_none_or(|only| only == *vehicle)).chain(given)
+    }
+
+    fn kinds(&self) -> impl Iterator<Item = Kind> {
+        let of = |vehicle| kinds().map(move |(before, way, has_gyro)| Kind { vehicle, before, way, has_gyro });
+        self.vehicles().filter(|_| self.headings).flat_map(of)
+    }
+
+    fn slips(&self) -> impl Iterator<Item = (VehicleKind, Way, ShownBy)> {
+        let of = |vehicle| slips_of().map(move |(way, shown_by)| (vehicle, way, shown_by));
+        self.vehicles().filter(|_| self.slips).flat_map(of)
+    }
+
+    /// How many drives [`run`] makes.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        (self.kinds().count() + self.slips().count()) as u64 * u64::from(self.drives)
+    }
+}
+
+/// Drives each kind. `step` is called after each drive.
 ///
 /// # Errors
 /// See [`GyroError`].
-pub fn run(drives: u32, seed: u64, mut step: impl FnMut()) -> Result<GyroOutcome, GyroError> {
-    let seeds = seed..seed + u64::from(drives);
+pub fn run(options: &GyroOptions, step: impl Fn() + Sync) -> Result<GyroOutcome, GyroError> {
+    let seeds = options.seed..options.seed + u64::from(options.drives);
     let (mut headings, mut slips) = (Vec::new(), Vec::new());
-    for vehicle in VEHICLES {
-        for (before, way, has_gyro) in kinds() {
-            let kind = Kind { vehicle, before, way, has_gyro };
-            let mut found = Vec::new();
-            for seed in seeds.clone() {
-                found.push((seed, blind_drive(kind, seed)?));
-                step();
-            }
-            headings.push(heading_row(kind, &found));
-        }
-        for (way, shown_by) in slips_of() {
-            slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &mut step)?);
-        }
+    for kind in options.kinds() {
+        let found = over(seeds.clone(), &step, |seed| blind_drive(kind, seed))?;
+        headings.push(heading_row(kind, &found));
+    }
+    for (vehicle, way, shown_by) in options.slips() {
+        slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &step)?);
     }
     Ok(GyroOutcome { headings, slips })
+}
+
+/// What `drive` gives for each seed, in their order.
+fn over<T: Send>(
+    seeds: Range<u64>,
+    step: &(impl Fn() + Sync),
+    drive: impl Fn(u64) -> Result<T, GyroError> + Sync,
+) -> Result<Vec<(u64, T)>, GyroError> {
+    let drive = |seed| {
+        let found = drive(seed)?;
+        step();
+        Ok((seed, found))
+    };
+    seeds.into_par_iter().map(drive).collect()
 }
 
 /// Lets a wheel of a vehicle slip on drives with those seeds. `step` is called after each drive.
@@ -172,21 +219,23 @@ pub fn slip_row(
     way: Way,
     shown_by: ShownBy,
     seeds: Range<u64>,
-    mut step: impl FnMut(),
+    step: impl Fn() + Sync,
 ) -> Result<SlipRow, GyroError> {
-    let (mut drives, mut told, mut beyond_level) = (0, 0, 0);
-    let (mut longest_m, mut worst_seed) = (0.0, seeds.start);
-    for seed in seeds {
-        let (after, is_beyond) = slipping_drive(vehicle, way, shown_by, seed)?;
-        drives += 1;
-        told += usize::from(after.is_some());
-        beyond_level += usize::from(is_beyond);
-        if let Some(after) = after.filter(|after| *after > longest_m) {
-            (longest_m, worst_seed) = (after, seed);
-        }
-        step();
-    }
-    Ok(SlipRow { vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level })
+    let first = seeds.start;
+    let found = over(seeds, &step, |seed| slipping_drive(vehicle, way, shown_by, seed))?;
+    let ways = found.iter().filter_map(|(seed, (after, _))| Some((*seed, (*after)?)));
+    let (worst_seed, longest_m) =
+        ways.clone().fold((first, 0.0), |worst, way| if way.1 > worst.1 { way } else { worst });
+    Ok(SlipRow {
+        vehicle,
+        way,
+        shown_by,
+        drives: found.len(),
+        told: ways.count(),
+        longest_m,
+        worst_seed,
+        beyond_level: found.iter().filter(|(_, (_, is_beyond))| *is_beyond).count(),
+    })
 }
 
 const VEHICLES: [VehicleKind; 4] =
@@ -211,13 +260,6 @@ fn kinds() -> impl Iterator<Item = (Before, Way, bool)> {
 fn slips_of() -> impl Iterator<Item = (Way, ShownBy)> {
     let shown = [ShownBy::Gyro, ShownBy::Reflectors, ShownBy::Nothing];
     WAYS.into_iter().flat_map(move |way| shown.map(|shown_by| (way, shown_by)))
-}
-
-/// How many drives [`run`] makes.
-#[must_use]
-pub fn drives(of_each: u32) -> u64 {
-    let of_vehicle = kinds().count() + slips_of().count();
-    (VEHICLES.len() * of_vehicle) as u64 * u64::from(of_each)
 }
 
 fn heading_row(kind: Kind, found: &[(u64, Drive)]) -> HeadingRow {
