@@ -38,7 +38,7 @@ fn a_gyro_tells_bias_and_noise_of_a_vehicle_that_stands() {
 
     let frame = GyroFrame::USUAL;
     let mut emulated = EmulatedGyro::of(&recording, &frame).unwrap();
-    let mut gyro = Gyro::new(&frame);
+    let gyro = Gyro::new(&frame);
     let end = BEGIN + (last.since(first) * 1e3) as u64 + 1_000;
     let (mut before, mut behind, mut driving) = (Vec::new(), Vec::new(), Vec::new());
     for millisecond in 1..end + 4_000 {
