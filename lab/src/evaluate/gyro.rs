@@ -339,7 +339,7 @@ fn scenario(kind: Kind, seed: u64) -> Scenario {
         start: PoseOptions { x: 0.0, y: -1.0, heading_deg: 0.0 },
         legs: vec![Leg { direction: Direction::Forward, segments }],
     };
-    Equipment { vehicle, gyro: has_gyro }.apply(&mut scenario);
+    Equipment { vehicle, gyro: has_gyro, ..Equipment::default() }.apply(&mut scenario);
     scenario
 }
 
