@@ -51,6 +51,7 @@ mod start_search;
 mod state_slots;
 mod support;
 mod timeline;
+mod traction_check;
 mod tricycle_speed;
 mod uncertain_motion;
 mod wheel_vehicle;

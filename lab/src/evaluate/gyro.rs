@@ -6,6 +6,7 @@
 //! - lost heading: the change of the published heading's error from the last pose before the laser falls silent to the pose after
 //!   12 m of way, which is what a perfect start at that place would leave;
 //! - the 95 % mark: the smallest value that 95 % of all drives do not exceed; no drive is left out;
+//! - false alarm: a slip, or a fault of the gyro, that is told of a vehicle in order; those less than 10 s apart are one;
 //! - told: the first pose on the bus with the reason [`Reason::WheelsSlip`] after the slip began; its way is that of the truth.
 
 use std::ops::Range;
@@ -30,6 +31,8 @@ const WAY: f64 = 12.0;
 const BEFORE: f64 = 60.0;
 /// A gyro that was not heard before the drive is not missed for so long any more, s.
 const SETTLED: f64 = 2.0;
+/// Alarms less than this apart, s, are one.
+const SAME_ALARM: f64 = 10.0;
 /// Share of a wheel's way that slips.
 const SLIP: f64 = 0.2;
 
@@ -124,6 +127,23 @@ pub struct SlipRow {
     pub beyond_level: usize,
 }
 
+/// What was told of vehicles in order.
+#[derive(Clone, Debug, Serialize)]
+pub struct SoundRow {
+    /// The vehicle.
+    pub vehicle: VehicleKind,
+    /// Whether there was a gyro.
+    pub has_gyro: bool,
+    /// Drives.
+    pub drives: usize,
+    /// Way of all, km.
+    pub km: f64,
+    /// False alarms.
+    pub false_alarms: usize,
+    /// Seeds of the drives with any.
+    pub seeds: Vec<u64>,
+}
+
 /// All that was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct GyroOutcome {
@@ -131,6 +151,8 @@ pub struct GyroOutcome {
     pub headings: Vec<HeadingRow>,
     /// Slips.
     pub slips: Vec<SlipRow>,
+    /// Vehicles in order.
+    pub sound: Vec<SoundRow>,
 }
 
 /// One drive without landmarks.
@@ -151,6 +173,8 @@ pub struct GyroOptions {
     pub headings: bool,
     /// Whether slips are measured.
     pub slips: bool,
+    /// Whether false alarms are counted.
+    pub sound: bool,
     /// With this vehicle alone.
     pub only: Option<VehicleKind>,
 }
@@ -172,10 +196,14 @@ impl GyroOptions {
         self.vehicles().filter(|_| self.slips).flat_map(of)
     }
 
+    fn sound(&self) -> impl Iterator<Item = (VehicleKind, bool)> {
+        self.vehicles().filter(|_| self.sound).flat_map(|vehicle| [true, false].map(|has_gyro| (vehicle, has_gyro)))
+    }
+
     /// How many drives [`run`] makes.
     #[must_use]
     pub fn count(&self) -> u64 {
-        (self.kinds().count() + self.slips().count()) as u64 * u64::from(self.drives)
+        (self.kinds().count() + self.slips().count() + self.sound().count()) as u64 * u64::from(self.drives)
     }
 }
 
@@ -193,7 +221,19 @@ pub fn run(options: &GyroOptions, step: impl Fn() + Sync) -> Result<GyroOutcome,
     for (vehicle, way, shown_by) in options.slips() {
         slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &step)?);
     }
-    Ok(GyroOutcome { headings, slips })
+    let mut sound = Vec::new();
+    for (vehicle, has_gyro) in options.sound() {
+        let found = over(seeds.clone(), &step, |seed| sound_drive(vehicle, has_gyro, seed))?;
+        sound.push(SoundRow {
+            vehicle,
+            has_gyro,
+            drives: found.len(),
+            km: 1e-3 * found.iter().map(|(_, (way, _))| way).sum::<f64>(),
+            false_alarms: found.iter().map(|(_, (_, alarms))| alarms).sum(),
+            seeds: found.iter().filter(|(_, (_, alarms))| *alarms > 0).map(|(seed, _)| *seed).collect(),
+        });
+    }
+    Ok(GyroOutcome { headings, slips, sound })
 }
 
 /// What `drive` gives for each seed, in their order.
@@ -387,6 +427,27 @@ fn blind_drive(kind: Kind, seed: u64) -> Result<Drive, GyroError> {
         }
     })?;
     Ok(drive)
+}
+
+/// Way of a vehicle in order among reflectors, m, and how often it was alarmed.
+fn sound_drive(vehicle: VehicleKind, has_gyro: bool, seed: u64) -> Result<(f64, usize), GyroError> {
+    let kind = Kind { vehicle, before: Before::Drives, way: Way::Curve, has_gyro };
+    let scenario = scenario(kind, seed);
+    let (_, end) = times(&scenario, Before::Drives);
+    let simulation = simulate(&scenario)?;
+    let options = RigOptions { seconds: end, seed, is_told: true };
+    let (mut way, mut last) = (0.0, None::<Pose>);
+    let (mut alarms, mut last_alarm) = (0, f64::NEG_INFINITY);
+    rig::drive(&simulation.recording, &[], &options, |heard| {
+        let Some(output) = heard.output else { return };
+        let Some(truth) = (heard.truth)(output.time) else { return };
+        way += last.replace(truth).map_or(0.0, |last| last.between(&truth).position().norm());
+        if heard.time > SETTLED && matches!(output.reason, Reason::WheelsSlip | Reason::GyroFault) {
+            alarms += usize::from(heard.time - last_alarm > SAME_ALARM);
+            last_alarm = heard.time;
+        }
+    })?;
+    Ok((way, alarms))
 }
 
 /// The way until the slip was told, and whether the pose was beyond its protection level meanwhile.

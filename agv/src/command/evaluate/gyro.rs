@@ -1,7 +1,7 @@
 //! `agv evaluate gyro`.
 
 use agv_lab::equipment::VehicleKind;
-use agv_lab::evaluate::gyro::{self, GyroOptions, HeadingRow, SlipRow};
+use agv_lab::evaluate::gyro::{self, GyroOptions, HeadingRow, SlipRow, SoundRow};
 
 use super::super::progress;
 
@@ -9,10 +9,12 @@ const HELP: &str = "\
 Examples:
   agv evaluate gyro
   agv evaluate gyro --runs 3 --only slips
+  agv evaluate gyro --runs 400 --only sound
   agv evaluate gyro --vehicle differential --runs 40 --json
 
 Keys of --json: headings [vehicle, before, way, has_gyro, drives, median_deg, mark_95_deg, worst_deg, worst_seed, beyond_level,
-false_alarms], slips [vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level].";
+false_alarms], slips [vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level],
+sound [vehicle, has_gyro, drives, km, false_alarms, seeds].";
 
 /// What is measured.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -21,6 +23,8 @@ enum Part {
     Headings,
     /// Wheels that slip.
     Slips,
+    /// False alarms of vehicles in order.
+    Sound,
 }
 
 /// How much heading a simulated vehicle loses on 12 m without landmarks, with a gyro and without, and how soon it tells a wheel
@@ -34,7 +38,7 @@ pub struct Gyro {
     /// First seed.
     #[arg(long, default_value_t = 100_000)]
     seed: u64,
-    /// One of the two tables only.
+    /// One of the tables only.
     #[arg(long)]
     only: Option<Part>,
     /// This vehicle alone. [default: tricycle, differential, bi-steerable and omni4]
@@ -56,8 +60,9 @@ impl Gyro {
         let options = GyroOptions {
             drives: self.runs,
             seed: self.seed,
-            headings: self.only != Some(Part::Slips),
-            slips: self.only != Some(Part::Headings),
+            headings: self.only.is_none_or(|only| only == Part::Headings),
+            slips: self.only.is_none_or(|only| only == Part::Slips),
+            sound: self.only.is_none_or(|only| only == Part::Sound),
             only: self.vehicle,
         };
         let bar = progress::bar("driving", options.count());
@@ -69,12 +74,14 @@ impl Gyro {
         }
         if options.headings {
             print_headings(&outcome.headings);
-        }
-        if options.headings && options.slips {
             println!();
         }
         if options.slips {
             print_slips(&outcome.slips);
+            println!();
+        }
+        if options.sound {
+            print_sound(&outcome.sound);
         }
         Ok(())
     }
@@ -131,6 +138,23 @@ fn print_slips(rows: &[SlipRow]) {
             row.longest_m,
             row.worst_seed,
             row.beyond_level
+        );
+    }
+}
+
+fn print_sound(rows: &[SoundRow]) {
+    println!("vehicles in order, among reflectors");
+    println!("{:<13} {:<5} {:>7} {:>8} {:>12} seeds", "vehicle", "gyro", "drives", "km", "false alarms");
+    for row in rows {
+        let seeds: Vec<String> = row.seeds.iter().map(u64::to_string).collect();
+        println!(
+            "{:<13} {:<5} {:>7} {:>8.1} {:>12} {}",
+            word(row.vehicle),
+            if row.has_gyro { "yes" } else { "no" },
+            row.drives,
+            row.km,
+            row.false_alarms,
+            seeds.join(" ")
         );
     }
 }
