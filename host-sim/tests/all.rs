@@ -1,6 +1,7 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod eds;
+mod fitted_vehicle;
 mod gyro;
 mod log;
 mod motion;
