@@ -53,6 +53,7 @@ mod support;
 mod timeline;
 mod traction_check;
 mod tricycle_speed;
+mod turn_check;
 mod uncertain_motion;
 mod wheel_vehicle;
 mod wheels;
