@@ -18,6 +18,8 @@ const GATE: f64 = 5.6;
 const LEARNT_OVER: f64 = 10.0;
 const STATED_FOR: f64 = 1.0;
 const LEAST_SHARE: f64 = 0.5;
+/// Wheels tell their ways in steps, of which several may fall together, m.
+const STEP: f64 = 3e-4;
 /// How long, s, what was found is told.
 const TOLD_FOR: f64 = 1.0;
 
@@ -80,8 +82,8 @@ impl RedundancyCheck {
             window.slip += slip;
             window.way += motion.distance;
             let lasting = errors.lasting * window.way;
-            let expected = variance * window.way + lasting * lasting;
-            if window.slip * window.slip > GATE * GATE * expected && expected > 0.0 {
+            let expected = variance * window.way + lasting * lasting + STEP * STEP;
+            if window.slip * window.slip > GATE * GATE * expected {
                 self.slips_until = Some(motion.end.offset(TOLD_FOR));
             }
         }
