@@ -65,8 +65,13 @@ enum Command {
     Manual(command::manual::Manual),
 }
 
+/// Room for a whole controller, which the threads of an evaluation make on their stacks, bytes.
+const THREAD_STACK: usize = 16 << 20;
+
 fn main() -> ExitCode {
     command::panic_message::install();
+    // Nobody has made the threads yet.
+    let _ = rayon::ThreadPoolBuilder::new().stack_size(THREAD_STACK).build_global();
     let matches = Agv::command().try_get_matches().unwrap_or_else(|error| leave(&error));
     let words: Vec<String> = std::env::args().skip(1).collect();
     if let Some(option) = matches.subcommand_name().and_then(|command| stray_option(command, &words)) {

@@ -3,7 +3,7 @@
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::OutputPredictor;
 use agv_core::measurement::{EncoderFaults, Time};
-use agv_core::odometry::MOST_COUNTERS;
+use agv_core::odometry::{Counted, MOST_COUNTERS};
 use agv_core::state::{LaserHealth, Mode, PoseOutput, Relocalization};
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
@@ -241,14 +241,18 @@ impl Bus {
     /// Says what is wrong with encoders, laser and pose.
     fn report_state(&mut self, now: Time) {
         let are_set_up = now.since(self.start) > SETTING_UP;
-        for (kind, is_there) in [
-            (ErrorKind::Laser, matches!(self.laser, LaserHealth::Silent | LaserHealth::Faulty)),
-            (ErrorKind::DriveEncoder, are_set_up && self.faults.drive.is_some()),
-            (ErrorKind::SteeringEncoder, are_set_up && self.faults.steering.is_some()),
-            (ErrorKind::Lost, self.is_lost),
+        for (kind, is_there, which) in [
+            (ErrorKind::Laser, matches!(self.laser, LaserHealth::Silent | LaserHealth::Faulty), 0),
+            (ErrorKind::DriveEncoder, are_set_up && self.faults.drive.is_some(), self.encoders.faulty(Counted::Turn)),
+            (
+                ErrorKind::SteeringEncoder,
+                are_set_up && self.faults.steering.is_some(),
+                self.encoders.faulty(Counted::Steering),
+            ),
+            (ErrorKind::Lost, self.is_lost, 0),
         ] {
             if is_there {
-                self.node.report(kind, now);
+                self.node.report_of(kind, which, now);
             }
         }
     }

@@ -179,6 +179,15 @@ fn a_lost_vehicle_and_a_silent_encoder_are_told_as_emergencies() {
     // Nobody answers for the encoders.
     bench.run(1900..3000);
     assert_eq!(bench.emergencies(), [0xFF01, 0x7305, 0x7306]);
+    // The first node counts the way, and the second one the steering.
+    let parts = |code: u16| {
+        let emergencies = bench.sent.iter().filter_map(|(_, frame)| match Message::decode(frame) {
+            Ok(Message::Emergency { emergency, .. }) if emergency.code == code => Some(emergency.details[0]),
+            _ => None,
+        });
+        emergencies.collect::<Vec<_>>()
+    };
+    assert_eq!((parts(0x7305), parts(0x7306)), (vec![0b01], vec![0b10]));
     bench.bus.update(&Estimate { answered: 3, ..estimate(Mode::Reflectors) });
     bench.run(3000..4000);
     assert_eq!(bench.emergencies(), [0xFF01, 0x7305, 0x7306, 0]);

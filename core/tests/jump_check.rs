@@ -4,6 +4,7 @@
 use agv_core::filter::Ekf;
 use agv_core::geometry::Pose;
 use agv_core::integrity::{Estimate, JumpCheck, is_sure};
+use nalgebra::Matrix3;
 
 #[test]
 fn a_pose_is_sure_while_three_of_its_deviations_are_less_than_a_slip() {
@@ -25,7 +26,7 @@ fn a_pose_is_sure_while_three_of_its_deviations_are_less_than_a_slip() {
 
 /// An estimate that is exactly where the odometry alone leads.
 fn estimate(pose: Pose, distance: f64) -> Estimate {
-    Estimate { pose, odometry_pose: pose, is_sure: true, distance }
+    Estimate { pose, odometry_pose: pose, covariance: Matrix3::zeros(), is_sure: true, distance }
 }
 
 #[test]

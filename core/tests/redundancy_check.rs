@@ -3,8 +3,8 @@
 use agv_core::integrity::{RedundancyCheck, WheelErrors};
 use agv_core::measurement::{Time, WheelReading, WheelSample};
 use agv_core::odometry::{
-    AngleEncoder, BiSteerable, CounterRange, DrivenWheel, Integration, Odometer, OdometerParameters, OdometryNoise,
-    Omnidirectional, SteeredWheel, WheelBased,
+    AngleEncoder, BiSteerable, CounterRange, DrivenWheel, Integration, Motion, Odometer, OdometerParameters,
+    OdometryNoise, Omnidirectional, SteeredWheel, WheelBased,
 };
 
 /// Way of one tick, m.
@@ -116,10 +116,61 @@ fn wheels_that_slip_by_half_of_what_is_stated_are_not_told_in_ten_kilometres() {
     assert_eq!(told_of_five(0.5), 0);
 }
 
-/// Four times in 100 km with seeds 101 to 150; two of the vehicles here are among the unlucky ones.
+/// The wheel goes half of the way of the vehicle, as one on the inside of a curve; the others slip as wheels do.
+#[test]
+fn a_wheel_on_the_inside_of_a_curve_is_told_once_it_is_known_how_wheels_slip() {
+    for seed in 1..=20 {
+        let mut state = seed;
+        let slipping = |driven: f64, number: usize, way: f64| {
+            let slip = if number == 0 && driven >= 8.0 { 0.12 * way } else { 0.0 };
+            slip + 0.5 * ERRORS.slip * way.abs().sqrt() * normal(&mut state)
+        };
+        let found = told(omni(), OMNI, 10.0, slipping).expect("it is told") - 8.0;
+        assert!(found > 0.0 && found <= 0.3 + STEP, "seed {seed}: {found} m");
+    }
+}
+
 #[test]
 fn wheels_that_slip_by_all_that_is_stated_are_hardly_told() {
-    assert!(told_of_five(1.0) <= 2, "{}", told_of_five(1.0));
+    assert!(told_of_five(1.0) <= 1, "{}", told_of_five(1.0));
+}
+
+/// A hundred kilometres of each, two kilometres at a time.
+#[test]
+#[ignore = "takes minutes: how often wheels in order are told to slip"]
+fn false_alarms_in_a_hundred_kilometres() {
+    for share in [0.3, 0.5, 0.7, 1.0] {
+        let mut alarms = 0;
+        for seed in 101..=150_u64 {
+            let mut state = seed;
+            let noise = |_: f64, number: usize, way: f64| {
+                let lasting = if number == 0 { ERRORS.lasting * way } else { 0.0 };
+                lasting + share * ERRORS.slip * way.abs().sqrt() * normal(&mut state)
+            };
+            alarms += usize::from(told(omni(), OMNI, 2000.0, noise).is_some());
+        }
+        println!("slip of {share} of that stated: {alarms} of 50 drives of 2 km");
+        assert!(alarms <= 1, "{alarms}");
+    }
+}
+
+/// Two ticks of a quarter of a millimetre that fall together when a vehicle drives off are all of a short way.
+#[test]
+fn ticks_are_no_slip() {
+    let mut check = RedundancyCheck::new();
+    let motion = |number: u64, distance: f64| {
+        let at = |number: u64| Time::from_micros(1_000_000 + 10_000 * number);
+        Motion { start: at(number), distance, ..Motion::none(at(number + 1)) }
+    };
+    // Wheels that slip by half of what is stated, to and fro, for thirty metres.
+    for number in 0..3000 {
+        let slip = 0.5 * ERRORS.slip * STEP.sqrt() * if number % 2 == 0 { 1.0 } else { -1.0 };
+        check.travel(&motion(number, STEP), slip, &ERRORS);
+    }
+    check.clear();
+    let ticks = motion(3000, 1.25e-4);
+    check.travel(&ticks, 2.5e-4, &ERRORS);
+    assert!(!check.slips(ticks.end));
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod eds;
+mod fitted_vehicle;
+mod gyro;
 mod lent_map;
 mod log;
 mod motion;

@@ -51,7 +51,7 @@ impl VehicleKind {
 }
 
 /// A vehicle, with a gyro or without. The standard one is a tricycle without.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::Args)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, clap::Args)]
 pub struct Equipment {
     /// The vehicle.
     #[arg(long, value_enum, default_value = "tricycle")]
@@ -59,6 +59,16 @@ pub struct Equipment {
     /// Whether it has a gyro, of the usual grade.
     #[arg(long)]
     pub gyro: bool,
+    /// True slip of each wheel, m for a square root of a metre; what is stated of it stays [default: 0.003].
+    #[arg(long, value_name = "SLIP", value_parser = slip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip: Option<f64>,
+}
+
+/// A slip that a wheel can have.
+fn slip(text: &str) -> Result<f64, String> {
+    let slip: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.0..=0.1).contains(&slip) { Ok(slip) } else { Err("a slip is from 0 to 0.1".to_owned()) }
 }
 
 impl Equipment {
@@ -66,6 +76,9 @@ impl Equipment {
     pub fn apply(self, scenario: &mut Scenario) {
         scenario.vehicle.reports = self.vehicle.reports();
         scenario.gyro.fitted = self.gyro;
+        if let Some(slip) = self.slip {
+            scenario.odometry.slip = slip;
+        }
     }
 
     /// What the localiser believes of the standard vehicle of its kind.

@@ -187,8 +187,8 @@ impl Replay {
             let vehicle = VehicleFile::read(path)?;
             let doubts = vehicle.settings().filter_map(|(name, value)| doubt(name, value));
             doubts.for_each(|doubt| output::note(&format!("agv: {}: {doubt}", path.display())));
-            let is_tricycle = vehicle.apply(&mut recording.parameters);
-            ensure!(is_tricycle, "{}: the log is not of a tricycle", self.log.display());
+            let is_of_kind = vehicle.apply(&mut recording.parameters);
+            ensure!(is_of_kind, "{}: the log is of another kind of vehicle", self.log.display());
         }
         let mut contours = None;
         for path in &self.map {

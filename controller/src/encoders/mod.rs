@@ -280,6 +280,15 @@ impl Encoders {
         }
     }
 
+    /// Which of the encoders that count turns, or of those that count angles, have a fault: bit 0 is the first encoder.
+    #[must_use]
+    pub fn faulty(&self, counted: Counted) -> u8 {
+        match &self.source {
+            Source::Counters(group) => group.faulty(counted),
+            Source::Own(_) => 0,
+        }
+    }
+
     /// How many of the nodes are encoders of the vehicle.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -1,5 +1,7 @@
 //! Whether the laser was knocked: landmarks put the pose right by more than the odometry can be wrong by.
 
+use nalgebra::Matrix3;
+
 use crate::filter::Ekf;
 use crate::geometry::Pose;
 
@@ -10,10 +12,24 @@ pub struct Estimate {
     pub pose: Pose,
     /// The same, moved by the odometry alone.
     pub odometry_pose: Pose,
+    /// Covariance of x, y (m) and heading (rad), in W.
+    pub covariance: Matrix3<f64>,
     /// Whether what is not known of the pose is less than a slip.
     pub is_sure: bool,
     /// Distance since a landmark last corrected the pose, m.
     pub distance: f64,
+}
+
+impl Estimate {
+    /// By how much landmarks have moved the pose to another estimate of the same time, in R behind the motion.
+    #[must_use]
+    pub fn correction_to(&self, after: &Self) -> Pose {
+        // What was extrapolated behind the last sample is in both.
+        let is_same = self.odometry_pose == after.odometry_pose;
+        let moved = || self.odometry_pose.between(&after.odometry_pose);
+        let expected = if is_same { self.pose } else { self.pose.compose(&moved()) };
+        expected.between(&after.pose)
+    }
 }
 
 /// The last revolution that has corrected the pose.
@@ -98,11 +114,7 @@ impl JumpCheck {
     /// odometry that fails has led to, does not put the pose right (`is_right`). None if nothing can be told.
     pub fn correct(&mut self, before: &Estimate, after: &Estimate, is_right: bool) -> Option<Jump> {
         let jump = self.corrected.and_then(|last| {
-            // What was extrapolated behind the last sample is in both.
-            let is_same = before.odometry_pose == after.odometry_pose;
-            let moved = || before.odometry_pose.between(&after.odometry_pose);
-            let expected = if is_same { before.pose } else { before.pose.compose(&moved()) };
-            let correction = expected.between(&after.pose);
+            let correction = before.correction_to(after);
             // What was not known of the pose before is nothing that the distance since has shown.
             last.is_sure.then(|| {
                 let motion = last.odometry_pose.between(&after.odometry_pose);

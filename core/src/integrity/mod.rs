@@ -7,6 +7,7 @@
 //! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
 //! | [`RedundancyCheck`] | what redundant wheels say differently | a wheel that slips |
+//! | [`TractionCheck`] | the estimate before and after each correction | a wheel that slips |
 //! | [`TurnCheck`] | turns by wheels and by a gyro | a wheel that slips, a gyro that is wrong |
 //! | [`MountingCheck`] | corrections with the motion since the last one | a laser mounted elsewhere, an odometry of another scale |
 //!
@@ -19,6 +20,7 @@ mod mounting_check;
 mod redundancy_check;
 pub mod separation;
 mod slip_check;
+mod traction_check;
 mod turn_check;
 
 pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
@@ -27,13 +29,14 @@ pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
 pub use mounting_check::{MountingCheck, Suspect};
 pub use redundancy_check::{RedundancyCheck, WheelErrors};
 pub use slip_check::SlipCheck;
+pub use traction_check::TractionCheck;
 pub use turn_check::{GyroFault, LastingErrors, TurnCheck};
 
 use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
 use crate::measurement::{LASERS, LaserId, Time};
-use crate::state::LandmarkUse;
 pub use crate::state::ProtectionLevel;
+use crate::state::{LandmarkSource, LandmarkUse};
 
 /// All checks of one vehicle.
 #[derive(Clone, Debug)]
@@ -48,6 +51,8 @@ pub struct Integrity {
     pub turns: TurnCheck,
     /// Of a vehicle with more wheels than it needs.
     pub redundancy: RedundancyCheck,
+    /// What landmarks say of the wheels.
+    pub traction: TractionCheck,
 }
 
 /// A pose that replaces one which was contradicted.
@@ -72,6 +77,7 @@ impl Integrity {
             mounting: MountingCheck::new(),
             turns: TurnCheck::new(),
             redundancy: RedundancyCheck::new(),
+            traction: TractionCheck::new(),
         }
     }
 
@@ -86,11 +92,13 @@ impl Integrity {
         }
         self.mounting.restart();
         self.jumps.forget();
+        self.traction.clear();
     }
 
     /// The odometry is not believed.
     pub fn doubt_odometry(&mut self) {
         self.jumps.forget();
+        self.traction.clear();
     }
 
     /// Takes the reflectors of a revolution of a laser that ended at `now`, be it none; `to_odometry` is the pose of W in the frame of the
@@ -104,6 +112,17 @@ impl Integrity {
             slip.see(&place, libm::hypot(x, y));
         }
         slip.disagrees()
+    }
+
+    /// Takes what the landmarks of a fixed map have made of the estimate, up to `now`, if there are enough of them.
+    pub fn judge_traction(&mut self, before: &Estimate, after: &Estimate, uses: &[LandmarkUse], now: Time) {
+        let is_fixed = |seen: &&LandmarkUse| {
+            let fixed = seen.landmark.is_some_and(|(source, _)| source == LandmarkSource::Fixed);
+            seen.verdict == Verdict::Accepted && seen.kind == LandmarkKind::Reflector && fixed
+        };
+        if uses.iter().filter(is_fixed).count() >= traction_check::LEAST {
+            self.traction.correct(before, after, now);
+        }
     }
 
     /// Takes what an event has made of the estimate; see [`JumpCheck::correct`]. What corrects nothing tells nothing.

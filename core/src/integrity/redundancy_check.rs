@@ -1,7 +1,7 @@
 //! Whether the wheels of a vehicle that has more of them than it needs fit each other.
 //!
-//! What does not fit is summed over some way and held against its deviation: the slip that is stated of every wheel, and what lasts of
-//! the errors of wheels and steering. More than that is a wheel that slips. The sum has a sign, so that what wanders to and
+//! What does not fit is summed over some way and held against its deviation: the slip that the wheels have shown on the way behind,
+//! which is not more than that stated, and what lasts of the errors of wheels and steering. More than that is a wheel that slips. The sum has a sign, so that what wanders to and
 //! fro is not taken for what goes one way.
 
 use crate::measurement::Time;
@@ -10,10 +10,16 @@ use crate::odometry::Motion;
 /// Way over which what does not fit is summed, m.
 const WINDOW: f64 = 0.3;
 /// So many sums, each of which begins behind the one before by its part of the way.
-const WINDOWS: usize = 4;
-/// A sum of more deviations is none of a vehicle in order. Wheels that slip by all that is stated exceed it four times in 100 km; the
-/// stated slip is meant to be more than the true one, and seven tenths of it exceed it never in as many.
-const GATE: f64 = 5.0;
+const WINDOWS: usize = 8;
+/// A sum of more deviations is none of a vehicle in order.
+const GATE: f64 = 5.6;
+/// The slip of wheels in order is learnt over so much of the way, m, from that stated as if it had been seen for a while, m; it is not
+/// less than this share of it.
+const LEARNT_OVER: f64 = 10.0;
+const STATED_FOR: f64 = 1.0;
+const LEAST_SHARE: f64 = 0.5;
+/// Wheels tell their ways in steps, of which several may fall together, m.
+const STEP: f64 = 3e-4;
 /// How long, s, what was found is told.
 const TOLD_FOR: f64 = 1.0;
 
@@ -44,6 +50,8 @@ pub struct RedundancyCheck {
     /// The window that begins next, and the way since the last one began, m.
     next: usize,
     since: f64,
+    /// Sum of squares of what did not fit, and its way, over the last metres.
+    learnt: (f64, f64),
     slips_until: Option<Time>,
 }
 
@@ -51,7 +59,7 @@ impl RedundancyCheck {
     /// A check that has seen nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { windows: [Window::EMPTY; WINDOWS], next: 0, since: 0.0, slips_until: None }
+        Self { windows: [Window::EMPTY; WINDOWS], next: 0, since: 0.0, learnt: (0.0, 0.0), slips_until: None }
     }
 
     /// Forgets the way behind.
@@ -69,15 +77,25 @@ impl RedundancyCheck {
             (self.next, self.since) = ((self.next + 1) % WINDOWS, 0.0);
         }
         self.since += motion.distance;
+        let variance = self.learn(motion.distance, slip, errors.slip * errors.slip);
         for window in &mut self.windows {
             window.slip += slip;
             window.way += motion.distance;
             let lasting = errors.lasting * window.way;
-            let expected = errors.slip * errors.slip * window.way + lasting * lasting;
-            if window.slip * window.slip > GATE * GATE * expected && expected > 0.0 {
+            let expected = variance * window.way + lasting * lasting + STEP * STEP;
+            if window.slip * window.slip > GATE * GATE * expected {
                 self.slips_until = Some(motion.end.offset(TOLD_FOR));
             }
         }
+    }
+
+    /// What wheels in order slip, m^2 for a metre, where `stated` is the most.
+    fn learn(&mut self, distance: f64, slip: f64, stated: f64) -> f64 {
+        let (squares, way) = self.learnt;
+        let kept = 1.0 - (distance / LEARNT_OVER).min(1.0);
+        self.learnt = (kept * squares + slip * slip, kept * way + distance);
+        let shown = (squares + stated * STATED_FOR) / (way + STATED_FOR);
+        shown.clamp(LEAST_SHARE * LEAST_SHARE * stated, stated)
     }
 
     /// Whether a wheel slips.

@@ -307,7 +307,8 @@ impl<C: Capacities> Localizer<C> {
         let timeline = self.timeline.begun_mut()?;
         let state = timeline.state();
         let odometry_pose = *timeline.odometry_pose();
-        Some(Estimate { pose: state.pose, odometry_pose, is_sure: is_sure(&state), distance: self.distance.any() })
+        let (is_sure, distance) = (is_sure(&state), self.distance.any());
+        Some(Estimate { pose: state.pose, odometry_pose, covariance: state.covariance(), is_sure, distance })
     }
 
     /// Lets the checks compare what an event has shown with what the odometry says; `before` is the estimate before it was
@@ -328,6 +329,9 @@ impl<C: Capacities> Localizer<C> {
         if self.told_by_contours.is_none() {
             let is_right = self.lost.is_none() && self.outage.is_none();
             self.integrity.correct(before, &after, uses, is_right);
+            if is_right && !self.parameters.maps.slam {
+                self.integrity.judge_traction(before, &after, uses, self.timeline.now());
+            }
         }
     }
 
@@ -653,7 +657,7 @@ impl<C: Capacities> Localizer<C> {
         };
         let outage = self.outage.map(|outage| outage.reason);
         let motion = remark_on_motion(&self.integrity, self.gyro.is_some(), timeline.now());
-        let (mode, reason) = supervise(self.lost, outage, motion, support, &self.integrity);
+        let (mode, reason) = supervise(self.lost, outage, motion, support, &self.integrity, timeline.now());
         self.outputs.pose = PoseOutput {
             time: timeline.now(),
             pose: state.pose,

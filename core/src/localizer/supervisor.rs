@@ -29,6 +29,7 @@ pub(super) fn supervise(
     motion: Option<Reason>,
     support: Support,
     integrity: &Integrity,
+    now: Time,
 ) -> (Mode, Reason) {
     if let Some(reason) = lost {
         return (Mode::Lost, reason);
@@ -37,7 +38,11 @@ pub(super) fn supervise(
         return (Mode::WithoutOdometry, reason);
     }
     let suspect = integrity.suspect();
-    let remark = if suspect == Some(Suspect::Odometry) { Reason::OdometryDisagrees } else { Reason::None };
+    let remark = match suspect {
+        _ if integrity.traction.slips(now) => Reason::WheelsSlip,
+        Some(Suspect::Odometry) => Reason::OdometryDisagrees,
+        _ => Reason::None,
+    };
     let remark = motion.unwrap_or(remark);
     match (support.by_reflectors, support.by_features) {
         (false, false) => (Mode::DeadReckoning, motion.unwrap_or(Reason::NoLandmarks)),

@@ -11,20 +11,31 @@
 //! laser_theta_rad = 0.007
 //! ```
 //!
+//! Of a vehicle with several wheels it holds settings by their names:
+//!
+//! ```toml
+//! [settings]
+//! "vehicle.track" = 0.612
+//! "vehicle.wheel_1_scale" = 2.5e-5
+//! ```
+//!
 //! Whatever is left out stays as it is.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Parameters, bounds};
 use agv_core::odometry::{Tricycle, Vehicle};
+use agv_settings::Settings;
+use agv_settings::leaf::{Leaf, Value};
 use serde::{Deserialize, Serialize};
 
 use crate::output_file;
 use crate::text_file::{self, TextFileError};
 
-/// Parameters of a tricycle and its laser.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Parameters of a tricycle and its laser, or settings of any vehicle.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct VehicleFile {
     /// Distance from the rear axle to the steering axis (K: L).
@@ -43,7 +54,13 @@ pub struct VehicleFile {
     pub laser_y_m: Option<f64>,
     /// The same.
     pub laser_theta_rad: Option<f64>,
+    /// Settings that are numbers, by their names.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub settings: BTreeMap<String, f64>,
 }
+
+/// How the names of the settings of a vehicle begin.
+const VEHICLE: &str = "vehicle.";
 
 /// One line of the file.
 struct Entry {
@@ -66,7 +83,19 @@ impl VehicleFile {
             laser_x_m: Some(laser.x),
             laser_y_m: Some(laser.y),
             laser_theta_rad: Some(laser.theta),
+            settings: BTreeMap::new(),
         }
+    }
+
+    /// The file for a vehicle of any kind, without its laser.
+    #[must_use]
+    pub fn of_vehicle(parameters: &Parameters) -> Self {
+        let settings = Settings::of(*parameters);
+        let number = |leaf: &Leaf| match leaf.get(&settings) {
+            Some(Value::Number(value)) if leaf.name.starts_with(VEHICLE) => Some((leaf.name.to_owned(), value)),
+            _ => None,
+        };
+        Self { settings: agv_settings::LEAVES.iter().filter_map(number).collect(), ..Self::default() }
     }
 
     /// Reads a file.
@@ -81,7 +110,8 @@ impl VehicleFile {
         })?;
         match file.problem() {
             Some((name, demand)) => {
-                let line = text.lines().position(|line| line.trim_start().starts_with(name)).map_or(1, |line| line + 1);
+                let line =
+                    text.lines().position(|line| line.trim_start().starts_with(&name)).map_or(1, |line| line + 1);
                 Err(TextFileError::of_line(path, line, format!("{name} must be {demand}")))
             }
             None => Ok(file),
@@ -89,7 +119,22 @@ impl VehicleFile {
     }
 
     /// The first entry that no vehicle has, and what it must be.
-    fn problem(&self) -> Option<(&'static str, String)> {
+    fn problem(&self) -> Option<(String, String)> {
+        self.problem_of_tricycle().map(|(name, demand)| (name.to_owned(), demand)).or_else(|| {
+            self.settings.iter().find_map(|(name, value)| {
+                let demand = match Leaf::named(name) {
+                    None => "the name of a setting".to_owned(),
+                    Some(leaf) if !(leaf.bounds.0..=leaf.bounds.1).contains(value) => {
+                        format!("from {} to {}, and is {value}", leaf.bounds.0, leaf.bounds.1)
+                    }
+                    Some(_) => return None,
+                };
+                Some((format!("\"{name}\""), demand))
+            })
+        })
+    }
+
+    fn problem_of_tricycle(&self) -> Option<(&'static str, String)> {
         self.entries().into_iter().find_map(|Entry { name, setting, value }| {
             let (value, (least, most)) = (value?, bounds(setting)?);
             let is_scale = name.ends_with("_per_tick");
@@ -126,13 +171,28 @@ impl VehicleFile {
     }
 
     /// The same parameters as the firmware's settings call them: names of leaves, and values in their units.
-    pub fn settings(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.entries().into_iter().filter_map(|entry| Some((entry.setting, entry.value?)))
+    pub fn settings(&self) -> impl Iterator<Item = (&str, f64)> {
+        let of_tricycle = self.entries().into_iter().filter_map(|entry| Some((entry.setting, entry.value?)));
+        of_tricycle.chain(self.settings.iter().map(|(name, value)| (name.as_str(), *value)))
     }
 
-    /// Puts the parameters in place of those of a log. False if the log is not of a tricycle.
+    /// Puts the parameters in place of those of a log. False if the log is of another kind of vehicle.
     #[must_use]
     pub fn apply(&self, parameters: &mut Parameters) -> bool {
+        if !self.settings.is_empty() {
+            let mut settings = Settings::of(*parameters);
+            let mut set = |(name, value): (&String, &f64)| {
+                let leaf = Leaf::named(name).filter(|leaf| leaf.get(&settings).is_some());
+                leaf.is_some_and(|leaf| leaf.set(&mut settings, Value::Number(*value)).is_ok())
+            };
+            if !self.settings.iter().all(&mut set) {
+                return false;
+            }
+            *parameters = settings.parameters;
+            if self.entries().iter().all(|entry| entry.value.is_none()) {
+                return true;
+            }
+        }
         let Vehicle::Tricycle(tricycle) = &mut parameters.vehicle else {
             return false;
         };

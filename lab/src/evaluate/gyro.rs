@@ -6,6 +6,7 @@
 //! - lost heading: the change of the published heading's error from the last pose before the laser falls silent to the pose after
 //!   12 m of way, which is what a perfect start at that place would leave;
 //! - the 95 % mark: the smallest value that 95 % of all drives do not exceed; no drive is left out;
+//! - false alarm: a slip, or a fault of the gyro, that is told of a vehicle in order; those less than 10 s apart are one;
 //! - told: the first pose on the bus with the reason [`Reason::WheelsSlip`] after the slip began; its way is that of the truth.
 
 use std::ops::Range;
@@ -17,6 +18,7 @@ use agv_host_sim::simulate::scenario::{
     PathKind, PathOptions, PoseOptions, ReflectorShape, Scenario, Shapes, Slip, WorldOptions,
 };
 use agv_host_sim::simulate::{SimulateError, simulate};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::campaign::fault::{Fault, FaultKind};
@@ -29,6 +31,8 @@ const WAY: f64 = 12.0;
 const BEFORE: f64 = 60.0;
 /// A gyro that was not heard before the drive is not missed for so long any more, s.
 const SETTLED: f64 = 2.0;
+/// Alarms less than this apart, s, are one.
+const SAME_ALARM: f64 = 10.0;
 /// Share of a wheel's way that slips.
 const SLIP: f64 = 0.2;
 
@@ -123,6 +127,23 @@ pub struct SlipRow {
     pub beyond_level: usize,
 }
 
+/// What was told of vehicles in order.
+#[derive(Clone, Debug, Serialize)]
+pub struct SoundRow {
+    /// The vehicle.
+    pub vehicle: VehicleKind,
+    /// Whether there was a gyro.
+    pub has_gyro: bool,
+    /// Drives.
+    pub drives: usize,
+    /// Way of all, km.
+    pub km: f64,
+    /// False alarms.
+    pub false_alarms: usize,
+    /// Seeds of the drives with any.
+    pub seeds: Vec<u64>,
+}
+
 /// All that was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct GyroOutcome {
@@ -130,6 +151,8 @@ pub struct GyroOutcome {
     pub headings: Vec<HeadingRow>,
     /// Slips.
     pub slips: Vec<SlipRow>,
+    /// Vehicles in order.
+    pub sound: Vec<SoundRow>,
 }
 
 /// One drive without landmarks.
@@ -139,28 +162,92 @@ struct Drive {
     is_alarmed: bool,
 }
 
-/// Drives each kind with seeds from `seed` on. `step` is called after each drive.
+/// What is to be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GyroOptions {
+    /// Drives of each kind.
+    pub drives: u32,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Whether lost headings are measured.
+    pub headings: bool,
+    /// Whether slips are measured.
+    pub slips: bool,
+    /// Whether false alarms are counted.
+    pub sound: bool,
+    /// With this vehicle alone.
+    pub only: Option<VehicleKind>,
+}
+
+impl GyroOptions {
+    fn vehicles(&self) -> impl Iterator<Item = VehicleKind> {
+        let only = self.only;
+        let given = only.filter(|only| !VEHICLES.contains(only));
+        VEHICLES.into_iter().filter(move |vehicle| only.is_none_or(|only| only == *vehicle)).chain(given)
+    }
+
+    fn kinds(&self) -> impl Iterator<Item = Kind> {
+        let of = |vehicle| kinds().map(move |(before, way, has_gyro)| Kind { vehicle, before, way, has_gyro });
+        self.vehicles().filter(|_| self.headings).flat_map(of)
+    }
+
+    fn slips(&self) -> impl Iterator<Item = (VehicleKind, Way, ShownBy)> {
+        let of = |vehicle| slips_of().map(move |(way, shown_by)| (vehicle, way, shown_by));
+        self.vehicles().filter(|_| self.slips).flat_map(of)
+    }
+
+    fn sound(&self) -> impl Iterator<Item = (VehicleKind, bool)> {
+        self.vehicles().filter(|_| self.sound).flat_map(|vehicle| [true, false].map(|has_gyro| (vehicle, has_gyro)))
+    }
+
+    /// How many drives [`run`] makes.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        (self.kinds().count() + self.slips().count() + self.sound().count()) as u64 * u64::from(self.drives)
+    }
+}
+
+/// Drives each kind. `step` is called after each drive.
 ///
 /// # Errors
 /// See [`GyroError`].
-pub fn run(drives: u32, seed: u64, mut step: impl FnMut()) -> Result<GyroOutcome, GyroError> {
-    let seeds = seed..seed + u64::from(drives);
+pub fn run(options: &GyroOptions, step: impl Fn() + Sync) -> Result<GyroOutcome, GyroError> {
+    let seeds = options.seed..options.seed + u64::from(options.drives);
     let (mut headings, mut slips) = (Vec::new(), Vec::new());
-    for vehicle in VEHICLES {
-        for (before, way, has_gyro) in kinds() {
-            let kind = Kind { vehicle, before, way, has_gyro };
-            let mut found = Vec::new();
-            for seed in seeds.clone() {
-                found.push((seed, blind_drive(kind, seed)?));
-                step();
-            }
-            headings.push(heading_row(kind, &found));
-        }
-        for (way, shown_by) in slips_of() {
-            slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &mut step)?);
-        }
+    for kind in options.kinds() {
+        let found = over(seeds.clone(), &step, |seed| blind_drive(kind, seed))?;
+        headings.push(heading_row(kind, &found));
     }
-    Ok(GyroOutcome { headings, slips })
+    for (vehicle, way, shown_by) in options.slips() {
+        slips.push(slip_row(vehicle, way, shown_by, seeds.clone(), &step)?);
+    }
+    let mut sound = Vec::new();
+    for (vehicle, has_gyro) in options.sound() {
+        let found = over(seeds.clone(), &step, |seed| sound_drive(vehicle, has_gyro, seed))?;
+        sound.push(SoundRow {
+            vehicle,
+            has_gyro,
+            drives: found.len(),
+            km: 1e-3 * found.iter().map(|(_, (way, _))| way).sum::<f64>(),
+            false_alarms: found.iter().map(|(_, (_, alarms))| alarms).sum(),
+            seeds: found.iter().filter(|(_, (_, alarms))| *alarms > 0).map(|(seed, _)| *seed).collect(),
+        });
+    }
+    Ok(GyroOutcome { headings, slips, sound })
+}
+
+/// What `drive` gives for each seed, in their order.
+fn over<T: Send>(
+    seeds: Range<u64>,
+    step: &(impl Fn() + Sync),
+    drive: impl Fn(u64) -> Result<T, GyroError> + Sync,
+) -> Result<Vec<(u64, T)>, GyroError> {
+    let drive = |seed| {
+        let found = drive(seed)?;
+        step();
+        Ok((seed, found))
+    };
+    seeds.into_par_iter().map(drive).collect()
 }
 
 /// Lets a wheel of a vehicle slip on drives with those seeds. `step` is called after each drive.
@@ -172,21 +259,23 @@ pub fn slip_row(
     way: Way,
     shown_by: ShownBy,
     seeds: Range<u64>,
-    mut step: impl FnMut(),
+    step: impl Fn() + Sync,
 ) -> Result<SlipRow, GyroError> {
-    let (mut drives, mut told, mut beyond_level) = (0, 0, 0);
-    let (mut longest_m, mut worst_seed) = (0.0, seeds.start);
-    for seed in seeds {
-        let (after, is_beyond) = slipping_drive(vehicle, way, shown_by, seed)?;
-        drives += 1;
-        told += usize::from(after.is_some());
-        beyond_level += usize::from(is_beyond);
-        if let Some(after) = after.filter(|after| *after > longest_m) {
-            (longest_m, worst_seed) = (after, seed);
-        }
-        step();
-    }
-    Ok(SlipRow { vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level })
+    let first = seeds.start;
+    let found = over(seeds, &step, |seed| slipping_drive(vehicle, way, shown_by, seed))?;
+    let ways = found.iter().filter_map(|(seed, (after, _))| Some((*seed, (*after)?)));
+    let (worst_seed, longest_m) =
+        ways.clone().fold((first, 0.0), |worst, way| if way.1 > worst.1 { way } else { worst });
+    Ok(SlipRow {
+        vehicle,
+        way,
+        shown_by,
+        drives: found.len(),
+        told: ways.count(),
+        longest_m,
+        worst_seed,
+        beyond_level: found.iter().filter(|(_, (_, is_beyond))| *is_beyond).count(),
+    })
 }
 
 const VEHICLES: [VehicleKind; 4] =
@@ -211,13 +300,6 @@ fn kinds() -> impl Iterator<Item = (Before, Way, bool)> {
 fn slips_of() -> impl Iterator<Item = (Way, ShownBy)> {
     let shown = [ShownBy::Gyro, ShownBy::Reflectors, ShownBy::Nothing];
     WAYS.into_iter().flat_map(move |way| shown.map(|shown_by| (way, shown_by)))
-}
-
-/// How many drives [`run`] makes.
-#[must_use]
-pub fn drives(of_each: u32) -> u64 {
-    let of_vehicle = kinds().count() + slips_of().count();
-    (VEHICLES.len() * of_vehicle) as u64 * u64::from(of_each)
 }
 
 fn heading_row(kind: Kind, found: &[(u64, Drive)]) -> HeadingRow {
@@ -297,7 +379,7 @@ fn scenario(kind: Kind, seed: u64) -> Scenario {
         start: PoseOptions { x: 0.0, y: -1.0, heading_deg: 0.0 },
         legs: vec![Leg { direction: Direction::Forward, segments }],
     };
-    Equipment { vehicle, gyro: has_gyro }.apply(&mut scenario);
+    Equipment { vehicle, gyro: has_gyro, ..Equipment::default() }.apply(&mut scenario);
     scenario
 }
 
@@ -345,6 +427,27 @@ fn blind_drive(kind: Kind, seed: u64) -> Result<Drive, GyroError> {
         }
     })?;
     Ok(drive)
+}
+
+/// Way of a vehicle in order among reflectors, m, and how often it was alarmed.
+fn sound_drive(vehicle: VehicleKind, has_gyro: bool, seed: u64) -> Result<(f64, usize), GyroError> {
+    let kind = Kind { vehicle, before: Before::Drives, way: Way::Curve, has_gyro };
+    let scenario = scenario(kind, seed);
+    let (_, end) = times(&scenario, Before::Drives);
+    let simulation = simulate(&scenario)?;
+    let options = RigOptions { seconds: end, seed, is_told: true };
+    let (mut way, mut last) = (0.0, None::<Pose>);
+    let (mut alarms, mut last_alarm) = (0, f64::NEG_INFINITY);
+    rig::drive(&simulation.recording, &[], &options, |heard| {
+        let Some(output) = heard.output else { return };
+        let Some(truth) = (heard.truth)(output.time) else { return };
+        way += last.replace(truth).map_or(0.0, |last| last.between(&truth).position().norm());
+        if heard.time > SETTLED && matches!(output.reason, Reason::WheelsSlip | Reason::GyroFault) {
+            alarms += usize::from(heard.time - last_alarm > SAME_ALARM);
+            last_alarm = heard.time;
+        }
+    })?;
+    Ok((way, alarms))
 }
 
 /// The way until the slip was told, and whether the pose was beyond its protection level meanwhile.

@@ -149,6 +149,8 @@ pub struct EncoderGroup {
     waiting: Option<EncoderReading>,
     /// What was said of faults last.
     told_faults: EncoderFaults,
+    /// Which of the channels had a fault when they were looked at last: a bit for each.
+    faulty: u8,
 }
 
 /// Time between two reports of a fault that lasts, s.
@@ -168,6 +170,7 @@ impl EncoderGroup {
             sync: is_synchronous.then(|| SyncProducer::new(sync_period, start)),
             waiting: None,
             told_faults: EncoderFaults::default(),
+            faulty: 0,
         };
         for settings in channels {
             // There is room for all that are left.
@@ -215,8 +218,10 @@ impl EncoderGroup {
     /// The faults that the encoders have now: the first one of those that count turns, and of those that count angles.
     pub fn faults(&mut self, now: Time) -> EncoderFaults {
         let mut faults = EncoderFaults { time: now, ..EncoderFaults::default() };
-        for channel in &mut self.channels {
+        self.faulty = 0;
+        for (number, channel) in self.channels.iter_mut().enumerate() {
             let fault = channel.check(now);
+            self.faulty |= u8::from(fault.is_some()) << number;
             let of = match channel.counted {
                 Counted::Turn => &mut faults.drive,
                 Counted::Steering => &mut faults.steering,
@@ -224,6 +229,13 @@ impl EncoderGroup {
             *of = of.or(fault);
         }
         faults
+    }
+
+    /// Which of the encoders that count turns, or of those that count angles, have a fault: bit 0 is the first encoder.
+    #[must_use]
+    pub fn faulty(&self, counted: Counted) -> u8 {
+        let of_kind = |(number, channel): (usize, &Channel)| u8::from(channel.counted == counted) << number;
+        self.faulty & self.channels.iter().enumerate().map(of_kind).fold(0, |all, one| all | one)
     }
 
     /// What there is to say of faults: when they change, and every [`FAULT_PERIOD`] seconds while there are any.

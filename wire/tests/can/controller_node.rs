@@ -504,6 +504,27 @@ fn errors_come_and_go_and_are_remembered() {
     assert_eq!((master.number(0x1003, 0), master.number(0x1003, 8)), (8, 0x7300));
 }
 
+/// Which of several encoders has failed is told in the first byte of the details, and in the upper half of the entry of 1003h.
+#[test]
+fn an_emergency_says_which_parts_have_failed_and_another_one_is_told_anew() {
+    let mut master = Master::new();
+    master.controller.report_of(ErrorKind::DriveEncoder, 0b0010, at(10));
+    assert_eq!(master.controller.poll(at(10)), Some(frame("090#0573010200000000")));
+    assert_eq!(master.number(0x1003, 1), 0x0002_7305);
+    master.controller.report_of(ErrorKind::DriveEncoder, 0b0010, at(20));
+    assert_eq!(master.controller.poll(at(20)), None);
+    master.controller.report_of(ErrorKind::DriveEncoder, 0b1000, at(30));
+    assert_eq!(master.controller.poll(at(30)), Some(frame("090#0573010A00000000")));
+    assert_eq!((master.number(0x1003, 0), master.number(0x1003, 1)), (2, 0x000A_7305));
+    // All are over, and what fails next is told alone.
+    let said = |master: &mut Master, now: u64| {
+        std::iter::from_fn(|| master.controller.poll(at(now))).find(|sent| *sent != frame("710#05"))
+    };
+    assert_eq!(said(&mut master, 600), Some(frame("090#0000000573000000")));
+    master.controller.report_of(ErrorKind::DriveEncoder, 0b0001, at(700));
+    assert_eq!(said(&mut master, 700), Some(frame("090#0573010100000000")));
+}
+
 #[test]
 fn emergencies_can_be_switched_off_and_are_remembered() {
     let mut master = Master::new();

@@ -211,7 +211,7 @@ impl Calibrate {
     /// Whether nothing is asked for that the joint fit of several wheels does not have.
     fn is_plain(&self) -> bool {
         let is_switched = self.wheelbase || self.steering_ratio || self.mend;
-        let is_given = self.side.is_some() || self.map.is_some() || self.apply.is_some() || self.report.is_some();
+        let is_given = self.side.is_some() || self.map.is_some() || self.report.is_some();
         matches!(self.method, MethodName::Joint | MethodName::Clocks) && !is_switched && !is_given
     }
 
@@ -228,8 +228,8 @@ impl Calibrate {
         let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         if matches!(input.parameters.vehicle, Vehicle::Wheels(_)) || self.method == MethodName::Clocks {
-            ensure!(self.is_plain(), "{}: the fit of any wheels takes no option but --json", log.display());
-            return wheels::run(&input, self.json).with_context(|| log.display().to_string());
+            ensure!(self.is_plain(), "{}: the fit of any wheels takes no option but --apply and --json", log.display());
+            return wheels::run(&input, self.apply.as_deref(), self.json).with_context(|| log.display().to_string());
         }
         let map: Option<Vec<Landmark>> = match &self.map {
             Some(path) => {

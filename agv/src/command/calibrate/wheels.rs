@@ -1,11 +1,19 @@
 //! `agv calibrate` of a vehicle with several wheels.
 
+use std::path::Path;
+
+use agv_core::localizer::Parameters;
 use agv_host_sim::calibrate::log_input::LogInput;
+use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::calibrate::wheeled::clock::Clock;
 use agv_host_sim::calibrate::wheeled::fit::{self, Fitted};
+use agv_host_sim::calibrate::wheeled::fitted_vehicle::{fitted_vehicle, has_setting};
 use agv_host_sim::calibrate::wheeled::log_drive::LogDrive;
 use agv_host_sim::calibrate::wheeled::unknowns::Unknown;
+use anyhow::Context as _;
 use serde::Serialize;
+
+use crate::command::output::note;
 
 #[derive(Serialize)]
 struct Summary {
@@ -15,11 +23,24 @@ struct Summary {
     residual_m: f64,
 }
 
-/// Fits the vehicle of the log and prints what was found.
-pub fn run(input: &LogInput, is_json: bool) -> anyhow::Result<()> {
+/// Fits the vehicle of the log, prints what was found, and writes it to a file if one is given.
+pub fn run(input: &LogInput, apply: Option<&Path>, is_json: bool) -> anyhow::Result<()> {
     let LogDrive { kind, nominal, drive } = LogDrive::new(input)?;
-    let unknowns = Unknown::of(kind, &nominal.wheels, true);
+    let mut unknowns = Unknown::of(kind, &nominal.wheels, true);
+    if apply.is_some() {
+        // What has no setting stays as it is, and the rest is fitted to go with it.
+        let (kept, held): (Vec<_>, Vec<_>) = unknowns.into_iter().partition(has_setting);
+        unknowns = kept;
+        held.iter().for_each(|held| note(&format!("agv: {} has no setting, and is held", held.name)));
+    }
     let found = fit::fit(&[drive], &nominal, &unknowns, true)?;
+    if let Some(path) = apply {
+        let vehicle = fitted_vehicle(&input.parameters.vehicle, &found.model).context("the vehicle has no settings")?;
+        for open in found.fitted.iter().filter(|fitted| fitted.is_open) {
+            note(&format!("agv: the drive does not tell the {}: it stays about as it was", open.name));
+        }
+        VehicleFile::of_vehicle(&Parameters { vehicle, ..input.parameters }).write(path)?;
+    }
     let clock = found.clocks.first().copied().unwrap_or_default();
     if is_json {
         let summary = Summary { method: "joint", fitted: found.fitted, clock, residual_m: found.residual };
@@ -33,5 +54,8 @@ pub fn run(input: &LogInput, is_json: bool) -> anyhow::Result<()> {
     }
     println!("clock of the odometry: {:+.3} s, {:+.3} %", clock.offset_s, 100.0 * clock.rate);
     println!("residual of a window: {:.2} mm", 1e3 * found.residual);
+    if let Some(path) = apply {
+        println!("written: {}", path.display());
+    }
     Ok(())
 }

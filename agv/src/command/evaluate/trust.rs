@@ -88,6 +88,7 @@ Examples:
   agv evaluate trust --sample 100 --seed 7
   agv evaluate trust --only nothing --sound-runs 30 --set odometry.slip=0.003
   agv evaluate trust --vehicle differential --gyro --sweep-runs 1 --runs 2 --sound-runs 10
+  agv evaluate trust --vehicle omni4 --slip 0.001 --set odometry.slip=0.002 --only nothing --sound-runs 15
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
@@ -99,7 +100,7 @@ continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_sh
 [95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
 pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
-and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro.";
+and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro, slip [if --slip].";
 
 impl Trust {
     /// Runs the command.
@@ -184,6 +185,9 @@ impl Trust {
             told["settings"] = self.settings.texts().into();
             told["vehicle"] = serde_json::to_value(self.equipment.vehicle)?;
             told["gyro"] = self.equipment.gyro.into();
+            if let Some(slip) = self.equipment.slip {
+                told["slip"] = slip.into();
+            }
             println!("{}", serde_json::to_string_pretty(&told)?);
         } else {
             print(&figures);

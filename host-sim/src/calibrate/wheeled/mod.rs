@@ -3,6 +3,7 @@
 pub mod clock;
 pub mod drive;
 pub mod fit;
+pub mod fitted_vehicle;
 pub mod log_drive;
 pub mod path;
 pub mod trajectory_error;

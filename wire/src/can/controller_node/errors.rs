@@ -99,6 +99,9 @@ struct State {
     seen: Option<Time>,
     /// Whether the bus was told of it.
     is_told: bool,
+    /// Of which parts there was something, and of which the bus was told: a bit for each.
+    parts: u8,
+    told_parts: u8,
 }
 
 /// What is wrong and what was.
@@ -112,13 +115,18 @@ pub(super) struct Errors {
 
 impl Errors {
     pub(super) const fn new() -> Self {
-        Self { states: [State { seen: None, is_told: false }; KINDS.len()], history: [0; HISTORY], remembered: 0 }
+        Self {
+            states: [State { seen: None, is_told: false, parts: 0, told_parts: 0 }; KINDS.len()],
+            history: [0; HISTORY],
+            remembered: 0,
+        }
     }
 
-    /// There is such an error at `now`.
-    pub(super) fn report(&mut self, kind: ErrorKind, now: Time) {
+    /// There is such an error at `now`, of the parts whose bits are set.
+    pub(super) fn report(&mut self, kind: ErrorKind, parts: u8, now: Time) {
         if let Some((_, state)) = KINDS.iter().zip(&mut self.states).find(|(known, _)| **known == kind) {
             state.seen = Some(now);
+            state.parts |= parts;
         }
     }
 
@@ -126,24 +134,28 @@ impl Errors {
     pub(super) fn poll(&mut self, now: Time) -> Option<Emergency> {
         for (kind, state) in KINDS.iter().zip(&mut self.states) {
             if !kind.is_lasting() && state.is_told && state.seen.is_some_and(|seen| now.since(seen) >= HOLD) {
-                state.seen = None;
+                (state.seen, state.parts) = (None, 0);
             }
         }
-        let is_due = |(_, state): &(&ErrorKind, &mut State)| state.seen.is_some() != state.is_told;
+        let is_due = |(_, state): &(&ErrorKind, &mut State)| {
+            state.seen.is_some() != state.is_told || state.parts != state.told_parts
+        };
         let (kind, state) = KINDS.iter().zip(&mut self.states).find(is_due)?;
         state.is_told = state.seen.is_some();
-        let (is_there, code) = (state.is_told, kind.code());
+        state.told_parts = state.parts;
+        let (is_there, code, parts) = (state.is_told, kind.code(), state.parts);
         let register = self.register();
         if is_there {
-            self.remember(code);
-            return Some(Emergency { code, register, details: [0; 5] });
+            self.remember(code, parts);
+            return Some(Emergency { code, register, details: [parts, 0, 0, 0, 0] });
         }
         let [low, high] = code.to_le_bytes();
         Some(Emergency { code: 0, register, details: [low, high, 0, 0, 0] })
     }
 
-    fn remember(&mut self, code: u16) {
-        let mut carried = u32::from(code);
+    /// The upper half of an entry is the additional information of CiA 301: the parts.
+    fn remember(&mut self, code: u16, parts: u8) {
+        let mut carried = u32::from(code) | u32::from(parts) << 16;
         for place in &mut self.history {
             carried = core::mem::replace(place, carried);
         }

@@ -143,7 +143,12 @@ impl ControllerNode {
 
     /// There is something wrong at `now`. What lasts is to be said again at least every [`HOLD`] seconds.
     pub fn report(&mut self, kind: ErrorKind, now: Time) {
-        self.objects.errors.report(kind, now);
+        self.report_of(kind, 0, now);
+    }
+
+    /// The same, of those of several parts whose bits are set.
+    pub fn report_of(&mut self, kind: ErrorKind, parts: u8, now: Time) {
+        self.objects.errors.report(kind, parts, now);
     }
 
     /// Nodes whose heartbeats are watched.
