@@ -2,6 +2,7 @@
 
 mod calibration;
 mod carpark;
+mod cloud_drive;
 mod contour_map;
 mod falko;
 mod features;
@@ -50,6 +51,7 @@ pub struct Evaluate {
 enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
+    CloudDrive(cloud_drive::CloudDrive),
     ContourMap(contour_map::ContourMap),
     Falko(falko::Falko),
     HaltingPoints(halting_points::HaltingPoints),
@@ -73,6 +75,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
+            Experiment::CloudDrive(experiment) => experiment.run(),
             Experiment::ContourMap(experiment) => experiment.run(),
             Experiment::Falko(experiment) => experiment.run(),
             Experiment::HaltingPoints(experiment) => experiment.run(),
