@@ -15,6 +15,10 @@ const RINGS: usize = 16;
 /// Lowest height above the floor and farthest distance that count, m.
 const LOWEST: f64 = 0.3;
 const FARTHEST: f64 = 40.0;
+/// How far a surface may be off at the beginning of an alignment, m: the speed changes little from turn to turn.
+const GATE: f64 = 0.2;
+/// What changes faster is a wrong alignment, m/s^2 and rad/s^2.
+const SUDDEN: (f64, f64) = (4.0, 6.0);
 /// After a gap of so many seconds the sensor is taken to stand.
 const LONGEST: f64 = 0.5;
 
@@ -42,16 +46,23 @@ impl CloudSpeed {
                 return Some(Speed::default());
             }
             let Speed { x, y, turn } = self.speed;
-            let moved = target.align(&points, &Pose::new(x * passed, y * passed, turn * passed))?.pose;
+            let moved = target.align(&points, &Pose::new(x * passed, y * passed, turn * passed), GATE)?.pose;
             let (sin, cos) = libm::sincos(-0.5 * moved.theta);
             // At constant speed the chord lies at half of the turn.
-            Some(Speed {
+            let found = Speed {
                 x: (moved.x * cos - moved.y * sin) / passed,
                 y: (moved.x * sin + moved.y * cos) / passed,
                 turn: moved.theta / passed,
-            })
+            };
+            let is_sudden = libm::hypot(found.x - x, found.y - y) > SUDDEN.0 * passed.max(0.1)
+                || (found.turn - turn).abs() > SUDDEN.1 * passed.max(0.1);
+            (!is_sudden).then_some(found)
         });
-        self.speed = found.unwrap_or(self.speed);
+        // A wrong speed distorts the surfaces, and the next one is then wrong the other way round: the mean of both is right.
+        if let Some(found) = found {
+            let Speed { x, y, turn } = self.speed;
+            self.speed = Speed { x: 0.5 * (x + found.x), y: 0.5 * (y + found.y), turn: 0.5 * (turn + found.turn) };
+        }
         self.last = Target::new(points).map(|target| (revolution.start, target));
         self.speed
     }

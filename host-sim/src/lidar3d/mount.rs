@@ -21,6 +21,8 @@ const KEPT: usize = 400;
 const RINGS: usize = 16;
 /// Points that are aligned, about.
 const POINTS: usize = 6000;
+/// How far a surface may be off at the beginning of an alignment, m.
+const GATE: f64 = 0.5;
 /// Heights above the floor that count, m: below is what the floor's roughness reaches.
 const LOWEST: f64 = 0.2;
 /// Farthest points that count, m.
@@ -133,7 +135,7 @@ impl<'a> MountFinder<'a> {
         let motion = |(keys, points): (&[Key], &[Vec<WallPoint>])| {
             let way = keys[0].pose.between(&keys[1].pose);
             let start = mount.between(&way.compose(mount));
-            let seen = Target::new(points[0].clone())?.align(&points[1], &start)?;
+            let seen = Target::new(points[0].clone())?.align(&points[1], &start, GATE)?;
             Some(motion(&seen.pose, &way))
         };
         pairs.filter_map(motion).collect()
@@ -150,7 +152,7 @@ impl<'a> MountFinder<'a> {
                 let (sin, cos) = libm::sincos(TAU * f64::from(number) / f64::from(DIRECTIONS));
                 Pose::new(length * cos, length * sin, way.theta)
             };
-            let ends = (0..DIRECTIONS).filter_map(|number| target.align(&points[1], &start(number)));
+            let ends = (0..DIRECTIONS).filter_map(|number| target.align(&points[1], &start(number), GATE));
             Some(motion(&ends.max_by_key(|end| end.agreeing)?.pose, &way))
         };
         pairs.filter_map(motion).collect()

@@ -11,9 +11,9 @@ const HEIGHT_SHARE: f64 = 0.5;
 /// Points are compared with the nearest one up to this distance, m, if both face alike by this cosine.
 const REACH: f64 = 1.0;
 const ALIKE: f64 = 0.94;
-/// How far from its line a point counts: so many robust deviations, and between these bounds, m.
+/// How far from its line a point counts: so many robust deviations, and at least this, m.
 const DEVIATIONS: f64 = 3.5 * 1.4826;
-const BOUNDS: (f64, f64) = (1e-4, 0.5);
+const NARROWEST: f64 = 1e-4;
 /// A point lies on its surface if it is this near, m.
 const AGREEING: f64 = 0.05;
 /// Steps at the most, and when there is nothing to gain any more, m and rad.
@@ -48,11 +48,12 @@ impl Target {
         (points.len() >= LEAST_POINTS).then_some(Self { points, tree })
     }
 
-    /// The pose of the sensor of other points in this revolution, near to `start`. None if the surfaces do not tell.
+    /// The pose of the sensor of other points in this revolution, near to `start`: points count that lie at most `gate` from their
+    /// surface there, m. None if the surfaces do not tell.
     #[must_use]
-    pub fn align(&self, others: &[WallPoint], start: &Pose) -> Option<Aligned> {
+    pub fn align(&self, others: &[WallPoint], start: &Pose, gate: f64) -> Option<Aligned> {
         let mut pose = *start;
-        let mut gate = BOUNDS.1;
+        let mut gate = gate;
         for _ in 0..STEPS {
             let mut pairs = self.pairs(others, &pose);
             pairs.retain(|(_, residual)| residual.abs() <= gate);
@@ -64,7 +65,7 @@ impl Target {
             let mut residuals: Vec<f64> = pairs.iter().map(|(_, residual)| residual.abs()).collect();
             let middle = residuals.len() / 2;
             let median = *residuals.select_nth_unstable_by(middle, f64::total_cmp).1;
-            let next = (DEVIATIONS * median).clamp(BOUNDS.0, gate);
+            let next = (DEVIATIONS * median).clamp(NARROWEST, gate);
             if step.amax() < SMALL && next > 0.99 * gate {
                 break;
             }

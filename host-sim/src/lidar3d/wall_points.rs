@@ -3,13 +3,13 @@
 use nalgebra::{Point2, Vector2};
 
 /// Neighbours on the ring up to this distance are of the same surface, m, and so many of them on each side at the most.
-const REACH: f64 = 0.3;
+const REACH: f64 = 0.4;
 const NEIGHBOURS: usize = 16;
 /// A surface has at least so many points, and reaches this far along itself, m.
 const LEAST_POINTS: usize = 5;
 const LEAST_LENGTH: f64 = 0.12;
 /// The scatter across a surface is at most this share of that along it.
-const FLAT: f64 = 0.2;
+const FLAT: f64 = 0.25;
 /// Surfaces whose scatter is more than so many times the median are edges.
 const EDGE: f64 = 2.5;
 

@@ -1,6 +1,7 @@
 //! `agv lidar3d`.
 
 mod arguments;
+mod bridge;
 mod calibrate;
 mod convert;
 mod decode;
@@ -25,6 +26,7 @@ enum Action {
     Convert(convert::Convert),
     Calibrate(calibrate::Calibrate),
     Mount(mount::Mount),
+    Bridge(bridge::Bridge),
     Places(places::Places),
     View(view::View),
 }
@@ -38,6 +40,7 @@ impl Lidar3d {
             Action::Convert(command) => command.run(),
             Action::Calibrate(command) => command.run(),
             Action::Mount(command) => command.run(),
+            Action::Bridge(command) => command.run(),
             Action::Places(command) => command.run(),
             Action::View(command) => command.run(),
         }
