@@ -1,5 +1,10 @@
 //! Multi-beam lidars: where their packets come from, and whole revolutions of points.
 
+#[cfg(all(feature = "bags", feature = "point-clouds"))]
+pub mod bag_clouds;
+#[cfg(not(all(feature = "bags", feature = "point-clouds")))]
+#[path = "no_bag_clouds.rs"]
+pub mod bag_clouds;
 pub mod capture;
 pub mod cloud_speed;
 pub mod clouds;

@@ -216,14 +216,14 @@ fn ring_beams(ring: &[Seen], beams: &mut [Vec<Candidate>]) {
     }
 }
 
-/// Range, m, 0 for none, and intensity of a beam: those of the ring that is nearest to the level of the sensor, averaged with those that see
-/// the same surface there.
+/// Range, m, 0 for none, and intensity of a beam: the nearest surface near the level of the sensor, averaged over the rings that see it. What
+/// lies between two rings changes with the distance; the nearest surface stays.
 fn combined(candidates: &[Candidate]) -> (f32, u16) {
-    let Some(best) = candidates.iter().min_by(|a, b| a.level.abs().total_cmp(&b.level.abs())) else { return (0.0, 0) };
-    let limit = NEAR_LEVEL.max(best.level.abs());
-    let is_same = |other: &&Candidate| {
-        other.level.abs() <= limit && (other.range - best.range).abs() < SAME_SURFACE
-    };
-    let (sum, count) = candidates.iter().filter(is_same).fold((0.0, 0.0), |(sum, count), other| (sum + other.range, count + 1.0));
+    let level = candidates.iter().map(|candidate| candidate.level.abs()).fold(f64::INFINITY, f64::min);
+    let limit = NEAR_LEVEL.max(level);
+    let near = || candidates.iter().filter(|candidate| candidate.level.abs() <= limit);
+    let Some(best) = near().min_by(|a, b| a.range.total_cmp(&b.range)) else { return (0.0, 0) };
+    let same = near().filter(|other| other.range - best.range < SAME_SURFACE);
+    let (sum, count) = same.fold((0.0, 0.0), |(sum, count), other| (sum + other.range, count + 1.0));
     ((sum / count) as f32, best.intensity)
 }
