@@ -1,6 +1,7 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod eds;
+mod lidar3d_bridge;
 mod lidar3d_mount;
 mod log;
 mod motion;

@@ -1,7 +1,7 @@
 //! Where a multi-beam lidar is on its vehicle, found in halls that are cast ray by ray.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::FRAC_PI_2;
 
 use agv_core::geometry::{Pose, difference};
 use agv_host_sim::lidar3d::mount::{Mount, MountFinder};
@@ -111,4 +111,53 @@ fn a_straight_drive_leaves_the_place_open() {
     println!("{drive:?}");
     assert!(drive.x.is_none() && drive.y.is_none());
     assert!(difference(drive.yaw.unwrap().value, 0.6).abs() < 0.01 && drive.scale.is_some());
+}
+
+/// `AGV_MOUNT_SEEDS=50` makes the whole table.
+#[test]
+fn the_spread_is_what_is_stated() {
+    let seeds = std::env::var("AGV_MOUNT_SEEDS").ok().map_or(12, |seeds| seeds.parse().unwrap());
+    let mut errors: [Vec<(f64, f64)>; 7] = std::array::from_fn(|_| Vec::new());
+    let names = ["height, mm", "roll, deg", "pitch, deg", "yaw, deg", "x, mm", "y, mm", "scale, %"];
+    let units =
+        [1e3, 180.0 / std::f64::consts::PI, 180.0 / std::f64::consts::PI, 180.0 / std::f64::consts::PI, 1e3, 1e3, 1e2];
+    for seed in 100_000..100_000 + seeds {
+        let (storeys, truth) = drive(BEFORE_RACKS, bends(), seed);
+        let mut random = Random::new(seed, Stream::Odometry);
+        let odometry = odometry(&truth, 0.003, 0.001, &mut random);
+        let mount = found(&sensor(0.03), &storeys, &truth, &odometry, Some(2.0), seed);
+        let (attitude, drive) = (mount.attitude.unwrap(), mount.drive.unwrap());
+        let by_floor = [attitude.height - 1.9, attitude.roll - 0.02, attitude.pitch + 0.03];
+        let known = [drive.yaw, drive.x, drive.y, drive.scale].map(Option::unwrap);
+        for (at, (error, deviation)) in by_floor.into_iter().zip(attitude.deviations).enumerate() {
+            errors[at].push((error, deviation));
+        }
+        for (at, (known, truth)) in known.into_iter().zip([0.6, 0.8, -0.25, 1.0]).enumerate() {
+            errors[3 + at].push((known.value - truth, known.deviation));
+        }
+    }
+    let root = |values: &[(f64, f64)], value: fn(&(f64, f64)) -> f64| {
+        (values.iter().map(|pair| value(pair).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+    };
+    let mut wrong = Vec::new();
+    for ((name, unit), errors) in names.iter().zip(units).zip(&errors) {
+        let (spread, stated) = (root(errors, |pair| pair.0), root(errors, |pair| pair.1));
+        let worst = errors.iter().map(|pair| pair.0.abs()).fold(0.0, f64::max);
+        println!("{name}: spread {:.4}, stated {:.4}, worst {:.4}", unit * spread, unit * stated, unit * worst);
+        if !(0.5..2.0).contains(&(spread / stated)) {
+            wrong.push(name);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn the_height_in_an_aisle_is_that_of_the_floor() {
+    let aisle = PoseOptions { x: 20.0, y: 12.0, heading_deg: 0.0 };
+    let (storeys, truth) = drive(aisle, vec![PathSegment::straight(6.0)], 3);
+    for height in [None, Some(1.8)] {
+        let mount = found(&sensor(0.02), &storeys, &truth, &truth, height, 3);
+        let attitude = mount.attitude.unwrap();
+        assert!((attitude.height - 1.9).abs() < 0.01, "{height:?} {attitude:?}");
+    }
 }

@@ -35,7 +35,11 @@ pub fn topic(path: &Path, stated: Option<&str>) -> Result<(String, usize), Strin
     .map_err(|error| error.to_string())?;
     match topics.as_slice() {
         [one] => Ok(one.clone()),
-        [] => Err(format!("{}: it holds no {KIND}{}", path.display(), stated.map_or(String::new(), |t| format!(" on {t}")))),
+        [] => Err(format!(
+            "{}: it holds no {KIND}{}",
+            path.display(),
+            stated.map_or(String::new(), |t| format!(" on {t}"))
+        )),
         several => {
             let names: BTreeSet<&str> = several.iter().map(|(topic, _)| topic.as_str()).collect();
             let names = names.into_iter().collect::<Vec<_>>().join(", ");

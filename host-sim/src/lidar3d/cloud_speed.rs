@@ -17,8 +17,13 @@ const LOWEST: f64 = 0.3;
 const FARTHEST: f64 = 40.0;
 /// How far a surface may be off at the beginning of an alignment, m: the speed changes little from turn to turn.
 const GATE: f64 = 0.2;
+/// Share of the points that must agree before other turns are tried, and these, rad.
+const AGREEING: f64 = 0.7;
+const TURNS: [f64; 6] = [-0.06, -0.04, -0.02, 0.02, 0.04, 0.06];
 /// What changes faster is a wrong alignment, m/s^2 and rad/s^2.
 const SUDDEN: (f64, f64) = (4.0, 6.0);
+/// So many in a row are right: the sensor was switched on while it moved.
+const PATIENCE: u32 = 3;
 /// After a gap of so many seconds the sensor is taken to stand.
 const LONGEST: f64 = 0.5;
 
@@ -28,13 +33,15 @@ pub struct CloudSpeed {
     height: f64,
     last: Option<(Time, Target)>,
     speed: Speed,
+    /// Sudden speeds in a row.
+    sudden: u32,
 }
 
 impl CloudSpeed {
     /// Of a sensor that stands.
     #[must_use]
     pub fn new(levelling: Rotation3<f64>, height: f64) -> Self {
-        Self { levelling, height, last: None, speed: Speed::default() }
+        Self { levelling, height, last: None, speed: Speed::default(), sudden: 0 }
     }
 
     /// The speed in a revolution; that of the one before if its surfaces do not tell.
@@ -46,7 +53,7 @@ impl CloudSpeed {
                 return Some(Speed::default());
             }
             let Speed { x, y, turn } = self.speed;
-            let moved = target.align(&points, &Pose::new(x * passed, y * passed, turn * passed), GATE)?.pose;
+            let moved = aligned(target, &points, &Pose::new(x * passed, y * passed, turn * passed))?;
             let (sin, cos) = libm::sincos(-0.5 * moved.theta);
             // At constant speed the chord lies at half of the turn.
             let found = Speed {
@@ -56,7 +63,8 @@ impl CloudSpeed {
             };
             let is_sudden = libm::hypot(found.x - x, found.y - y) > SUDDEN.0 * passed.max(0.1)
                 || (found.turn - turn).abs() > SUDDEN.1 * passed.max(0.1);
-            (!is_sudden).then_some(found)
+            self.sudden = if is_sudden { self.sudden + 1 } else { 0 };
+            (!is_sudden || self.sudden > PATIENCE).then_some(found)
         });
         // A wrong speed distorts the surfaces, and the next one is then wrong the other way round: the mean of both is right.
         if let Some(found) = found {
@@ -82,4 +90,16 @@ impl CloudSpeed {
         let least = LOWEST - self.height;
         wall_points(&levelled, POINTS, |[x, y, z]| *z > least && libm::hypot(*x, *y) < FARTHEST)
     }
+}
+
+/// Near to a start; where few points agree, as at the beginning of a bend, the turn is searched for.
+fn aligned(target: &Target, points: &[WallPoint], start: &Pose) -> Option<Pose> {
+    let align = |turn: f64| target.align(points, &Pose::new(start.x, start.y, start.theta + turn), GATE);
+    let first = align(0.0);
+    let enough = (AGREEING * points.len() as f64) as usize;
+    if let Some(found) = first.filter(|found| found.agreeing >= enough) {
+        return Some(found.pose);
+    }
+    let others = TURNS.into_iter().filter_map(align);
+    first.into_iter().chain(others).max_by_key(|found| found.agreeing).map(|found| found.pose)
 }

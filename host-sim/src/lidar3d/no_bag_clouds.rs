@@ -25,10 +25,6 @@ pub fn topic(path: &Path, _: Option<&str>) -> Result<(String, usize), String> {
 ///
 /// # Errors
 /// Always.
-pub fn for_each(
-    path: &Path,
-    _: &str,
-    _: impl FnMut(Revolution, Vec<Laser>) -> ControlFlow<()>,
-) -> Result<(), String> {
+pub fn for_each(path: &Path, _: &str, _: impl FnMut(Revolution, Vec<Laser>) -> ControlFlow<()>) -> Result<(), String> {
     Err(left_out(path))
 }

@@ -132,10 +132,8 @@ impl Projection {
         for _ in 0..2 {
             let later = self.beam_time(bearing) - measured;
             let (half_sin, half_cos) = libm::sincos(0.5 * speed.turn * later);
-            let way = [
-                later * (speed.x * half_cos - speed.y * half_sin),
-                later * (speed.x * half_sin + speed.y * half_cos),
-            ];
+            let way =
+                [later * (speed.x * half_cos - speed.y * half_sin), later * (speed.x * half_sin + speed.y * half_cos)];
             let (sin, cos) = libm::sincos(speed.turn * later);
             let [a, b] = [x - way[0], y - way[1]];
             position = [a * cos + b * sin, b * cos - a * sin];
@@ -186,9 +184,11 @@ fn apart(one: &Seen, other: &Seen) -> f64 {
 fn ring_beams(ring: &[Seen], beams: &mut [Vec<Candidate>]) {
     let step = TAU / BEAMS as f64;
     for (one, other) in ring.iter().zip(ring.iter().skip(1)) {
-        let (low, high) = if agv_core::geometry::difference(other.bearing, one.bearing) > 0.0 { (one, other) } else { (other, one) };
+        let (low, high) =
+            if agv_core::geometry::difference(other.bearing, one.bearing) > 0.0 { (one, other) } else { (other, one) };
         let width = agv_core::geometry::difference(high.bearing, low.bearing);
-        if width > GAP {
+        // Behind the sensor, a turn lies between the two.
+        if width > GAP || (one.bearing - other.bearing).abs() > PI {
             continue;
         }
         let first = libm::ceil((low.bearing + PI) / step);

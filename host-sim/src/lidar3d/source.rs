@@ -107,7 +107,9 @@ impl Source {
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Capture(path) | Self::Images(path) | Self::Clouds(path, _) | Self::Bag(path, _) => path.display().to_string(),
+            Self::Capture(path) | Self::Images(path) | Self::Clouds(path, _) | Self::Bag(path, _) => {
+                path.display().to_string()
+            }
             Self::Live(port) => format!("UDP port {port}"),
         }
     }

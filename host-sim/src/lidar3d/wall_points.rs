@@ -69,6 +69,5 @@ fn surface(ring: &[[f64; 3]], index: usize) -> Option<(WallPoint, f64)> {
     // A deviation of length / sqrt(12) is that of an even spread.
     let is_surface = along * 12.0_f64.sqrt() > LEAST_LENGTH && across < FLAT * along;
     let onto = normal * normal.dot(&mean);
-    is_surface
-        .then(|| (WallPoint { position: Point2::new(x + onto.x, y + onto.y), height, normal }, across))
+    is_surface.then(|| (WallPoint { position: Point2::new(x + onto.x, y + onto.y), height, normal }, across))
 }

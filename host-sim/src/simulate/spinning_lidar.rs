@@ -107,7 +107,8 @@ impl SpinningLidar {
                     leaning.z,
                 ];
                 let noise = self.noise * random.normal();
-                let Some(hit) = storeys.first_hit([sensor.x, sensor.y, self.height], direction, self.distances[1]) else {
+                let Some(hit) = storeys.first_hit([sensor.x, sensor.y, self.height], direction, self.distances[1])
+                else {
                     continue;
                 };
                 let distance = hit.distance + noise;

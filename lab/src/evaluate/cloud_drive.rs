@@ -145,9 +145,7 @@ fn summary(site: Site, sensor: SensorKind, runs: &[Run]) -> CloudDrives {
     let errors: Vec<(f64, f64)> = runs.iter().flat_map(|run| run.errors.iter().copied()).collect();
     let longest = runs.iter().map(|run| run.errors.len()).max().unwrap_or(0);
     let missing: usize = runs.iter().filter(|run| run.errors.is_empty()).map(|_| longest).sum();
-    let share = |run: &Run| {
-        run.errors.iter().filter(is_good).count() as f64 / run.errors.len().max(1) as f64
-    };
+    let share = |run: &Run| run.errors.iter().filter(is_good).count() as f64 / run.errors.len().max(1) as f64;
     let worst_drive = runs.iter().min_by(|a, b| share(a).total_cmp(&share(b)));
     let largest = |run: &Run| run.errors.iter().map(|error| error.0).fold(0.0, f64::max);
     let worst = runs.iter().max_by(|a, b| largest(a).total_cmp(&largest(b)));
@@ -235,12 +233,12 @@ fn scenario(site: Site, is_mapping: bool, vehicle: &Vehicle, seed: u64) -> Scena
         scenario.seed ^= MAPPING_SEED_BIT;
     }
     scenario.world = match site {
-        Site::Hall => {
-            WorldOptions::WarehouseHall(WarehouseHall { seed: Some(seed), reflectors: false, ..WarehouseHall::default() })
-        }
-        Site::BlockStorage => {
-            WorldOptions::BlockStorage(BlockStorage { seed: Some(seed), ..BlockStorage::default() })
-        }
+        Site::Hall => WorldOptions::WarehouseHall(WarehouseHall {
+            seed: Some(seed),
+            reflectors: false,
+            ..WarehouseHall::default()
+        }),
+        Site::BlockStorage => WorldOptions::BlockStorage(BlockStorage { seed: Some(seed), ..BlockStorage::default() }),
     };
     scenario.path.kind = match (site, is_mapping) {
         (Site::Hall, _) => PathKind::HallLoop,
@@ -301,7 +299,8 @@ fn run(site: Site, sensor: SensorKind, seconds: Option<f64>, seed: u64) -> Resul
         if first.is_none() {
             let points = vehicle.cloud(revolution);
             let search = PlaceSearch::new(&places);
-            let found = search.zip(Cloud::new(&points, vehicle.order.rings())).and_then(|(search, cloud)| search.find(&cloud));
+            let found =
+                search.zip(Cloud::new(&points, vehicle.order.rings())).and_then(|(search, cloud)| search.find(&cloud));
             first = Some(found.filter(|found| found.is_believed && !found.is_ambiguous));
         }
     });

@@ -35,6 +35,9 @@ pub struct FloorStand {
     pub pitch: f64,
     /// Standard deviations of the three by the residuals of the plane, m and rad.
     pub deviations: [f64; 3],
+    /// By how much the three differ from those of a plane through twice as wide a band: what stands on the floor draws a plane upwards, in a
+    /// wide band more than in a narrow one. m and rad.
+    pub contradictions: [f64; 3],
     /// Standard deviation of a point from the plane, m.
     pub residual: f64,
     /// Points of floor.
@@ -66,9 +69,16 @@ impl FloorStand {
                 break;
             }
         }
+        let wide = fit.stand();
+        // What remains of the points is cut off evenly on both sides: the plane stays, and less of what stands on it counts.
+        let narrow = (0.5 * band).max(NARROWEST);
+        let plane = fit.plane;
+        fit = Fit { residual: fit.residual, ..Fit::of(&points, &plane, narrow)? };
         let is_steep = fit.plane.xy().amax() > STEEPEST;
         let is_other = stated.is_some_and(|stated| (stated + fit.plane.z).abs() > NEAR_STATED);
-        (!is_steep && !is_other).then(|| fit.stand())
+        let stand = fit.stand();
+        let contradictions = [wide.height - stand.height, wide.roll - stand.roll, wide.pitch - stand.pitch];
+        (!is_steep && !is_other).then_some(Self { contradictions, ..stand })
     }
 
     /// The rotation that makes points of the sensor level: a roll, then a pitch.
@@ -131,6 +141,7 @@ impl Fit {
             roll,
             pitch,
             deviations: covariance.diagonal().map(f64::sqrt).into(),
+            contradictions: [0.0; 3],
             residual: self.residual,
             points: self.points,
         }
@@ -156,7 +167,7 @@ pub struct Attitude {
 const SPREAD_SCANS: usize = 8;
 
 /// The mean of several scans. The deviations are those of the mean by the spread from scan to scan, which shows an uneven floor and a
-/// swaying vehicle, and never less than those by the residuals. None without scans.
+/// swaying vehicle, never less than those by the residuals, and with what a wider band contradicts. None without scans.
 #[must_use]
 pub fn attitude(stands: &[FloorStand]) -> Option<Attitude> {
     let count = stands.len() as f64;
@@ -167,7 +178,9 @@ pub fn attitude(stands: &[FloorStand]) -> Option<Attitude> {
     };
     let stated = squares(&|stand| Vector3::from(stand.deviations)).map(f64::sqrt) / count;
     let spread = squares(&|stand| values(stand) - mean).map(|sum| (sum / (count - 1.0).max(1.0) / count).sqrt());
-    let deviations = if stands.len() < SPREAD_SCANS { stated } else { spread.sup(&stated) };
+    let random = if stands.len() < SPREAD_SCANS { stated } else { spread.sup(&stated) };
+    let contradicted = stands.iter().map(|stand| Vector3::from(stand.contradictions)).sum::<Vector3<f64>>() / count;
+    let deviations = random.zip_map(&contradicted, f64::hypot);
     let [height, roll, pitch] = mean.into();
     (!stands.is_empty()).then(|| Attitude { height, roll, pitch, deviations: deviations.into(), scans: stands.len() })
 }

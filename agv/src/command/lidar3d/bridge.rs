@@ -182,7 +182,11 @@ impl FirstPlace {
             .filter(|found| found.is_believed && !found.is_ambiguous);
         if let Some(found) = found {
             let [x, y, heading] = found.pose;
-            note(&format!("the sensor is at {x:.2} {y:.2} m, {:.1} deg; agreement {:.2}", heading.to_degrees(), found.score));
+            note(&format!(
+                "the sensor is at {x:.2} {y:.2} m, {:.1} deg; agreement {:.2}",
+                heading.to_degrees(),
+                found.score
+            ));
             self.map = None;
         }
     }

@@ -119,7 +119,11 @@ impl Drive {
             turn.pose = truth.map(|truth| truth.pose.compose(recording.parameters.lasers.first()));
         }
         let layout = layout_file::layout(&recording.landmarks);
-        if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, first: 0, is_live: false, begin, layout, frame }) }
+        if turns.is_empty() {
+            Err(DriveError::Empty)
+        } else {
+            Ok(Self { turns, first: 0, is_live: false, begin, layout, frame })
+        }
     }
 
     /// A drive that goes on: nothing is seen yet, and the times of what will be are those since the start of the sensor.

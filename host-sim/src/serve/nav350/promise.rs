@@ -116,7 +116,8 @@ impl Sensor {
     pub(super) fn keep(&self, promise: &Promise) -> Vec<u8> {
         let Promise { dialect, method, .. } = *promise;
         let turn = self.drive.place(promise.turn);
-        let start = if self.drive.is_live { self.drive.turns[turn].start.since(Time::default()) } else { promise.start };
+        let start =
+            if self.drive.is_live { self.drive.turns[turn].start.since(Time::default()) } else { promise.start };
         if matches!(method, PromisedMethod::Mapping) {
             let reflectors = self.mapped(turn, start);
             let list = ReflectorList { filter: 0, reflectors: Sequence::Values(&reflectors) };
