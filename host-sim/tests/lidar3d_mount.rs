@@ -5,11 +5,11 @@ use std::f64::consts::FRAC_PI_2;
 
 use agv_core::geometry::{Pose, difference};
 use agv_host_sim::lidar3d::mount::{Mount, MountFinder};
+use agv_host_sim::lidar3d::spinning_lidar::SpinningLidar;
 use agv_host_sim::recording::Truth;
 use agv_host_sim::simulate::path::{Direction, Leg, Path, PathSegment};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{PathKind, PoseOptions, Scenario};
-use agv_host_sim::simulate::spinning_lidar::SpinningLidar;
 use agv_host_sim::simulate::storeys::Storeys;
 use agv_host_sim::simulate::{START, simulate};
 use agv_lidar3d::cloud::RingOrder;

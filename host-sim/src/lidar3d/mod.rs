@@ -22,6 +22,7 @@ pub mod setup;
 mod setup_options;
 pub mod signatures;
 pub mod source;
+pub mod spinning_lidar;
 pub mod stand;
 pub mod survey;
 pub mod view;

@@ -16,7 +16,6 @@ pub mod reflector_detector;
 pub mod scenario;
 pub mod shape;
 pub mod speed_profile;
-pub mod spinning_lidar;
 pub mod standard;
 pub mod storeys;
 pub mod vehicle;

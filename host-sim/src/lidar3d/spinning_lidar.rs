@@ -1,4 +1,4 @@
-//! A multi-beam lidar that turns on a vehicle.
+//! A multi-beam lidar that turns on a simulated vehicle.
 
 use std::f64::consts::TAU;
 
@@ -8,11 +8,11 @@ use agv_lidar3d::calibration::Laser;
 use agv_lidar3d::packet::{Point, ReturnKind};
 use nalgebra::{Rotation3, Vector3};
 
-use super::random::Random;
-use super::raycast::Surface;
-use super::storeys::Storeys;
-use crate::lidar3d::Revolution;
+use super::revolution::Revolution;
 use crate::recording::{Truth, truth_at};
+use crate::simulate::random::Random;
+use crate::simulate::raycast::Surface;
+use crate::simulate::storeys::Storeys;
 
 /// Strength of the returns of foil and of everything else, by a maker's scale on which retroreflectors begin above 100 (VLP-16 user manual,
 /// chapter 6.1).
