@@ -4,6 +4,8 @@ mod eds;
 mod fitted_vehicle;
 mod gyro;
 mod lent_map;
+mod lidar3d_bridge;
+mod lidar3d_mount;
 mod log;
 mod motion;
 mod output_file;

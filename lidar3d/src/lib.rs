@@ -15,5 +15,7 @@ pub mod geometry;
 #[cfg(feature = "std")]
 pub mod intrinsic;
 mod laser;
+#[cfg(feature = "std")]
+pub mod mount;
 pub mod packet;
 pub mod place;

@@ -73,6 +73,7 @@ const HOUSES: [House; 8] = [
             &["calibration"],
             &["cloud", "cloud_file", "intrinsic"],
             &["place"],
+            &["mount"],
         ],
     },
     House {

@@ -1,21 +1,32 @@
 //! Multi-beam lidars: where their packets come from, and whole revolutions of points.
 
+#[cfg(all(feature = "bags", feature = "point-clouds"))]
+pub mod bag_clouds;
+#[cfg(not(all(feature = "bags", feature = "point-clouds")))]
+#[path = "no_bag_clouds.rs"]
+pub mod bag_clouds;
 pub mod capture;
+pub mod cloud_speed;
 pub mod clouds;
 pub mod decoder;
 pub mod kind;
 pub mod live;
+pub mod mount;
 pub mod place_map;
 pub mod place_search;
+pub mod projection;
 pub mod refinement;
 pub mod revolution;
+pub mod scan_motion;
 pub mod setup;
 mod setup_options;
 pub mod signatures;
 pub mod source;
+pub mod spinning_lidar;
 pub mod stand;
 pub mod survey;
 pub mod view;
+pub mod wall_points;
 
 pub use revolution::{Revolution, Revolutions};
 pub use setup::Setup;

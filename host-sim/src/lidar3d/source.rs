@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use agv_core::measurement::Time;
 use agv_lidar3d::packet::{PORT, Packet, STATUS_CYCLE, Sensor, Tally, ouster};
 
+use super::bag_clouds;
 use super::capture::{self, CaptureError};
 use super::clouds;
 use super::kind::{Datagram, Kind};
@@ -75,11 +76,14 @@ pub enum Source {
     Images(PathBuf),
     /// Point clouds, a scan each.
     Clouds(PathBuf, Vec<PathBuf>),
+    /// Clouds in a recording of ROS 2, and their topic if it was named.
+    Bag(PathBuf, Option<String>),
 }
 
 impl Source {
     /// `udp` or `udp:PORT` is the network, a folder holds range images or point clouds, a name that ends in .pcd, .bin,
-    /// .ply or .las is a point cloud, and any other is a capture.
+    /// .ply or .las is a point cloud, one that ends in .mcap or .db3 and a folder of rosbag2 is a recording of ROS 2, behind which
+    /// `#TOPIC` may stand, and any other is a capture.
     ///
     /// # Errors
     /// If the port is no number.
@@ -89,6 +93,7 @@ impl Source {
             Some(rest) if rest.starts_with(':') => {
                 rest[1..].parse().map(Self::Live).map_err(|_| format!("'{}' is no port", &rest[1..]))
             }
+            _ if bag(text).is_some() => bag(text).ok_or_else(String::new),
             _ if Path::new(text).is_dir() => {
                 let found = clouds::in_folder(Path::new(text));
                 if found.is_empty() { Ok(Self::Images(text.into())) } else { Ok(Self::Clouds(text.into(), found)) }
@@ -102,7 +107,9 @@ impl Source {
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Capture(path) | Self::Images(path) | Self::Clouds(path, _) => path.display().to_string(),
+            Self::Capture(path) | Self::Images(path) | Self::Clouds(path, _) | Self::Bag(path, _) => {
+                path.display().to_string()
+            }
             Self::Live(port) => format!("UDP port {port}"),
         }
     }
@@ -137,6 +144,18 @@ impl Source {
                 let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, ..Survey::default() };
                 let setup = Some(Setup::of_clouds(options, lasers));
                 Ok(OpenSource { options: options.clone(), setup, survey, packets: Packets::Clouds(files) })
+            }
+            Self::Bag(path, topic) => {
+                let (topic, count) = bag_clouds::topic(&path, topic.as_deref()).map_err(SourceError::Cloud)?;
+                let mut first = None;
+                let take = |_, lasers| {
+                    first = Some(lasers);
+                    ControlFlow::Break(())
+                };
+                bag_clouds::for_each(&path, &topic, take).map_err(SourceError::Cloud)?;
+                let survey = Survey { kind: Some(Kind::Cloud), turns: count as f64, ..Survey::default() };
+                let setup = Some(Setup::of_clouds(options, first.unwrap_or_default()));
+                Ok(OpenSource { options: options.clone(), setup, survey, packets: Packets::Bag(path, topic, count) })
             }
             Self::Live(port) => {
                 let network = |problem| SourceError::Network { port, problem };
@@ -173,6 +192,7 @@ enum Packets {
     Capture { path: PathBuf, port: Option<u16>, ouster: Option<Box<ouster::Sensor>> },
     Images(RangeImages),
     Clouds(Vec<PathBuf>),
+    Bag(PathBuf, String, usize),
     Live { port: u16, listener: Box<Listener>, waiting: Vec<(Time, Vec<u8>)>, ouster: Option<Box<ouster::Sensor>> },
 }
 
@@ -209,6 +229,7 @@ impl OpenSource {
             Packets::Capture { .. } => Some(self.survey.turns.ceil() as u64),
             Packets::Images(images) => Some(images.files.len() as u64),
             Packets::Clouds(files) => Some(files.len() as u64),
+            Packets::Bag(_, _, count) => Some(*count as u64),
             Packets::Live { .. } => None,
         }
     }
@@ -226,6 +247,16 @@ impl OpenSource {
         let setup = self.setup()?;
         if let Packets::Clouds(files) = &self.packets {
             return cloud_revolutions(files, &setup, stop, take);
+        }
+        if let Packets::Bag(path, topic, _) = &self.packets {
+            let mut tally = Tally::default();
+            let each = |mut revolution: Revolution, _| {
+                filtered(&mut revolution, &setup, &mut tally);
+                let flow = take(revolution);
+                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { flow }
+            };
+            bag_clouds::for_each(path, topic, each).map_err(SourceError::Cloud)?;
+            return Ok(tally);
         }
         let mut revolutions = Revolutions::new(&setup);
         let mut flow = ControlFlow::Continue(());
@@ -259,7 +290,7 @@ impl OpenSource {
                 }
                 "the range images".to_owned()
             }
-            Packets::Clouds(_) => String::new(),
+            Packets::Clouds(_) | Packets::Bag(..) => String::new(),
             Packets::Live { port, listener, waiting, ouster } => {
                 let port_now = listener.port();
                 let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
@@ -303,17 +334,31 @@ fn cloud_revolutions(
     for (number, path) in files.iter().enumerate() {
         let (mut revolution, _) = clouds::read(path).map_err(SourceError::Cloud)?;
         revolution.start = Time::from_micros(number as u64 * IMAGE_INTERVAL);
-        let all = revolution.points.len();
-        let range = |[x, y, z]: [f32; 3]| (x * x + y * y + z * z).sqrt();
-        revolution.points.retain(|point| range(point.position) >= setup.filter.near);
-        tally.near += (all - revolution.points.len()) as u64;
-        let far = revolution.points.len();
-        revolution.points.retain(|point| range(point.position) <= setup.filter.far);
-        tally.far += (far - revolution.points.len()) as u64;
-        tally.points += revolution.points.len() as u64;
+        filtered(&mut revolution, setup, &mut tally);
         if take(revolution).is_break() || stop.load(Ordering::Relaxed) {
             break;
         }
     }
     Ok(tally)
+}
+
+/// Leaves out what is too near or too far.
+fn filtered(revolution: &mut Revolution, setup: &Setup, tally: &mut Tally) {
+    let range = |[x, y, z]: [f32; 3]| (x * x + y * y + z * z).sqrt();
+    let all = revolution.points.len();
+    revolution.points.retain(|point| range(point.position) >= setup.filter.near);
+    tally.near += (all - revolution.points.len()) as u64;
+    let far = revolution.points.len();
+    revolution.points.retain(|point| range(point.position) <= setup.filter.far);
+    tally.far += (far - revolution.points.len()) as u64;
+    tally.points += revolution.points.len() as u64;
+}
+
+/// A recording of ROS 2; None if the name is of something else.
+fn bag(text: &str) -> Option<Source> {
+    let (path, topic) = text.split_once('#').map_or((text, None), |(path, topic)| (path, Some(topic.to_owned())));
+    let path = Path::new(path);
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    let is_bag = matches!(ending.as_deref(), Some("mcap" | "db3")) || path.join("metadata.yaml").is_file();
+    is_bag.then(|| Source::Bag(path.to_owned(), topic))
 }

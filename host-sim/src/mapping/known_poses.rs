@@ -30,6 +30,18 @@ pub fn sightings(
     Ok(sightings.collect())
 }
 
+/// Where the odometry alone has the vehicle, from the origin on.
+///
+/// # Errors
+/// [`ReplayError`] if the recording cannot be replayed.
+pub fn odometry_poses(recording: &Recording) -> Result<Vec<Truth>, ReplayError> {
+    let replay = replay(&by_odometry(recording, Pose::default()), |_| {})?;
+    let mut poses: Vec<Truth> =
+        replay.poses.iter().map(|output| Truth { time: output.time, pose: output.smooth }).collect();
+    poses.dedup_by_key(|pose| pose.time);
+    Ok(poses)
+}
+
 /// The recording without a map, from a start pose on. The localiser only finds the landmarks; it must not mind that its own
 /// pose rests on odometry alone.
 pub(super) fn by_odometry(recording: &Recording, pose: Pose) -> Recording {

@@ -12,6 +12,7 @@ pub mod slam;
 mod slam_poses;
 
 pub use clustering::{Clustering, Sighting, cluster};
+pub use known_poses::odometry_poses;
 pub use slam_poses::{SlamPosesError, slam_poses};
 
 use agv_core::localizer::{MapUse, Mode, PoseOutput};

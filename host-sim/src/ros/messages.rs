@@ -205,6 +205,42 @@ pub struct LaserScan {
     pub intensities: Vec<f32>,
 }
 
+/// `sensor_msgs/PointField`: one number of each point.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PointField {
+    /// Its name.
+    pub name: String,
+    /// Its first byte in a point.
+    pub offset: u32,
+    /// Kind of number, 1 to 8: i8, u8, i16, u16, i32, u32, f32, f64.
+    pub datatype: u8,
+    /// Numbers of that kind.
+    pub count: u32,
+}
+
+/// `sensor_msgs/PointCloud2`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PointCloud2 {
+    /// When it was measured, and in which frame.
+    pub header: Header,
+    /// Rows.
+    pub height: u32,
+    /// Points of a row.
+    pub width: u32,
+    /// What a point holds.
+    pub fields: Vec<PointField>,
+    /// Whether the highest byte comes first.
+    pub is_bigendian: bool,
+    /// Bytes of a point.
+    pub point_step: u32,
+    /// Bytes of a row.
+    pub row_step: u32,
+    /// The points.
+    pub data: Vec<u8>,
+    /// Whether all of them are seen.
+    pub is_dense: bool,
+}
+
 /// `sensor_msgs/Imu`. The first entry of a covariance is -1 if what it is of is not measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imu {

@@ -76,6 +76,12 @@ impl BlockStorage {
     /// Builds the storage. `seed` is the scenario's.
     #[must_use]
     pub fn world(&self, seed: u64) -> World {
+        self.level(seed, true)
+    }
+
+    /// The storage at the height of its pallets, or above them.
+    #[must_use]
+    pub fn level(&self, seed: u64, has_pallets: bool) -> World {
         let mut random = Random::new(self.seed.unwrap_or(seed), Stream::World);
         let half_lane = 0.5 * random.between(2.0, 2.4);
         let mut pallets = lane_sides(half_lane, &mut random);
@@ -101,7 +107,9 @@ impl BlockStorage {
         let mut moves = Random::new(seed, Stream::MovedPallets);
         for pallet in &mut pallets {
             self.move_pallet(pallet, &mut moves);
-            world.add_pallet(pallet);
+            if has_pallets {
+                world.add_pallet(pallet);
+            }
         }
         for rectangle in columns.iter().chain([&machine]) {
             world.add_rectangle(rectangle);

@@ -17,6 +17,7 @@ pub mod scenario;
 pub mod shape;
 pub mod speed_profile;
 pub mod standard;
+pub mod storeys;
 pub mod vehicle;
 pub mod warehouse_hall;
 pub mod wheels;

@@ -30,6 +30,17 @@ impl Default for WarehouseHall {
     }
 }
 
+/// A height in the hall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// That of a planar laser.
+    Laser,
+    /// Where racks have goods of their own, by number.
+    Goods(u8),
+    /// Between goods: uprights alone.
+    Beams,
+}
+
 const LENGTH: f64 = 60.0;
 const WIDTH: f64 = 40.0;
 const RACK_START: f64 = 14.0;
@@ -51,12 +62,24 @@ impl WarehouseHall {
     /// Builds the hall. `seed` is the scenario's.
     #[must_use]
     pub fn world(&self, seed: u64) -> World {
-        let mut random = Random::new(self.seed.unwrap_or(seed), Stream::World);
+        self.level(seed, Level::Laser)
+    }
+
+    /// The hall at some height.
+    #[must_use]
+    pub fn level(&self, seed: u64, level: Level) -> World {
+        let seed = self.seed.unwrap_or(seed);
+        let mut random = Random::new(seed, Stream::World);
+        let mut goods = match level {
+            Level::Laser | Level::Beams => None,
+            Level::Goods(number) => Some(Random::new(seed ^ (u64::from(number) + 1) << 48, Stream::World)),
+        };
         let mut world = World::default();
         world.add_hall(Point::zeros(), Point::new(LENGTH, WIDTH));
         for axis in RACK_AXES {
             for side in [-1.0, 1.0] {
-                self.add_rack_side(&mut world, axis, side, &mut random);
+                let goods = (level != Level::Beams).then_some(goods.as_mut());
+                self.add_rack_side(&mut world, axis, side, &mut random, goods);
             }
         }
         for (x, y) in columns() {
@@ -83,7 +106,15 @@ impl WarehouseHall {
         RACK_AXES.into_iter().map(rack).chain(columns().map(column)).collect()
     }
 
-    fn add_rack_side(&self, world: &mut World, axis: f64, side: f64, random: &mut Random) {
+    /// `goods` draws what lies in the rack: None for nothing, Some(None) as for the plane of the laser.
+    fn add_rack_side(
+        &self,
+        world: &mut World,
+        axis: f64,
+        side: f64,
+        random: &mut Random,
+        mut goods: Option<Option<&mut Random>>,
+    ) {
         let face = axis + side * RACK_HALF_DEPTH;
         for bay in 0..=BAYS {
             let x = RACK_START + bay as f64 * BAY;
@@ -97,12 +128,21 @@ impl WarehouseHall {
                 break;
             }
             for place in [0.28, 0.72] {
-                let is_filled = random.happens(self.filled_share);
-                let yaw = random.between(-0.8, 0.8).to_radians();
-                let x = x + place * BAY + random.between(-0.04, 0.04);
-                let y = face - side * (0.56 + random.between(0.0, 0.05));
-                if is_filled {
-                    world.add_rectangle(&Rectangle { pose: Pose::new(x, y, yaw), length: 0.8, width: 1.0 });
+                let good = |random: &mut Random| {
+                    let is_filled = random.happens(self.filled_share);
+                    let yaw = random.between(-0.8, 0.8).to_radians();
+                    let x = x + place * BAY + random.between(-0.04, 0.04);
+                    let y = face - side * (0.56 + random.between(0.0, 0.05));
+                    is_filled.then(|| Rectangle { pose: Pose::new(x, y, yaw), length: 0.8, width: 1.0 })
+                };
+                let in_plane = good(random);
+                let good = match &mut goods {
+                    None => None,
+                    Some(None) => in_plane,
+                    Some(Some(random)) => good(random),
+                };
+                if let Some(good) = good {
+                    world.add_rectangle(&good);
                 }
             }
         }

@@ -2,8 +2,9 @@
 //! controller.
 
 use agv_controller::{Controller, EncoderNodes, LaserOrder};
+use agv_core::contours::KeptMap;
 use agv_core::geometry::Pose;
-use agv_core::localizer::{Localizer, PoseFix};
+use agv_core::localizer::{ContourCapacities, Localizer, PoseFix};
 use agv_core::maps::MapError;
 use agv_core::measurement::Time;
 use agv_core::state::PoseOutput;
@@ -72,12 +73,16 @@ pub struct Heard<'a> {
     pub truth: &'a dyn Fn(Time) -> Option<Pose>,
 }
 
+/// A controller to which a map of contours can be lent.
+pub type ContourController<'a> = Controller<Localizer<ContourCapacities<'a>>>;
+
 /// Everything on the vehicle.
 struct Rig<'a> {
     recording: &'a Recording,
+    contours: Option<KeptMap<'a>>,
     faults: &'a [&'a Fault],
     /// None while the power is cut.
-    controller: Option<Box<Controller>>,
+    controller: Option<Box<ContourController<'a>>>,
     motion: EmulatedMotion,
     gyro: Option<EmulatedGyro>,
     sensor: Sensor,
@@ -130,10 +135,32 @@ pub fn drive_listening(
     recording: &Recording,
     faults: &[&Fault],
     options: &RigOptions,
+    hear: impl FnMut(&Heard),
+    listen: impl FnMut(Time, Given),
+) -> Result<(), RigError> {
+    drive_rig(Rig::new(recording, None, faults, options.seed)?, options, hear, listen)
+}
+
+/// Drives a recorded drive in a map of contours.
+///
+/// # Errors
+/// See [`RigError`].
+pub fn drive_in_contours(
+    recording: &Recording,
+    contours: KeptMap<'_>,
+    options: &RigOptions,
+    hear: impl FnMut(&Heard),
+) -> Result<(), RigError> {
+    drive_rig(Rig::new(recording, Some(contours), &[], options.seed)?, options, hear, |_, _| ())
+}
+
+fn drive_rig(
+    mut rig: Rig<'_>,
+    options: &RigOptions,
     mut hear: impl FnMut(&Heard),
     mut listen: impl FnMut(Time, Given),
 ) -> Result<(), RigError> {
-    let mut rig = Rig::new(recording, faults, options.seed)?;
+    let recording = rig.recording;
     let begin = Time::from_seconds(BEGIN);
     let steps = ((BEGIN + options.seconds) * 1e6) as u64 / STEP;
     for step in 1..=steps {
@@ -156,7 +183,12 @@ pub fn drive_listening(
 }
 
 impl<'a> Rig<'a> {
-    fn new(recording: &'a Recording, faults: &'a [&'a Fault], seed: u64) -> Result<Self, RigError> {
+    fn new(
+        recording: &'a Recording,
+        contours: Option<KeptMap<'a>>,
+        faults: &'a [&'a Fault],
+        seed: u64,
+    ) -> Result<Self, RigError> {
         let settings = Settings::of(recording.parameters);
         let nodes = EncoderNodes::of(&settings);
         let motion = EmulatedMotion::new(recording, &nodes)?.standing();
@@ -164,6 +196,7 @@ impl<'a> Rig<'a> {
         let receiver = PoseReceiver::new(nodes.controller);
         let mut rig = Self {
             recording,
+            contours,
             faults,
             controller: None,
             gyro: EmulatedGyro::of(recording, &settings.gyro_frame),
@@ -185,7 +218,7 @@ impl<'a> Rig<'a> {
     }
 
     fn power_on(&mut self, now: Time) -> Result<(), RigError> {
-        self.controller = Some(new_controller(self.recording, now)?);
+        self.controller = Some(new_controller(self.recording, self.contours, now)?);
         Ok(())
     }
 
@@ -266,7 +299,7 @@ impl<'a> Rig<'a> {
     fn obey(
         &mut self,
         order: LaserOrder<Vec<u8>>,
-        controller: &mut Controller,
+        controller: &mut ContourController<'_>,
         (now, time): (Time, f64),
         listen: &mut impl FnMut(Time, Given),
     ) {
@@ -305,12 +338,17 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// A controller with the map of a recording, that is switched on at `now`.
+/// A controller with the map of a recording, and one of contours if there is one, that is switched on at `now`.
 ///
 /// # Errors
 /// [`RigError::Map`] if the map does not fit.
-pub fn new_controller(recording: &Recording, now: Time) -> Result<Box<Controller>, RigError> {
-    let mut localizer = <Localizer>::new(recording.parameters);
+pub fn new_controller<'a>(
+    recording: &Recording,
+    contours: Option<KeptMap<'a>>,
+    now: Time,
+) -> Result<Box<ContourController<'a>>, RigError> {
+    let mut localizer = Localizer::<ContourCapacities>::new(recording.parameters);
+    localizer.set_contours(contours);
     localizer.add_landmarks(&recording.landmarks).map_err(RigError::Map)?;
     Ok(Box::new(Controller::new(&Settings::of(recording.parameters), localizer, now)))
 }

@@ -58,7 +58,7 @@ impl Tape {
     /// # Errors
     /// See [`RigError`].
     pub fn play(&self, recording: &Recording) -> Result<Box<Controller>, RigError> {
-        let mut controller = new_controller(recording, Time::default())?;
+        let mut controller = new_controller(recording, None, Time::default())?;
         for (now, given) in &self.given {
             let now = *now;
             match given {

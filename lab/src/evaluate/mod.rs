@@ -4,6 +4,7 @@ pub mod arbitrary_events;
 pub mod calibration;
 pub mod carpark;
 pub mod carpark_starts;
+pub mod cloud_drive;
 pub mod contour_map;
 pub mod contour_worlds;
 mod contours;

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod carpark;
+mod cloud_drive;
 mod contour_map;
 mod contour_starts;
 mod drives;
@@ -52,6 +53,7 @@ pub struct Evaluate {
 enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
+    CloudDrive(cloud_drive::CloudDrive),
     ContourMap(contour_map::ContourMap),
     ContourStarts(contour_starts::ContourStarts),
     Drives(drives::Drives),
@@ -77,6 +79,7 @@ impl Evaluate {
         match self.experiment {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
+            Experiment::CloudDrive(experiment) => experiment.run(),
             Experiment::ContourMap(experiment) => experiment.run(),
             Experiment::ContourStarts(experiment) => experiment.run(),
             Experiment::Drives(experiment) => experiment.run(),

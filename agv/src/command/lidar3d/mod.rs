@@ -1,16 +1,18 @@
 //! `agv lidar3d`.
 
 mod arguments;
+mod bridge;
 mod calibrate;
 mod convert;
 mod decode;
 mod held;
 mod info;
+mod mount;
 mod places;
 pub mod relocalise;
 mod view;
 
-/// Multi-beam lidars: look at, decode, convert and calibrate, and recognise places.
+/// Multi-beam lidars: look at, decode, convert and calibrate, find their mount, and recognise places.
 #[derive(clap::Args)]
 pub struct Lidar3d {
     #[command(subcommand)]
@@ -23,6 +25,8 @@ enum Action {
     Decode(decode::Decode),
     Convert(convert::Convert),
     Calibrate(calibrate::Calibrate),
+    Mount(mount::Mount),
+    Bridge(bridge::Bridge),
     Places(places::Places),
     View(view::View),
 }
@@ -35,6 +39,8 @@ impl Lidar3d {
             Action::Decode(command) => command.run(),
             Action::Convert(command) => command.run(),
             Action::Calibrate(command) => command.run(),
+            Action::Mount(command) => command.run(),
+            Action::Bridge(command) => command.run(),
             Action::Places(command) => command.run(),
             Action::View(command) => command.run(),
         }

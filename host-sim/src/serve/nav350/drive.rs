@@ -33,6 +33,10 @@ pub struct Turn {
 #[derive(Clone, Debug)]
 pub struct Drive {
     pub(super) turns: Vec<Turn>,
+    /// Number of the first of them; of a drive that goes on, older ones are forgotten.
+    pub(super) first: usize,
+    /// Whether turns come while the sensor is asked.
+    pub(super) is_live: bool,
     /// When the drive begins, in the time of the recording: the first sample of the encoders, if there are any.
     pub(super) begin: Time,
     layout: Vec<IdentifiedLandmark>,
@@ -45,6 +49,25 @@ pub enum DriveError {
     /// It has no scans and no reflectors.
     #[error("the drive has neither scans nor reflectors")]
     Empty,
+}
+
+/// Turns of a drive that goes on which can still be asked for.
+const KEPT: usize = 4;
+
+impl Turn {
+    /// A scan, without reflectors and pose.
+    #[must_use]
+    pub fn of(scan: &RecordedScan, frame: &SensorFrame) -> Self {
+        Self {
+            start: scan.start,
+            ranges: scan.ranges.iter().copied().map(millimetres).collect(),
+            remission: scan.intensities.clone(),
+            first: Milliangle::from_radians(agv_core::geometry::wrap(frame.angle(scan.first_bearing))),
+            resolution: Milliangle::from_radians(scan.bearing_step.abs()).0.try_into().unwrap_or(u16::MAX),
+            reflectors: Vec::new(),
+            pose: None,
+        }
+    }
 }
 
 fn millimetres(range: f32) -> u32 {
@@ -69,14 +92,7 @@ impl Drive {
         };
         for event in &recording.events {
             let RecordedEvent::Scan(scan) = event else { continue };
-            let RecordedScan { start, first_bearing, bearing_step, ranges, intensities, .. } = scan;
-            turns.push(Turn {
-                ranges: ranges.iter().copied().map(millimetres).collect(),
-                remission: intensities.clone(),
-                first: Milliangle::from_radians(agv_core::geometry::wrap(frame.angle(*first_bearing))),
-                resolution: Milliangle::from_radians(bearing_step.abs()).0.try_into().unwrap_or(u16::MAX),
-                ..empty(*start)
-            });
+            turns.push(Turn::of(scan, &frame));
         }
         let has_scans = !turns.is_empty();
         turns.sort_by_key(|turn| turn.start);
@@ -103,7 +119,30 @@ impl Drive {
             turn.pose = truth.map(|truth| truth.pose.compose(recording.parameters.lasers.first()));
         }
         let layout = layout_file::layout(&recording.landmarks);
-        if turns.is_empty() { Err(DriveError::Empty) } else { Ok(Self { turns, begin, layout, frame }) }
+        if turns.is_empty() {
+            Err(DriveError::Empty)
+        } else {
+            Ok(Self { turns, first: 0, is_live: false, begin, layout, frame })
+        }
+    }
+
+    /// A drive that goes on: nothing is seen yet, and the times of what will be are those since the start of the sensor.
+    #[must_use]
+    pub fn live(frame: SensorFrame) -> Self {
+        Self { turns: Vec::new(), first: 0, is_live: true, begin: Time::default(), layout: Vec::new(), frame }
+    }
+
+    /// Adds a turn that has ended; those that nobody asks for any more are forgotten.
+    pub(super) fn push(&mut self, turn: Turn) {
+        self.turns.push(turn);
+        let old = self.turns.len().saturating_sub(KEPT);
+        self.turns.drain(..old);
+        self.first += old;
+    }
+
+    /// Place among the turns of the turn of that number, or of the oldest that is known.
+    pub(super) fn place(&self, number: usize) -> usize {
+        number.saturating_sub(self.first)
     }
 
     /// What the sensor will see, turn by turn.

@@ -79,6 +79,11 @@ impl Nav350 {
         self.sensor().layout().to_vec()
     }
 
+    /// Takes a turn that has just ended, of a drive that goes on; its time is that since the start of the sensor.
+    pub fn see(&self, turn: Turn) {
+        self.sensor().see(turn);
+    }
+
     /// Lets the vehicle of a sensor that stands drive off at `time`.
     pub fn begin(&self, time: Instant) {
         let seconds = time.saturating_duration_since(self.started).as_secs_f64() * self.speed;
@@ -115,7 +120,8 @@ impl Nav350 {
     }
 
     /// Seconds of the sensor since its start.
-    fn now(&self) -> f64 {
+    #[must_use]
+    pub fn now(&self) -> f64 {
         self.started.elapsed().as_secs_f64() * self.speed
     }
 
@@ -130,8 +136,9 @@ impl Nav350 {
                 stream.write_all(&bytes)?;
                 continue;
             }
+            // What has been due for a while waits for a turn that has not ended.
             let wait = connection.due().map_or(LONGEST_WAIT, |due| (due - self.now()) / self.speed);
-            stream.set_read_timeout(Some(Duration::from_secs_f64(wait.clamp(1e-4, LONGEST_WAIT))))?;
+            stream.set_read_timeout(Some(Duration::from_secs_f64(wait.clamp(SHORTEST_WAIT, LONGEST_WAIT))))?;
             let count = match stream.read(&mut buffer) {
                 Ok(0) => return Ok(()),
                 Ok(count) => count,
@@ -145,5 +152,7 @@ impl Nav350 {
     }
 }
 
+/// How long is waited at least, s.
+const SHORTEST_WAIT: f64 = 5e-4;
 /// Waits are cut into pieces of this length, s, so that the sensor can be stopped.
 const LONGEST_WAIT: f64 = 0.02;

@@ -32,7 +32,7 @@ impl Pending {
         if let Some((_, bytes)) = self.delayed.pop_front_if(|(due, _)| *due <= now) {
             return Some(bytes);
         }
-        let promise = self.promise.take_if(|promise| promise.due <= now)?;
+        let promise = self.promise.take_if(|promise| promise.due <= now && sensor.has_seen(promise))?;
         Some(sensor.keep(&promise))
     }
 }

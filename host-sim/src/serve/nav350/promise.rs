@@ -1,5 +1,6 @@
 //! Questions that a sensor answers at the end of a turn.
 
+use agv_core::measurement::Time;
 use agv_wire::cola::{Dialect, Sequence};
 use agv_wire::nav350::{
     Answer, Channel, ErrorCode, LandmarkData, MethodResult, NavigationData, OperatingMode, PoseAnswer, PoseReport,
@@ -58,6 +59,12 @@ impl Sensor {
 
     /// When a question is answered, which turn answers it, and when that turn began.
     fn turn(&mut self, wait: bool, now: f64) -> (f64, usize, f64) {
+        if self.drive.is_live {
+            let next = self.drive.first + self.drive.turns.len();
+            // Before the first turn there is none to tell of at once.
+            let number = if wait || self.drive.turns.is_empty() { next } else { next - 1 };
+            return (now, number, 0.0);
+        }
         if self.stands && self.drive_start.is_none_or(|start| now < start) {
             return self.standing_turn(wait, now);
         }
@@ -91,21 +98,32 @@ impl Sensor {
     /// The same for mapping, which takes as many turns as it is to average. A vehicle that has not driven off stands
     /// meanwhile.
     fn mapping_turn(&mut self, now: f64) -> (f64, usize, f64) {
+        if self.drive.is_live {
+            return self.turn(true, now);
+        }
         let is_driving = self.drive_start.is_some_and(|start| now >= start);
         let (due, turn, start) = if is_driving { self.turn(true, now) } else { self.standing_turn(true, now) };
         let more = f64::from(self.map_configuration().mean.saturating_sub(1));
         (due + more * self.drive.frame.period, turn, start)
     }
 
+    /// Whether the turn that answers a question has ended.
+    pub(super) fn has_seen(&self, promise: &Promise) -> bool {
+        promise.turn < self.drive.first + self.drive.turns.len()
+    }
+
     /// The answer that was promised.
     pub(super) fn keep(&self, promise: &Promise) -> Vec<u8> {
-        let Promise { dialect, method, start, .. } = *promise;
+        let Promise { dialect, method, .. } = *promise;
+        let turn = self.drive.place(promise.turn);
+        let start =
+            if self.drive.is_live { self.drive.turns[turn].start.since(Time::default()) } else { promise.start };
         if matches!(method, PromisedMethod::Mapping) {
-            let reflectors = self.mapped(promise.turn, start);
+            let reflectors = self.mapped(turn, start);
             let list = ReflectorList { filter: 0, reflectors: Sequence::Values(&reflectors) };
             return encode(dialect, &Answer::Result(MethodResult::Mapping(ErrorCode::OK, Some(list))));
         }
-        let seen = self.seen(promise.turn, start);
+        let seen = self.seen(turn, start);
         let (wants_reflectors, wants_scan) = match method {
             PromisedMethod::Data { mask, .. } => (mask != 1, mask != 0),
             PromisedMethod::Landmarks { dataset, .. } => (dataset != 1, dataset != 0),

@@ -3,7 +3,7 @@
 use agv_wire::cola::Dialect;
 use agv_wire::nav350::{DeviceTime, IdentifiedLandmark, OperatingMode, Setting, SpeedReport};
 
-use super::drive::Drive;
+use super::drive::{Drive, Turn};
 use super::factory;
 
 /// A sensor. Times are seconds since it was started, by a right clock.
@@ -81,6 +81,11 @@ impl Sensor {
     #[must_use]
     pub fn drive(&self) -> &Drive {
         &self.drive
+    }
+
+    /// Takes a turn that a sensor whose drive goes on has just ended.
+    pub fn see(&mut self, turn: Turn) {
+        self.drive.push(turn);
     }
 
     /// The layout as it is now.

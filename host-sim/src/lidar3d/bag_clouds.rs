@@ -1,0 +1,151 @@
+//! Scans as `sensor_msgs/PointCloud2` in recordings of ROS 2.
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use agv_core::measurement::Time;
+use agv_lidar3d::calibration::Laser;
+use agv_lidar3d::cloud_file::{FilePoint, ringed};
+
+use super::revolution::Revolution;
+use crate::ros::messages::{PointCloud2, PointField};
+use crate::ros::{Bag, decode};
+
+/// The kind of message.
+const KIND: &str = "sensor_msgs/msg/PointCloud2";
+/// An absolute time of a point is one of more seconds than a scan lasts.
+const ABSOLUTE: f64 = 1e6;
+
+/// The topic of the clouds in a recording, and how many there are.
+///
+/// # Errors
+/// One line: there is none, or there are several and none was named.
+pub fn topic(path: &Path, stated: Option<&str>) -> Result<(String, usize), String> {
+    let bag = Bag::open(path).map_err(|error| error.to_string())?;
+    let mut topics: Vec<(String, usize)> = Vec::new();
+    bag.read(|message| {
+        if message.kind == KIND && stated.is_none_or(|stated| stated == message.topic) {
+            match topics.iter_mut().find(|(topic, _)| topic == message.topic) {
+                Some((_, count)) => *count += 1,
+                None => topics.push((message.topic.to_owned(), 1)),
+            }
+        }
+    })
+    .map_err(|error| error.to_string())?;
+    match topics.as_slice() {
+        [one] => Ok(one.clone()),
+        [] => Err(format!(
+            "{}: it holds no {KIND}{}",
+            path.display(),
+            stated.map_or(String::new(), |t| format!(" on {t}"))
+        )),
+        several => {
+            let names: BTreeSet<&str> = several.iter().map(|(topic, _)| topic.as_str()).collect();
+            let names = names.into_iter().collect::<Vec<_>>().join(", ");
+            Err(format!("{}: clouds are on {names}; name one behind the file: FILE#TOPIC", path.display()))
+        }
+    }
+}
+
+/// Calls `take` with each cloud of a topic until it breaks off. Times count from the first stamp.
+///
+/// # Errors
+/// One line.
+pub fn for_each(
+    path: &Path,
+    topic: &str,
+    mut take: impl FnMut(Revolution, Vec<Laser>) -> ControlFlow<()>,
+) -> Result<(), String> {
+    let bag = Bag::open(path).map_err(|error| error.to_string())?;
+    let (mut first, mut flow, mut problem) = (None, ControlFlow::Continue(()), None);
+    bag.read(|message| {
+        if message.kind != KIND || message.topic != topic || flow.is_break() || problem.is_some() {
+            return;
+        }
+        let cloud = decode::<PointCloud2>(message.data).map_err(|error| error.to_string());
+        match cloud.and_then(|cloud| revolution(&cloud, &mut first)) {
+            Ok((revolution, lasers)) => flow = take(revolution, lasers),
+            Err(reason) => problem = Some(format!("{}: {topic}: {reason}", path.display())),
+        }
+    })
+    .map_err(|error| error.to_string())?;
+    problem.map_or(Ok(()), Err)
+}
+
+fn revolution(cloud: &PointCloud2, first: &mut Option<i64>) -> Result<(Revolution, Vec<Laser>), String> {
+    let stamp = cloud.header.stamp.nanoseconds();
+    let first = *first.get_or_insert(stamp);
+    let points = points(cloud)?;
+    let seen: Vec<&(FilePoint, f64)> = points.iter().filter(|(point, _)| point.is_seen()).collect();
+    let earliest = seen.iter().map(|(_, time)| *time).fold(f64::INFINITY, f64::min);
+    let file_points: Vec<FilePoint> = seen.iter().map(|(point, _)| *point).collect();
+    let mut cloud = ringed(&file_points);
+    for (point, (_, time)) in cloud.points.iter_mut().zip(&seen) {
+        point.time = (1e9 * (time - earliest)).round() as i32;
+    }
+    // Some drivers state the times from the stamp on, some up to it, some by the clock.
+    let shift = if earliest.abs() < ABSOLUTE { earliest } else { 0.0 };
+    let start = Time::from_micros(((stamp - first).max(0) / 1000).unsigned_abs()).offset(shift);
+    Ok((Revolution { start, points: cloud.points, is_whole: true }, cloud.lasers))
+}
+
+/// The points with their times, s; without a field of time all are 0.
+fn points(cloud: &PointCloud2) -> Result<Vec<(FilePoint, f64)>, String> {
+    let field = |names: &[&str]| cloud.fields.iter().find(|field| names.contains(&field.name.as_str()));
+    let needed = |name: &str| field(&[name]).ok_or_else(|| format!("a cloud has no field {name}"));
+    let position = [needed("x")?, needed("y")?, needed("z")?];
+    let intensity = field(&["intensity", "reflectivity"]);
+    let ring = field(&["ring", "channel"]);
+    let time = field(&["t", "time", "timestamp", "time_stamp", "offset_time"]);
+    let step = cloud.point_step as usize;
+    let (count, row) = (cloud.width as usize, cloud.row_step as usize);
+    let place = |number: usize| (number / count.max(1)) * row + (number % count.max(1)) * step;
+    let mut points = Vec::with_capacity(count * cloud.height as usize);
+    for number in 0..count * cloud.height as usize {
+        let at = place(number);
+        let bytes = cloud.data.get(at..at + step).ok_or("a cloud is shorter than it says")?;
+        let read = |field: &PointField| value(field, bytes, cloud.is_bigendian);
+        let [x, y, z] = position.map(read);
+        let missing = || "a field lies outside of its point, or is of no kind that ROS knows".to_owned();
+        // Whole numbers of time are nanoseconds.
+        let unit = |field: &PointField| if field.datatype < FLOAT { 1e-9 } else { 1.0 };
+        let time = time.map_or(Some(0.0), |field| Some(unit(field) * read(field)?)).ok_or_else(missing)?;
+        let point = FilePoint {
+            position: [x.ok_or_else(missing)?, y.ok_or_else(missing)?, z.ok_or_else(missing)?],
+            intensity: intensity.map_or(Some(0.0), read).ok_or_else(missing)?,
+            ring: match ring {
+                Some(field) => Some(read(field).ok_or_else(missing)? as u16),
+                None => None,
+            },
+        };
+        points.push((point, time));
+    }
+    Ok(points)
+}
+
+/// `PointField.FLOAT32`; smaller kinds are whole numbers.
+const FLOAT: u8 = 7;
+
+/// A number of a point, by the kinds of `sensor_msgs/PointField`.
+fn value(field: &PointField, point: &[u8], is_big: bool) -> Option<f64> {
+    let length = [1, 1, 2, 2, 4, 4, 4, 8].get(usize::from(field.datatype).checked_sub(1)?).copied()?;
+    let offset = field.offset as usize;
+    let mut bytes = [0_u8; 8];
+    let own = bytes.get_mut(..length)?;
+    own.copy_from_slice(point.get(offset..offset.checked_add(length)?)?);
+    if is_big {
+        own.reverse();
+    }
+    let whole = u64::from_le_bytes(bytes);
+    Some(match field.datatype {
+        1 => f64::from(whole as i8),
+        2 => f64::from(whole as u8),
+        3 => f64::from(whole as i16),
+        4 => f64::from(whole as u16),
+        5 => f64::from(whole as i32),
+        6 => f64::from(whole as u32),
+        7 => f64::from(f32::from_bits(whole as u32)),
+        _ => f64::from_bits(whole),
+    })
+}
