@@ -95,7 +95,8 @@ impl RedundancyCheck {
         let kept = 1.0 - (distance / LEARNT_OVER).min(1.0);
         self.learnt = (kept * squares + slip * slip, kept * way + distance);
         let shown = (squares + stated * STATED_FOR) / (way + STATED_FOR);
-        shown.clamp(LEAST_SHARE * LEAST_SHARE * stated, stated)
+        // `clamp` panics where its bounds contradict each other.
+        shown.max(LEAST_SHARE * LEAST_SHARE * stated).min(stated)
     }
 
     /// Whether a wheel slips.
