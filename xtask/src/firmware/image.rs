@@ -1,5 +1,6 @@
 //! Boards, and the images that are built for them.
 
+use std::fs::File;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -104,6 +105,18 @@ pub fn build_folder() -> PathBuf {
     repository().join("target/firmware/build")
 }
 
+/// Waits until nobody else builds images, and keeps others waiting until the file is dropped.
+pub fn lock() -> anyhow::Result<File> {
+    let path = repository().join("target/firmware/lock");
+    let take = || {
+        std::fs::create_dir_all(path.parent().unwrap_or(&path))?;
+        let file = File::create(&path)?;
+        file.lock()?;
+        Ok::<_, std::io::Error>(file)
+    };
+    take().with_context(|| format!("{} cannot be locked", path.display()))
+}
+
 impl Board {
     /// The file of an image.
     pub fn image(&self, name: &str) -> anyhow::Result<PathBuf> {
@@ -130,9 +143,12 @@ impl Board {
     pub fn keep_images(&self) -> anyhow::Result<()> {
         for name in self.images {
             let (built, kept) = (build_folder().join(IMAGES).join(name), self.image(name)?);
+            // Whoever reads the image meanwhile has the old one or the new one, never a part.
             let copy = || {
                 std::fs::create_dir_all(kept.parent().unwrap_or(&kept))?;
-                std::fs::copy(&built, &kept)
+                let aside = kept.with_extension("new");
+                std::fs::copy(&built, &aside)?;
+                std::fs::rename(&aside, &kept)
             };
             copy().with_context(|| format!("{} cannot be copied to {}", built.display(), kept.display()))?;
         }

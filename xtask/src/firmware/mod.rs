@@ -109,6 +109,8 @@ fn build_board(board: &Board) -> anyhow::Result<()> {
     if board.images.is_empty() {
         return Ok(());
     }
+    // Two at once would keep each other's images: they are built in one folder, under the same names.
+    let lock = image::lock()?;
     let mut cargo = toolchain::cargo()?;
     cargo.args(["build", "--package", "agv-firmware", "--profile", "firmware"]);
     cargo.args(["--target", image::TARGET, "--features", board.feature, "--target-dir"]);
@@ -119,7 +121,9 @@ fn build_board(board: &Board) -> anyhow::Result<()> {
     if !cargo.status().context("cargo cannot be started")?.success() {
         bail!("the firmware of {} does not build", board.feature);
     }
-    board.keep_images()
+    board.keep_images()?;
+    drop(lock);
+    Ok(())
 }
 
 fn emulate(name: &str, icount: bool) -> anyhow::Result<()> {
