@@ -359,6 +359,29 @@ fn apply_and_reboot(agv: &Path, host: &str, folder: &Path) {
 }
 
 #[test]
+fn a_port_that_another_took_is_chosen_again() {
+    use agv_host_sim::emulate::board::{Board, BoardError, Ports};
+    let Some((image, _alone)) = image("a_port_that_another_took_is_chosen_again") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let free = || {
+        let port = || std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        Ports { log: port(), service: port() }
+    };
+    let at_taken = Ports { service: taken.local_addr().unwrap().port(), ..free() };
+    let mut asked = 0;
+    let (mut board, _bus) = Board::start_at(&image, folder.path(), || {
+        asked += 1;
+        Ok(if asked == 1 { at_taken } else { free() })
+    })
+    .unwrap();
+    assert!(board.is_running() && asked == 2 && board.ports.service != at_taken.service);
+    drop(board);
+    let refused = Board::start_at(&image, folder.path(), || Ok(at_taken)).err().unwrap();
+    assert!(matches!(&refused, BoardError::Ended(words) if words.contains("host forwarding")), "{refused}");
+}
+
+#[test]
 fn rubbish_in_flash_is_said_and_replaced() {
     let Some((image, _alone)) = image("rubbish_in_flash_is_said_and_replaced") else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -91,7 +91,7 @@ impl Stage<'_> {
             }
             play.send_foreign()?;
             if !board.is_running() {
-                return Err(BoardError::Ended.into());
+                return Err(board.ended().into());
             }
             // Everything that the localiser is told is in the stream, from the first sample on.
             if is_streaming.load(Ordering::Acquire) {
