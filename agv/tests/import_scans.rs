@@ -5,7 +5,7 @@ use std::io::Write;
 
 use agv_core::geometry::Pose;
 use agv_core::measurement::Time;
-use agv_host_sim::import::{carmen, graph_log};
+use agv_host_sim::import::{PosedScan, carmen, graph_log};
 use agv_host_sim::text_file::TextFileError;
 use agv_tests::recordings;
 use flate2::Compression;
@@ -41,6 +41,28 @@ fn graph_log_gives_scans_with_the_laser_where_it_sits_on_the_corrected_robot() {
     assert_eq!(second.laser, Pose::new(1.5, 3.0, 0.0));
     assert_eq!((graph.edges[0].from, graph.edges[0].to), (0, 1));
     assert_eq!(graph.edges[0].displacement, Pose::new(1.0, 0.0, -1.5));
+}
+
+#[test]
+fn a_graph_log_whose_times_go_back_keeps_scans_at_the_poses_of_their_lines() {
+    let scan = |number: usize, seconds: f64| {
+        format!(
+            "VERTEX2 {number} {number} 0 0\nROBOTLASER1 0 -1.5 3.0 1.0 50 0.1 0 1 {number} 0 0 0 0 0 0 0 0 0 0 0 0 {seconds} host 0\n"
+        )
+    };
+    let text: String =
+        [100.0, 100.6, 102.0, 101.9, 102.5].iter().zip(1..).map(|(time, number)| scan(number, *time)).collect();
+    let (_folder, path) = file("graph.log", text.as_bytes());
+    let graph = graph_log::read(&path).unwrap();
+    assert_eq!(graph.defects.backward, 1);
+    let drive = agv_host_sim::import::drive(&graph.log).unwrap();
+    let posed = PosedScan::of_recording(&drive);
+    assert_eq!(posed.len(), 5);
+    for posed in posed {
+        assert!((posed.robot.x - f64::from(posed.scan.ranges[0])).abs() < 1e-9, "{posed:?}");
+    }
+    let (_folder, path) = file("graph.log", scan(1, f64::NAN).as_bytes());
+    assert!(matches!(graph_log::read(&path).unwrap_err(), TextFileError::Line { line: 2, .. }));
 }
 
 #[test]

@@ -9,7 +9,8 @@ use agv_host_sim::import::raw::{self, RawBytes};
 #[cfg(feature = "bags")]
 use agv_host_sim::import::ros;
 use agv_host_sim::import::{
-    self, ScanLog, candump, capture, carmen, carpark, graph_log, optiodom, sapienza, wheel_recording,
+    self, ScanLog, candump, capture, carmen, carmen::TimeDefects, carpark, graph_log, optiodom, sapienza,
+    wheel_recording,
 };
 use agv_host_sim::recording::Recording;
 use agv_host_sim::{file_kind, log};
@@ -135,7 +136,7 @@ impl Import {
             Format::Csv => self.table()?,
             Format::Optiodom => optiodom::read_run(&self.input)?,
             Format::Carmen => self.carmen_drive()?,
-            Format::Graph => drive(&self.input, "pose-graph", &graph_log::read(&self.input)?.log)?,
+            Format::Graph => self.graph_drive()?,
             Format::Auto => unreachable!("the format has been found above"),
         };
         progress.set_message(format!("writing {}", self.output.display()));
@@ -195,10 +196,20 @@ impl Import {
 
     fn carmen_drive(&self) -> anyhow::Result<Recording> {
         let log = carmen::read(&self.input)?;
-        if !log.defects.is_none() {
-            note(&format!("agv: {}: {}", self.input.display(), log.defects));
-        }
+        self.note_times(&log.defects);
         drive(&self.input, "CARMEN", &log.front)
+    }
+
+    fn graph_drive(&self) -> anyhow::Result<Recording> {
+        let graph = graph_log::read(&self.input)?;
+        self.note_times(&graph.defects);
+        drive(&self.input, "pose-graph", &graph.log)
+    }
+
+    fn note_times(&self, defects: &TimeDefects) {
+        if !defects.is_none() {
+            note(&format!("agv: {}: {defects}", self.input.display()));
+        }
     }
 
     fn table(&self) -> anyhow::Result<Recording> {

@@ -14,7 +14,7 @@ use agv_core::geometry::Pose;
 use agv_core::measurement::PoseIncrement;
 
 pub use super::line_times::TimeDefects;
-use super::line_times::{Record, TimedLine, as_written, by_order, defects};
+use super::line_times::{NOT_FINITE, Record, TimedLine, times};
 use super::scan_record::{number, pose, ranges, robot_laser, scan};
 use super::{PosedScan, ScanLog};
 use crate::text_file::{self, TextFileError};
@@ -52,10 +52,7 @@ pub fn read(path: &Path) -> Result<CarmenLog, TextFileError> {
         };
         let (record, seconds) =
             parsed.ok_or_else(|| TextFileError::of_line(path, number, super::missing_field(record)))?;
-        if !seconds.is_finite() {
-            return Err(TextFileError::of_line(path, number, "the time is not finite"));
-        }
-        lines.push(TimedLine { seconds, record });
+        lines.push(TimedLine::new(seconds, record).ok_or_else(|| TextFileError::of_line(path, number, NOT_FINITE))?);
     }
     mark_anchors(&mut lines);
     Ok(CarmenLog::of_lines(lines))
@@ -63,8 +60,7 @@ pub fn read(path: &Path) -> Result<CarmenLog, TextFileError> {
 
 impl CarmenLog {
     fn of_lines(lines: Vec<TimedLine>) -> Self {
-        let defects = defects(&lines);
-        let times = if defects.is_none() { as_written(&lines) } else { by_order(&lines) };
+        let (times, defects) = times(&lines);
         let mut log = Self { defects, ..Self::default() };
         let mut anchor = None;
         for (line, time) in lines.into_iter().zip(times) {

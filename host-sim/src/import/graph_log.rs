@@ -7,7 +7,8 @@ use std::path::Path;
 
 use agv_core::geometry::Pose;
 
-use super::scan_record::{Clock, count, pose, robot_laser};
+use super::line_times::{NOT_FINITE, Record, TimeDefects, TimedLine, times};
+use super::scan_record::{count, pose, robot_laser};
 use super::{PosedScan, ScanLog};
 use crate::text_file::{self, TextFileError};
 
@@ -29,6 +30,8 @@ pub struct GraphLog {
     pub log: ScanLog,
     /// Relations in order of the file.
     pub edges: Vec<Edge>,
+    /// What was wrong with the times; none of those written are used if there is anything.
+    pub defects: TimeDefects,
 }
 
 /// Reads a graph log.
@@ -39,7 +42,7 @@ pub fn read(path: &Path) -> Result<GraphLog, TextFileError> {
     let text = text_file::read(path, "a pose graph with scans")?;
     let mut graph = GraphLog::default();
     let mut vertex = None;
-    let mut clock = Clock::default();
+    let mut lines = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let mut words = text.split_ascii_whitespace();
         let record = words.next().unwrap_or_default();
@@ -50,11 +53,23 @@ pub fn read(path: &Path) -> Result<GraphLog, TextFileError> {
             "EDGE2" => graph.edges.push(parse_edge(words).ok_or_else(malformed)?),
             "ROBOTLASER1" => {
                 let robot = vertex.ok_or_else(no_vertex)?;
-                graph.log.scans.push(parse_scan(words, robot, &mut clock).ok_or_else(malformed)?);
+                let (scan, seconds) = parse_scan(words, robot).ok_or_else(malformed)?;
+                let timed = TimedLine::new(seconds, Record::Front(scan));
+                lines.push(timed.ok_or_else(|| TextFileError::of_line(path, line, NOT_FINITE))?);
             }
             _ => {}
         }
     }
+    let (times, defects) = times(&lines);
+    let timed = lines.into_iter().zip(times).filter_map(|(line, time)| match line.record {
+        Record::Front(mut posed) => {
+            posed.scan.start = time;
+            Some(posed)
+        }
+        Record::Rear(_) | Record::Odometry(_) | Record::Anchor(_) => None,
+    });
+    graph.log.scans = timed.collect();
+    graph.defects = defects;
     Ok(graph)
 }
 
@@ -67,9 +82,8 @@ fn parse_edge<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Edge> {
     Some(Edge { from: count(&mut words)?, to: count(&mut words)?, displacement: pose(&mut words)? })
 }
 
-/// A scan whose laser stands on the corrected robot as the log says.
-fn parse_scan<'a>(mut words: impl Iterator<Item = &'a str>, robot: Pose, clock: &mut Clock) -> Option<PosedScan> {
-    let (mut logged, seconds) = robot_laser(&mut words)?;
-    logged.scan.start = clock.at(seconds);
-    Some(PosedScan { laser: robot.compose(&logged.robot.between(&logged.laser)), robot, ..logged })
+/// A scan whose laser stands on the corrected robot as the log says, without its time, and that time, s.
+fn parse_scan<'a>(mut words: impl Iterator<Item = &'a str>, robot: Pose) -> Option<(PosedScan, f64)> {
+    let (logged, seconds) = robot_laser(&mut words)?;
+    Some((PosedScan { laser: robot.compose(&logged.robot.between(&logged.laser)), robot, ..logged }, seconds))
 }

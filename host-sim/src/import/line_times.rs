@@ -7,7 +7,7 @@ use agv_core::measurement::Time;
 
 use super::PosedScan;
 
-/// Between two lines of odometry whose times are made, s.
+/// Between two lines of odometry whose times are made, or two scans where there is no odometry, s.
 pub const STEP: f64 = 0.2;
 
 /// A scan is logged within this time of the lines of odometry beside it, s.
@@ -20,6 +20,16 @@ pub(super) struct TimedLine {
     /// What happened.
     pub(super) record: Record,
 }
+
+impl TimedLine {
+    /// None if the time is not finite.
+    pub(super) fn new(seconds: f64, record: Record) -> Option<Self> {
+        seconds.is_finite().then_some(Self { seconds, record })
+    }
+}
+
+/// What is said of a line whose time is not finite.
+pub(super) const NOT_FINITE: &str = "the time is not finite";
 
 /// What a line tells.
 pub(super) enum Record {
@@ -60,13 +70,19 @@ impl fmt::Display for TimeDefects {
         write!(
             formatter,
             "the times of {backward} lines go back, of {equal} repeat, of {zero} are zero, of {apart} are far from the \
-             odometry's: all times are made from the order of the lines, {STEP} s a line of odometry"
+             odometry's: all times are made from the order of the lines, {STEP} s a line of odometry, or a scan where there \
+             is none"
         )
     }
 }
 
-/// What is wrong with the times of lines.
-pub(super) fn defects(lines: &[TimedLine]) -> TimeDefects {
+/// Time of each line, and what was wrong with those that are written; if there is anything, none of them is used.
+pub(super) fn times(lines: &[TimedLine]) -> (Vec<Time>, TimeDefects) {
+    let defects = defects(lines);
+    (if defects.is_none() { as_written(lines) } else { by_order(lines) }, defects)
+}
+
+fn defects(lines: &[TimedLine]) -> TimeDefects {
     let mut defects = TimeDefects::default();
     let (mut odometry, mut front, mut rear): (Option<(f64, Pose)>, _, _) = (None, None, None);
     // The last scan waits for the line of odometry behind it.
@@ -104,7 +120,7 @@ pub(super) fn defects(lines: &[TimedLine]) -> TimeDefects {
 }
 
 /// The times as written, from the first on.
-pub(super) fn as_written(lines: &[TimedLine]) -> Vec<Time> {
+fn as_written(lines: &[TimedLine]) -> Vec<Time> {
     let timed = lines.iter().filter(|line| !matches!(line.record, Record::Anchor(_)));
     let start = timed.map(|line| line.seconds).min_by(f64::total_cmp).unwrap_or_default();
     lines.iter().map(|line| Time::from_seconds(line.seconds - start)).collect()
@@ -112,7 +128,7 @@ pub(super) fn as_written(lines: &[TimedLine]) -> Vec<Time> {
 
 /// Times by the order of the lines: each line of odometry is a step later than the one before, and scans are at the one
 /// before them, a microsecond apart. Where there is no odometry, scans are a step apart.
-pub(super) fn by_order(lines: &[TimedLine]) -> Vec<Time> {
+fn by_order(lines: &[TimedLine]) -> Vec<Time> {
     let has_odometry = lines.iter().any(|line| matches!(line.record, Record::Odometry(_)));
     let (mut steps, mut scans) = (0_u64, 0_u64);
     let step = (STEP * 1e6) as u64;

@@ -6,19 +6,6 @@ use agv_core::measurement::{LaserId, Time};
 use super::PosedScan;
 use crate::recording::RecordedScan;
 
-/// Times of a log count from its first one, in case they are seconds since 1970.
-#[derive(Default)]
-pub(super) struct Clock {
-    start: Option<f64>,
-}
-
-impl Clock {
-    pub(super) fn at(&mut self, seconds: f64) -> Time {
-        let start = *self.start.get_or_insert(seconds);
-        Time::from_seconds((seconds - start).max(0.0))
-    }
-}
-
 pub(super) fn number<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<f64> {
     words.next()?.parse().ok()
 }
