@@ -43,7 +43,7 @@ where
     M: MapKeeping,
 {
     type Slots = S;
-    type Maps = Maps<M::Maps<REFLECTORS, FEATURES>, DYNAMIC>;
+    type Maps = Maps<M::Map<REFLECTORS>, M::Map<FEATURES>, DYNAMIC>;
     type Features = FeatureFinder<BEAMS>;
     type Contours = K;
 }

@@ -6,17 +6,18 @@ use super::contours::ToldByContours;
 use super::evidence::DistanceSince;
 use super::slam::Slam;
 use super::supervisor::{Support, remark_on_motion, supervise};
+use super::travel::Outage;
 use super::{
-    Capacities, ContourCapacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseFix, PoseOutput, Reason,
+    Capacities, ContourCapacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseOutput, Reason,
     StatedCapacities,
 };
-use crate::filter::{Ekf, Timeline};
-use crate::geometry::{Point, Pose, wrap};
+use crate::filter::Timeline;
+use crate::geometry::{Point, Pose};
 use crate::integrity::separation::SolutionSeparation;
-use crate::integrity::{Estimate, Integrity, ProtectionLevel, Replacement, WheelErrors, is_sure};
+use crate::integrity::{Estimate, Integrity, ProtectionLevel, is_sure};
 use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, LendError, MapError, MapView, Verdict};
-use crate::measurement::{EncoderFaults, LaserId, Reflectors, Scan, Time};
-use crate::odometry::{Coasting, GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
+use crate::measurement::{LaserId, Reflectors, Scan, Time};
+use crate::odometry::{GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::sensing::detect_reflectors;
 use crate::sources::{
     AddLandmarks, Aid, AidOutcome, FindContours, FindFeatures, GyroSource, LandmarkMaps, LendLandmarks, Source,
@@ -41,9 +42,9 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     /// Of a vehicle with a gyro.
     pub(super) gyro: Option<GyroSource>,
     pub(super) lost: Option<Reason>,
-    outage: Option<Outage>,
+    pub(super) outage: Option<Outage>,
     /// Samples of the odometry in a row that were not later than the one before.
-    repeated: u8,
+    pub(super) repeated: u8,
     pub(super) distance: DistanceSince,
     pub(super) features: C::Features,
     pub(super) contours: C::Contours,
@@ -52,26 +53,8 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) outputs: Outputs,
 }
 
-/// The odometry is not believed, or not heard.
-#[derive(Clone, Copy, Debug)]
-struct Outage {
-    reason: Reason,
-    coasting: Coasting,
-    /// What was seen until this time raised the doubt; nothing that was seen, if it is the beginning of time.
-    since: Time,
-}
-
-/// An odometry that says so often in a row what is not later than before has a clock that stands.
-const MOST_REPEATED: u8 = 10;
-
 /// An aid with so many numbers says all of the pose: the vehicle rests on it as on features.
 const WHOLE_POSE: usize = 3;
-
-/// A pose that was given for a time further ahead of the odometry than this, s, is of another clock.
-const LONGEST_LEAD: f64 = 0.5;
-
-/// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
-const LONGEST_BRIDGE: f64 = 1.0;
 
 impl<C: Capacities> Localizer<C>
 where
@@ -303,7 +286,7 @@ impl<C: Capacities> Localizer<C> {
     }
 
     /// The pose for now, and that by odometry alone.
-    fn estimate(&mut self) -> Option<Estimate> {
+    pub(super) fn estimate(&mut self) -> Option<Estimate> {
         let timeline = self.timeline.begun_mut()?;
         let state = timeline.state();
         let odometry_pose = *timeline.odometry_pose();
@@ -335,20 +318,6 @@ impl<C: Capacities> Localizer<C> {
         }
     }
 
-    /// What a given pose replaces, if it was contradicted.
-    fn replaced_by(&mut self, fix: &PoseFix) -> Option<Replacement> {
-        let contradictions =
-            [Reason::MotionDisagrees, Reason::LandmarksRejected, Reason::InnovationsTooLarge].map(Some);
-        if !contradictions.contains(&self.lost) {
-            return None;
-        }
-        let distance = self.distance.any();
-        let timeline = self.timeline.begun_mut()?;
-        let before = timeline.state_at(fix.time).unwrap_or_else(|_| timeline.state()).pose;
-        let deviations = (fix.position_deviation, fix.heading_deviation);
-        Some(Replacement { jump: before.between(&fix.pose), distance, deviations })
-    }
-
     /// Whether an event tells which reflectors one revolution has seen, be it none. Not every scan does: the laser may have
     /// told its reflectors before.
     fn tells_reflectors(&self, event: &Event) -> bool {
@@ -357,209 +326,6 @@ impl<C: Capacities> Localizer<C> {
             Event::Scan(scan) => self.parameters.detection_in(scan).is_some(),
             _ => false,
         }
-    }
-
-    #[inline(never)]
-    fn set_pose(&mut self, fix: &PoseFix) {
-        if !self.parameters.sources.given_pose {
-            return;
-        }
-        self.outputs.sources.given_pose.begin(fix.time);
-        if !fix.is_sound() {
-            self.outputs.misuse = Some(Misuse::NoPose);
-            return;
-        }
-        let is_past = self.timeline.begun().is_some_and(|timeline| fix.time < timeline.now());
-        // A pose of a time that has not come yet is no reason to refuse one of now.
-        if is_past && self.lost != Some(Reason::NoPose) && self.timeline.reaches(fix.time).is_err() {
-            self.outputs.misuse = Some(Misuse::TooLate);
-            return;
-        }
-        let pose = Pose { theta: wrap(fix.pose.theta), ..fix.pose };
-        let state = Ekf::new(pose, fix.position_deviation, fix.heading_deviation);
-        let replacement = self.replaced_by(fix);
-        self.integrity.restart(self.parameters.consistency, replacement.as_ref());
-        if self.parameters.protection {
-            self.separation.step(self.timeline.now(), self.timeline.odometry_pose());
-        }
-        self.timeline.begin(fix.time, state);
-        if self.parameters.protection {
-            let (now, state) = (self.timeline.now(), self.timeline.state());
-            self.separation.begin(now, &state.pose, &state.covariance_entries(), self.timeline.odometry_pose());
-            if matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge)) {
-                self.separation.doubt_mounting();
-            }
-        }
-        self.slam.begin(fix.time, &state, &self.parameters.slam);
-        if let Some(gyro) = &mut self.gyro {
-            gyro.begin_pose();
-        }
-        self.lost = None;
-        self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
-        if !is_past {
-            let standing = Coasting::new(Motion::none(fix.time));
-            self.outage = self.outage.map(|outage| Outage { coasting: standing, ..outage });
-        }
-        let since = self
-            .timeline
-            .motions(fix.time, self.timeline.now())
-            .fold(0.0, |distance, motion| distance + motion.distance);
-        self.distance = DistanceSince { fix: since, ..DistanceSince::NEVER };
-        self.maps.forget_found();
-        self.count_given_pose();
-    }
-
-    fn count_given_pose(&mut self) {
-        let Some(Estimate { pose, .. }) = self.estimate() else { return };
-        let last = &mut self.outputs.pose;
-        let is_first = last.mode == Mode::NotLocalised;
-        let distance = if is_first { 0.0 } else { libm::hypot(pose.x - last.pose.x, pose.y - last.pose.y) };
-        last.count_reset(distance);
-    }
-
-    /// Lets the check of redundant wheels take a motion, and what of it does not fit.
-    #[inline(never)]
-    fn compare_wheels(&mut self, found: &Result<(Motion, f64), OdometryError>) {
-        let check = &mut self.integrity.redundancy;
-        let Ok((motion, slip)) = found else { return check.clear() };
-        let Parameters { assumed, odometry_noise, .. } = &self.parameters;
-        let lasting = libm::hypot(assumed.scale, assumed.steering);
-        check.travel(motion, *slip, &WheelErrors { slip: odometry_noise.slip, lasting });
-    }
-
-    fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
-        self.outputs.misuse = match &motion {
-            Err(OdometryError::WrongVehicle) => Some(Misuse::WrongVehicle),
-            Err(OdometryError::OutOfOrder) => Some(Misuse::OutOfOrder),
-            _ => None,
-        };
-        let Some(start) = self.timeline.begun().map(Timeline::start) else {
-            return;
-        };
-        match &motion {
-            // A pose may be given for a time between two samples; only what follows it counts.
-            Ok(motion) if motion.end > start => {
-                self.outage = None;
-                self.repeated = 0;
-                // A motion is large: it is copied only where it changes.
-                let within = (motion.start < start).then(|| motion.split(start).1);
-                let motion = within.as_ref().unwrap_or(motion);
-                if self.parameters.maps.slam {
-                    let lever = self.parameters.vehicle.steering_lever();
-                    self.go_on(&motion.corrected(&self.slam.bias(), lever));
-                } else if self.gyro.is_some() {
-                    self.go_on_by_gyro(motion);
-                } else {
-                    self.go_on(motion);
-                }
-            }
-            Err(OdometryError::Implausible) => self.coast(time, Reason::OdometryImplausible),
-            Err(OdometryError::Pause) => self.coast(time, Reason::OdometrySilent),
-            // The first sample behind a fault: the next one says how the vehicle moves.
-            Err(OdometryError::First) => {
-                if let Some(outage) = self.outage {
-                    self.coast(time, outage.reason);
-                }
-            }
-            // What the odometry should say does not come.
-            Err(OdometryError::WrongVehicle) => self.bridge(time, time),
-            // Once it is a frame that was sent twice.
-            Err(OdometryError::OutOfOrder) => {
-                self.repeated = self.repeated.saturating_add(1);
-                if self.repeated >= MOST_REPEATED {
-                    self.doubt_odometry(Reason::OdometryImplausible, Time::default());
-                }
-            }
-            // Whoever gave that pose has a clock that is ahead: the vehicle has not been there yet.
-            Ok(motion) if start.since(motion.end) > LONGEST_LEAD => self.lost = Some(Reason::NoPose),
-            Ok(_) => {}
-        }
-    }
-
-    /// Goes on to `time`, at which something was seen, if that is too far ahead of an odometry that is silent. What the
-    /// odometry says later of the same time counts instead.
-    #[inline(never)]
-    fn bridge(&mut self, from: Time, time: Time) {
-        let limit = self.parameters.limits.longest_extrapolation;
-        let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_motion().end) > limit)
-        else {
-            return;
-        };
-        let now = timeline.now();
-        let Some(Outage { reason, since, .. }) = self.outage else {
-            self.doubt_odometry(Reason::OdometrySilent, time);
-            return;
-        };
-        // A laser whose clock has jumped looks the same, until the odometry speaks before the next revolution.
-        if from <= since {
-            return;
-        }
-        let mut coasting = self.doubt_odometry(reason, since);
-        // What was extrapolated has been assumed already.
-        let _ = coasting.to(now, &self.parameters.odometry_noise);
-        if time.since(now) <= LONGEST_BRIDGE
-            && let Some(motion) = coasting.to(time, &self.parameters.odometry_noise)
-        {
-            self.keep_up();
-            self.timeline.assume(&motion);
-        }
-    }
-
-    /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
-    fn doubt_odometry(&mut self, reason: Reason, since: Time) -> Coasting {
-        let recent = || Coasting::new(self.timeline.recent_motion(Coasting::SPAN));
-        let coasting = self.outage.map_or_else(recent, |outage| outage.coasting);
-        self.outage = Some(Outage { reason, coasting, since });
-        self.integrity.doubt_odometry();
-        coasting
-    }
-
-    pub(super) fn go_on(&mut self, motion: &Motion) {
-        self.distance.advance(motion.distance);
-        self.keep_up();
-        self.timeline.advance(motion);
-        if self.parameters.protection {
-            self.separation.travel(motion, self.timeline.odometry_pose());
-        }
-    }
-
-    /// Before a motion is forgotten that the filter with landmarks has not seen, as the laser is silent.
-    pub(super) fn keep_up(&mut self) {
-        if self.parameters.maps.slam
-            && self.lost.is_none()
-            && let Some(time) = self.timeline.oldest_after_next()
-            && time > self.slam.time()
-        {
-            self.slam.advance(time, &self.timeline, &self.parameters);
-        }
-    }
-
-    #[inline(never)]
-    fn doubt_encoders(&mut self, faults: &EncoderFaults) {
-        let reason = match (faults.drive, faults.steering) {
-            (Some(_), _) => Reason::DriveEncoder,
-            (None, Some(_)) => Reason::SteeringEncoder,
-            // Samples follow, and end the outage.
-            (None, None) => return,
-        };
-        // What the counters did meanwhile is not to be taken for a motion.
-        self.odometer.restart();
-        self.coast(faults.time, reason);
-    }
-
-    /// Goes on to `time` without the odometry.
-    fn coast(&mut self, time: Time, reason: Reason) {
-        if self.timeline.begun().is_none() {
-            return;
-        }
-        let mut coasting = self.doubt_odometry(reason, Time::default());
-        if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
-            if let Some(gyro) = &mut self.gyro {
-                gyro.forget_rest();
-            }
-            self.go_on(&motion);
-        }
-        self.outage = Some(Outage { reason, coasting, since: Time::default() });
     }
 
     /// Takes reflectors that a laser has found.

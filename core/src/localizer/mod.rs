@@ -7,6 +7,7 @@ mod contours;
 mod event;
 mod evidence;
 mod fusion;
+mod given_pose;
 mod gyro;
 mod horizon;
 mod lasers;
@@ -23,6 +24,7 @@ mod start_finder;
 mod start_odometry;
 mod start_search;
 mod supervisor;
+mod travel;
 
 pub use bounds::{ParameterError, bounds};
 pub use capacities::{

@@ -11,23 +11,16 @@ use crate::maps::{
 
 /// The fixed maps and the dynamic one.
 #[derive(Clone, Debug)]
-pub struct Maps<F, const DYNAMIC: usize> {
-    fixed: F,
+pub struct Maps<R, F, const DYNAMIC: usize> {
+    fixed: FixedMaps<R, F>,
     dynamic: DynamicMap<DYNAMIC>,
 }
 
-/// Fixed maps of which the localiser has a copy.
+/// The fixed map of reflectors, and that of natural features.
 #[derive(Clone, Debug)]
-pub struct OwnMaps<const REFLECTORS: usize, const FEATURES: usize> {
-    reflectors: FixedMap<REFLECTORS>,
-    features: FixedMap<FEATURES>,
-}
-
-/// Fixed maps that stay where they are kept.
-#[derive(Clone, Debug)]
-pub struct LentMaps<'m, const REFLECTORS: usize, const FEATURES: usize> {
-    reflectors: LentMap<'m, REFLECTORS>,
-    features: LentMap<'m, FEATURES>,
+pub struct FixedMaps<R, F> {
+    reflectors: R,
+    features: F,
 }
 
 /// What is compared with what is seen.
@@ -38,25 +31,22 @@ pub(crate) struct MapViews<'a> {
     pub dynamic: DynamicMapView<'a>,
 }
 
-/// The fixed map of reflectors, and that of natural features.
-pub trait FixedMaps: Clone + Debug {
+/// One fixed map.
+pub trait KeptLandmarks: Clone + Debug {
     /// Landmarks, at the most.
-    const LANDMARKS: usize;
+    const MOST: usize;
 
-    /// Empty maps.
+    /// An empty map.
     fn new() -> Self;
 
-    /// The reflectors.
-    fn reflectors(&self) -> MapView<'_>;
-
-    /// The natural features.
-    fn features(&self) -> MapView<'_>;
+    /// What it holds.
+    fn view(&self) -> MapView<'_>;
 }
 
 /// How a localiser has its fixed maps: [`Own`], or [`Lent`].
 pub trait MapKeeping: Clone + Debug {
-    /// Maps of so many reflectors and features.
-    type Maps<const REFLECTORS: usize, const FEATURES: usize>: FixedMaps;
+    /// A map of so many landmarks.
+    type Map<const LANDMARKS: usize>: KeptLandmarks;
 }
 
 /// The localiser has a copy of its map.
@@ -68,11 +58,11 @@ pub struct Own;
 pub struct Lent<'m>(PhantomData<&'m Landmark>);
 
 impl MapKeeping for Own {
-    type Maps<const REFLECTORS: usize, const FEATURES: usize> = OwnMaps<REFLECTORS, FEATURES>;
+    type Map<const LANDMARKS: usize> = FixedMap<LANDMARKS>;
 }
 
 impl<'m> MapKeeping for Lent<'m> {
-    type Maps<const REFLECTORS: usize, const FEATURES: usize> = LentMaps<'m, REFLECTORS, FEATURES>;
+    type Map<const LANDMARKS: usize> = LentMap<'m, LANDMARKS>;
 }
 
 /// [`Maps`] of any capacities.
@@ -130,60 +120,50 @@ fn is_reflector(landmark: &Landmark) -> bool {
     landmark.kind == LandmarkKind::Reflector
 }
 
-impl<const REFLECTORS: usize, const FEATURES: usize> FixedMaps for OwnMaps<REFLECTORS, FEATURES> {
-    const LANDMARKS: usize = REFLECTORS + FEATURES;
+impl<const LANDMARKS: usize> KeptLandmarks for FixedMap<LANDMARKS> {
+    const MOST: usize = LANDMARKS;
 
     #[inline(always)]
     fn new() -> Self {
-        Self { reflectors: FixedMap::new(), features: FixedMap::new() }
+        Self::new()
     }
 
     #[inline]
-    fn reflectors(&self) -> MapView<'_> {
-        self.reflectors.view()
-    }
-
-    #[inline]
-    fn features(&self) -> MapView<'_> {
-        self.features.view()
+    fn view(&self) -> MapView<'_> {
+        self.view()
     }
 }
 
-impl<const REFLECTORS: usize, const FEATURES: usize> FixedMaps for LentMaps<'_, REFLECTORS, FEATURES> {
-    const LANDMARKS: usize = REFLECTORS + FEATURES;
+impl<const LANDMARKS: usize> KeptLandmarks for LentMap<'_, LANDMARKS> {
+    const MOST: usize = LANDMARKS;
 
     #[inline(always)]
     fn new() -> Self {
-        Self { reflectors: LentMap::new(), features: LentMap::new() }
+        Self::new()
     }
 
     #[inline]
-    fn reflectors(&self) -> MapView<'_> {
-        self.reflectors.view()
-    }
-
-    #[inline]
-    fn features(&self) -> MapView<'_> {
-        self.features.view()
+    fn view(&self) -> MapView<'_> {
+        self.view()
     }
 }
 
-impl<F: FixedMaps, const DYNAMIC: usize> LandmarkMaps for Maps<F, DYNAMIC> {
-    const FIXED: usize = F::LANDMARKS;
+impl<R: KeptLandmarks, F: KeptLandmarks, const DYNAMIC: usize> LandmarkMaps for Maps<R, F, DYNAMIC> {
+    const FIXED: usize = R::MOST + F::MOST;
 
     #[inline(always)]
     fn new(dynamic: DynamicMapParameters) -> Self {
-        Self { fixed: F::new(), dynamic: DynamicMap::new(dynamic) }
+        Self { fixed: FixedMaps { reflectors: R::new(), features: F::new() }, dynamic: DynamicMap::new(dynamic) }
     }
 
     #[inline]
     fn reflectors(&self) -> MapView<'_> {
-        self.fixed.reflectors()
+        self.fixed.reflectors.view()
     }
 
     #[inline]
     fn features(&self) -> MapView<'_> {
-        self.fixed.features()
+        self.fixed.features.view()
     }
 
     #[inline]
@@ -212,7 +192,7 @@ impl<F: FixedMaps, const DYNAMIC: usize> LandmarkMaps for Maps<F, DYNAMIC> {
 }
 
 impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> AddLandmarks
-    for Maps<OwnMaps<REFLECTORS, FEATURES>, DYNAMIC>
+    for Maps<FixedMap<REFLECTORS>, FixedMap<FEATURES>, DYNAMIC>
 {
     fn add(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
         // Runs of one kind, so that each map is indexed once for a list that is sorted by kind.
@@ -246,7 +226,7 @@ impl<const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> AddLa
 }
 
 impl<'m, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> LendLandmarks<'m>
-    for Maps<LentMaps<'m, REFLECTORS, FEATURES>, DYNAMIC>
+    for Maps<LentMap<'m, REFLECTORS>, LentMap<'m, FEATURES>, DYNAMIC>
 {
     fn lend(&mut self, landmarks: &'m [Landmark]) -> Result<(), LendError> {
         let count = landmarks.iter().take_while(|landmark| is_reflector(landmark)).count();
@@ -254,7 +234,7 @@ impl<'m, const REFLECTORS: usize, const FEATURES: usize, const DYNAMIC: usize> L
         if features.iter().any(is_reflector) {
             return Err(LendError::Order);
         }
-        let mut lent = LentMaps::new();
+        let mut lent = FixedMaps { reflectors: LentMap::new(), features: LentMap::new() };
         lent.reflectors.lend(reflectors)?;
         lent.features.lend(features)?;
         self.fixed = lent;

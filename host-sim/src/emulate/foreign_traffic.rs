@@ -59,6 +59,18 @@ impl ForeignTraffic {
         Frame::new(id, data.get(..length).unwrap_or(&data)).unwrap_or(Frame::of(id, data))
     }
 
+    /// A command for another node, or what is no command for an own one.
+    fn command(&mut self) -> Frame {
+        let command = self.one_of(&[0x01, 0x02, 0x80, 0x81, 0x82]) as u8;
+        let (_, own) = self.own_identifier();
+        let data = match self.below(3) {
+            0 => [command, self.other() as u8],
+            1 => [command, 0x80 | own as u8],
+            _ => [0x03, own as u8],
+        };
+        Frame::of(standard_id(0), data)
+    }
+
     /// The next frame.
     pub fn next_frame(&mut self) -> Frame {
         // Lengths that messages of the own nodes have, and any.
@@ -95,17 +107,7 @@ impl ForeignTraffic {
                 let id = standard_id(group | node);
                 Frame::remote(id, length).unwrap_or(Frame::of(id, []))
             }
-            4 => {
-                // Commands for other nodes, and what is no command for an own one.
-                let command = self.one_of(&[0x01, 0x02, 0x80, 0x81, 0x82]) as u8;
-                let (_, own) = self.own_identifier();
-                let data = match self.below(3) {
-                    0 => [command, self.other() as u8],
-                    1 => [command, 0x80 | own as u8],
-                    _ => [0x03, own as u8],
-                };
-                Frame::of(standard_id(0), data)
-            }
+            4 => self.command(),
             5 => {
                 // Heartbeats and boot-up messages of other nodes.
                 let state = self.one_of(&[0x00, 0x04, 0x05, 0x7F]) as u8;

@@ -115,13 +115,29 @@ impl Judge {
         });
         let judged = claim.zip(moment.truth).map(|((pose, _), truth)| (Errors::of(&pose.pose, &truth), pose.level));
         let is_available = judged.is_some_and(|(_, level)| self.limits.travel.holds(&level));
-        if judged.is_some() && outcome.first_claim.is_none() {
+        self.count_availability(moment, judged.map(|(_, level)| level), is_available, time);
+        self.count_alarm(moment);
+        let share = judged.map(|(errors, level)| self.count_claim(moment, &errors, &level));
+        let is_right = is_available && share.is_some_and(|share| share <= 1.0);
+        self.right_since = if is_right { self.right_since.or(Some(time)) } else { None };
+        let hazards = [self.limits.travel, self.limits.docking].map(|limit| {
+            !moment.is_hidden && judged.is_some_and(|(errors, level)| errors.exceed(&limit) && limit.holds(&level))
+        });
+        for (event, is_hazardous) in self.events.iter_mut().zip(hazards) {
+            follow(event, is_hazardous, time, moment.driven, &mut self.outcome);
+        }
+    }
+
+    /// Counts whether there is a claim, by the level that stands beside it, that a vehicle can use.
+    fn count_availability(&mut self, moment: &Moment, level: Option<ProtectionLevel>, is_available: bool, time: f64) {
+        let outcome = &mut self.outcome;
+        if level.is_some() && outcome.first_claim.is_none() {
             outcome.first_claim = Some(outcome.outputs - 1);
         }
         if outcome.first_claim.is_some() {
             outcome.judged += 1;
             outcome.available += u64::from(is_available);
-            let is_within = judged.is_some_and(|(_, level)| self.limits.docking.holds(&level));
+            let is_within = level.is_some_and(|level| self.limits.docking.holds(&level));
             outcome.within_docking += u64::from(is_within);
             outcome.docking += u64::from(moment.docks);
             outcome.docking_available += u64::from(moment.docks && is_within);
@@ -131,6 +147,11 @@ impl Judge {
             self.last_loss = Some(time);
         }
         self.was_available = is_available;
+    }
+
+    /// Counts what a check says, and how soon it is said once a fault has begun.
+    fn count_alarm(&mut self, moment: &Moment) {
+        let outcome = &mut self.outcome;
         let said = moment.heard.and_then(|(pose, _)| said_by(pose));
         if let Some(check) = said.filter(|check| outcome.first_claim.is_some() && self.said != Some(check)) {
             *outcome.alarms.entry(check.to_owned()).or_default() += 1;
@@ -145,29 +166,23 @@ impl Judge {
             });
             self.begun = (self.begun.0 + STEP, self.begun.1 + moment.driven);
         }
-        let mut hazards = [false; 2];
-        let mut is_right = false;
-        if let Some((errors, level)) = judged {
-            outcome.claims += 1;
-            if moment.is_nominal {
-                outcome.add_nominal(&level);
-            }
-            outcome.add_to_stanford(level.position, errors.position);
-            let share = errors.over(&level);
-            outcome.most_over_level = outcome.most_over_level.max(share.min(MOST_OVER));
-            outcome.misleading += u64::from(share > 1.0);
-            hazards =
-                [self.limits.travel, self.limits.docking].map(|limit| errors.exceed(&limit) && limit.holds(&level));
-            if moment.is_hidden {
-                outcome.hidden_hazardous += u64::from(hazards.contains(&true));
-                hazards = [false; 2];
-            }
-            is_right = share <= 1.0 && is_available;
+    }
+
+    /// Counts a claim, and returns its error over its level.
+    fn count_claim(&mut self, moment: &Moment, errors: &Errors, level: &ProtectionLevel) -> f64 {
+        let outcome = &mut self.outcome;
+        outcome.claims += 1;
+        if moment.is_nominal {
+            outcome.add_nominal(level);
         }
-        self.right_since = if is_right { self.right_since.or(Some(time)) } else { None };
-        for (event, is_hazardous) in self.events.iter_mut().zip(hazards) {
-            follow(event, is_hazardous, time, moment.driven, &mut self.outcome);
-        }
+        outcome.add_to_stanford(level.position, errors.position);
+        let share = errors.over(level);
+        outcome.most_over_level = outcome.most_over_level.max(share.min(MOST_OVER));
+        outcome.misleading += u64::from(share > 1.0);
+        let is_hazardous = |limit: AlertLimit| errors.exceed(&limit) && limit.holds(level);
+        let is_hidden = moment.is_hidden && [self.limits.travel, self.limits.docking].into_iter().any(is_hazardous);
+        outcome.hidden_hazardous += u64::from(is_hidden);
+        share
     }
 
     /// What became of the run.

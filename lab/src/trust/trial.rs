@@ -1,6 +1,6 @@
 //! One run: a hall and a drive that are drawn, a fault of one size, and the judge at the bus.
 
-use agv_core::geometry::Pose;
+use agv_core::geometry::{Point, Pose};
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::Parameters;
 use agv_host_sim::simulate::random::{Random, Stream};
@@ -88,42 +88,31 @@ impl Trial<'_> {
         let begins = drawn.iter().filter(|(_, drawn)| *drawn != Drawn::Nothing).map(|(from, _)| *from);
         let begins = begins.fold(f64::INFINITY, f64::min);
         let mut judge = Judge::new(AlertLimits::default());
-        let mut before = None;
+        let mut here = None;
         let mut hidden: Vec<Revealed> = self.kinds().filter_map(|(kind, _)| kind.revealed).collect();
         let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
         let options = RigOptions { seconds, seed: self.seed, is_told };
         rig::drive(&recording, &faults, &options, |heard| {
-            let here = (heard.truth)(heard.now);
-            let driven = before.zip(here).map_or(0.0, |(before, here): (Pose, Pose)| {
-                let step = before.between(&here).position().norm();
-                // A vehicle that is carried does not drive.
-                if step > CARRIED { 0.0 } else { step }
-            });
-            before = here.or(before);
+            let before = here;
+            here = (heard.truth)(heard.now).or(before);
             hidden.retain(|by| !sight.reveals(*by, heard.time));
-            let [least, most] = bare;
-            let is_bare =
-                before.is_some_and(|here| (least.x..=most.x).contains(&here.x) && (least.y..=most.y).contains(&here.y));
             judge.hear(&Moment {
                 now: heard.now,
                 heard: heard.published,
                 truth: heard.published.and_then(|(_, stated)| (heard.truth)(stated)),
-                driven,
+                driven: before.zip(here).map_or(0.0, |(before, here)| driven(&before, &here)),
                 docks: sight.docks(heard.time),
                 is_nominal: sight.is_nominal(heard.time),
-                is_bare,
+                is_bare: here.is_some_and(|here| is_within(&bare, &here)),
                 has_begun: heard.time >= begins,
                 is_hidden: !hidden.is_empty(),
             });
         })?;
-        let mut ends = faults.iter().filter_map(|fault| fault.until);
+        let ends = |fault: &&Fault| fault.until.is_some_and(|until| sight.can_recover(until));
+        // Of two faults both must end.
         let can_recover = match self.with {
-            None => ends.any(|until| sight.can_recover(until)),
-            // Of two faults both must end.
-            Some(_) => {
-                faults.len() == drawn.len()
-                    && faults.iter().all(|fault| fault.until.is_some_and(|until| sight.can_recover(until)))
-            }
+            None => faults.iter().any(ends),
+            Some(_) => faults.len() == drawn.len() && faults.iter().all(ends),
         };
         Ok(Tried { outcome: judge.outcome(), is_accepted, can_recover })
     }
@@ -131,6 +120,17 @@ impl Trial<'_> {
 
 /// A vehicle that is further away after a hundredth of a second, m, was carried.
 const CARRIED: f64 = 0.1;
+
+/// How far a vehicle has driven from one pose to the next, m. One that is carried does not drive.
+fn driven(before: &Pose, here: &Pose) -> f64 {
+    let step = before.between(here).position().norm();
+    if step > CARRIED { 0.0 } else { step }
+}
+
+/// Whether a pose is in the rectangle between these corners.
+fn is_within([least, most]: &[Point; 2], here: &Pose) -> bool {
+    (least.x..=most.x).contains(&here.x) && (least.y..=most.y).contains(&here.y)
+}
 
 /// When a drive ends, and when it stands in between.
 struct Timetable {

@@ -75,6 +75,18 @@ impl Faces<'_> {
         self.end_of_line(index, range, &line, extent, background)
     }
 
+    /// Covariance of an end point, m^2, of a unit vector along the beam and one along the face, each with its variance, m^2.
+    #[inline(always)]
+    fn covariance(&self, beam: (ScanPoint, f32), face: (ScanPoint, f32)) -> [f32; 3] {
+        let ((ray, along_beam), (outwards, along_face)) = (beam, face);
+        let floor = self.parameters.deviation_floor * self.parameters.deviation_floor;
+        [
+            along_beam * ray.x * ray.x + along_face * outwards.x * outwards.x + floor,
+            along_beam * ray.x * ray.y + along_face * outwards.x * outwards.y,
+            along_beam * ray.y * ray.y + along_face * outwards.y * outwards.y + floor,
+        ]
+    }
+
     /// The same, if the face lies along a line and goes on for `extent` (m), and some beams on something is seen behind it.
     fn end_of_line(
         &self,
@@ -121,14 +133,7 @@ impl Faces<'_> {
 
         let across = line.variance_at(relative, ray, parameters.range_deviation * parameters.range_deviation);
         // An error across the line moves the foot along the beam.
-        let along_beam = across / (slant * slant);
-        let along_face = gap * gap / 12.0;
-        let floor = parameters.deviation_floor * parameters.deviation_floor;
-        let covariance = [
-            along_beam * ray.x * ray.x + along_face * outwards.x * outwards.x + floor,
-            along_beam * ray.x * ray.y + along_face * outwards.x * outwards.y,
-            along_beam * ray.y * ray.y + along_face * outwards.y * outwards.y + floor,
-        ];
+        let covariance = self.covariance((ray, across / (slant * slant)), (outwards, gap * gap / 12.0));
         if largest_variance(covariance) > wanted.spacing * wanted.spacing {
             return None;
         }

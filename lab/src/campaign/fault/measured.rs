@@ -215,22 +215,27 @@ impl Fault {
             }
             FaultKind::SunShines { towards_deg, half_width_deg } => {
                 let sensor = seen.first().and_then(|first| laser.sensor(first.time));
-                let Some(sensor) = sensor.filter(|_| half_width_deg > 0.0) else { return };
-                let middle = towards_deg - sensor.theta.to_degrees();
-                let (from, to) = (middle - half_width_deg, middle + half_width_deg);
-                let false_one = (wrap(random.between(from, to).to_radians()), random.between(2.0, 25.0));
-                // The sun does not take the last one, which tells the time of the revolution.
-                let mut last = seen.last().copied();
-                seen.retain(|observation| !is_behind(f64::from(observation.bearing).to_degrees(), from, to));
-                if let Some(last) = last.take_if(|_| seen.is_empty()) {
-                    seen.push(last);
+                if let Some(sensor) = sensor.filter(|_| half_width_deg > 0.0) {
+                    dazzle(seen, towards_deg - sensor.theta.to_degrees(), half_width_deg, random);
                 }
-                add(seen, false_one.0, false_one.1);
             }
             _ => {}
         }
         seen.sort_by_key(|observation| observation.time);
     }
+}
+
+/// The sun in a direction, deg: reflectors within so much to either side are not seen, and a false one is.
+fn dazzle(seen: &mut Vec<ReflectorObservation>, middle: f64, half_width_deg: f64, random: &mut Random) {
+    let (from, to) = (middle - half_width_deg, middle + half_width_deg);
+    let false_one = (wrap(random.between(from, to).to_radians()), random.between(2.0, 25.0));
+    // The sun does not take the last one, which tells the time of the revolution.
+    let mut last = seen.last().copied();
+    seen.retain(|observation| !is_behind(f64::from(observation.bearing).to_degrees(), from, to));
+    if let Some(last) = last.take_if(|_| seen.is_empty()) {
+        seen.push(last);
+    }
+    add(seen, false_one.0, false_one.1);
 }
 
 /// Images of reflectors behind a mirror at a distance, m, in a direction, deg, as far as they can be seen, m in S.
