@@ -99,6 +99,26 @@ fn noise_of_reflectors_alone_is_that_of_the_sensor() {
 }
 
 #[test]
+fn a_vehicle_whose_noise_is_measured_is_accepted() {
+    let files = Files::new();
+    let mut scenario = Scenario::parse(HALL).unwrap();
+    scenario.laser.scans = false;
+    let drive = files.path("drive.agvlog");
+    log::write(Path::new(&drive), &simulate(&scenario).unwrap().recording).unwrap();
+    let (measured, _) = measured(&files, &drive, &["reflectors"]);
+    let log = files.path("vehicle.agvlog");
+    agv_tests::busy_board::drive(&log::read(Path::new(&measured)).unwrap().0, Path::new(&log));
+    let ten = format!("along_mm,across_mm,heading_deg\n{}", "1,2,0.01\n".repeat(10));
+    let halts = files.write("halts.csv", ten.as_bytes());
+    let (code, result) = json(&["accept", &log, "--halts", &halts, "--json"]);
+    assert_eq!((code, verdict(&result, "the same bits")), (Some(0), "pass"), "{result}");
+    // Settings that the vehicle did not have: its outputs are no witness.
+    let other = ["accept", &log, "--halts", &halts, "--set", "odometry.slip=0.004", "--json"];
+    let (code, result) = json(&other);
+    assert_eq!((code, verdict(&result, "the same bits")), (Some(4), "not_measured"), "{result}");
+}
+
+#[test]
 fn noise_in_the_car_park_is_measured() {
     let Some(folder) = recordings("noise_in_the_car_park_is_measured", "carpark") else { return };
     let (_, recording, _) = carpark::run(&folder, carpark::Noise::Nominal, carpark::Knowledge::Map).unwrap();

@@ -1,6 +1,7 @@
 //! What the tests of several crates need: recordings of others, programs of others, the images of the boards, and a word
 //! about every test for which one of them is missing.
 
+pub mod busy_board;
 mod programs;
 mod skip;
 
