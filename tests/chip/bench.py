@@ -8,6 +8,7 @@ from emulated_chip.clock import MILLISECOND
 from emulated_chip.description import Description
 from emulated_chip.flash import Flash
 from emulated_chip.image import Image
+from unicorn import UC_HOOK_CODE
 
 # Longest start that a check waits for: flash that has to be erased, twice.
 LONGEST_START = 9_000 * MILLISECOND
@@ -81,13 +82,26 @@ def emergencies(chip, since=0):
 PAINT = 0xC0DE_57AC.to_bytes(4, "little")
 
 
-def deepest_stack(chip):
-    """Bytes of the stack that were used since the program's loop began."""
+def stack_of(chip):
+    """The stack above its guard: where it begins, and its bytes."""
     top, end, guard = (chip.image.address(name) for name in ("_stack_start", "_stack_end", "_stack_guard"))
-    ram = chip.ram_at(end)
-    stack = ram.bytes(end + guard, top - end - guard)
+    return end + guard, top - end - guard
+
+
+def deepest_stack(chip):
+    """Bytes of the stack that were used since the program painted it; all of them before it has."""
+    begin, size = stack_of(chip)
+    stack = chip.ram_at(begin).bytes(begin, size)
     unused = next((place for place in range(0, len(stack), 4) if stack[place : place + 4] != PAINT), len(stack))
     return len(stack) - unused
+
+
+def note_depths(chip):
+    """A list that grows by the deepest stack until then whenever the program begins to paint it."""
+    place, depths = chip.image.find("stack5paint"), []
+    note = lambda *_: depths.append(deepest_stack(chip))
+    chip.processor.engine.hook_add(UC_HOOK_CODE, note, begin=place, end=place)
+    return depths
 
 
 def describe(chip):

@@ -1,6 +1,6 @@
 """From reset to the loop."""
 
-from bench import check_sound, describe, poses
+from bench import check_sound, describe, note_depths, poses, stack_of
 from emulated_chip.clock import MILLISECOND
 from emulated_chip.system_control import DATA_CACHE_ON, INSTRUCTION_CACHE_ON, CCR
 
@@ -10,17 +10,29 @@ LONGEST_START = 200 * MILLISECOND
 TARGET_7 = 0x8108
 
 
+# Share of the stack that the start may take.
+MOST_OF_STACK = 0.9
+
+
 def boot(bench, **options):
-    chip = bench.chip(**options)
+    return to_the_loop(bench.chip(**options))
+
+
+def to_the_loop(chip):
     chip.run_for(LONGEST_START, stop=lambda: chip.sleeps > 0)
     return chip
 
 
 def boots(bench):
     """The image comes to its loop, which sleeps, without a fault and without touching what has no clock."""
-    chip = boot(bench)
+    chip = bench.chip()
+    depths = note_depths(chip)
+    to_the_loop(chip)
     assert chip.sleeps > 0, describe(chip)
     check_sound(chip)
+    # Painted when the program begins, and when its large values are built.
+    assert len(depths) == 2 and 1000 < depths[1] <= MOST_OF_STACK * stack_of(chip)[1], depths
+    bench.note("stack_at_start", depths[1])
     bench.note("start_ms", chip.clock.now() / MILLISECOND)
     chip.run_for(100 * MILLISECOND)
     bench.note("first_pose_ms", poses(chip)[0] / MILLISECOND)
