@@ -26,8 +26,8 @@ pub const MOTIONS: usize = 16;
 /// What was wrong when the controller started, told once on the bus in the codes of CiA 301, table 26.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Troubles {
-    /// A part of the board does not work (5000h).
-    pub is_board_damaged: bool,
+    /// Parts of the board that do not work (5000h), a bit for each: 0 for the Ethernet, 1 for the clock, 2 for the option bytes.
+    pub damaged_parts: u8,
     /// The program ended by itself the last time (6100h).
     pub has_panicked: bool,
     /// Not everything that was set was found (6300h).
@@ -35,10 +35,11 @@ pub struct Troubles {
 }
 
 impl Troubles {
-    fn kinds(self) -> impl Iterator<Item = ErrorKind> {
-        let board = self.is_board_damaged.then_some(ErrorKind::Board);
-        let panicked = self.has_panicked.then_some(ErrorKind::Panicked);
-        let settings = self.are_settings_lost.then_some(ErrorKind::SettingsLost);
+    /// Kinds of errors, each with its parts.
+    fn kinds(self) -> impl Iterator<Item = (ErrorKind, u8)> {
+        let board = (self.damaged_parts != 0).then_some((ErrorKind::Board, self.damaged_parts));
+        let panicked = self.has_panicked.then_some((ErrorKind::Panicked, 0));
+        let settings = self.are_settings_lost.then_some((ErrorKind::SettingsLost, 0));
         board.into_iter().chain(panicked).chain(settings)
     }
 }
@@ -98,7 +99,7 @@ impl Bus {
             ..NodeSettings::new(nodes.controller)
         };
         let mut node = ControllerNode::new(node, start);
-        troubles.kinds().for_each(|kind| node.report(kind, start));
+        troubles.kinds().for_each(|(kind, parts)| node.report_of(kind, parts, start));
         Self {
             nodes,
             encoders: Encoders::new(&nodes, &settings.parameters, start),

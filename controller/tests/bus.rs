@@ -291,3 +291,18 @@ fn settings_are_changed_over_the_bus_if_that_is_permitted() {
     assert_eq!((changed.nodes.encoders[0].node, changed.bit_rate, changed.parameters.maps.slam), (9, 500, true));
     assert_eq!(changed.network.address, [192, 168, 1, 20]);
 }
+
+#[test]
+fn what_of_the_board_does_not_work_is_told_by_its_bit() {
+    let troubles = Troubles { damaged_parts: 0b100, ..Troubles::default() };
+    let mut bus = Bus::new(&Settings::default(), "test", troubles, at(0));
+    let mut told = Vec::new();
+    for now in 0..100 {
+        bus.poll(at(now), LaserHealth::Sound, |output| match output {
+            BusOutput::Send(frame) if frame.id() == standard_id(0x90) => told.push(frame),
+            _ => {}
+        });
+    }
+    let [emergency] = told.as_slice() else { panic!("{told:?}") };
+    assert_eq!(emergency.data(), [0x00, 0x50, 0x01, 0b100, 0, 0, 0, 0]);
+}

@@ -210,7 +210,7 @@ fn start() -> Vehicle {
     exchange::publish(localization.localization.estimate());
     let troubles = Troubles {
         has_panicked: !failure.is_empty(),
-        is_board_damaged: troubles.are_there(),
+        damaged_parts: troubles.parts(),
         are_settings_lost: !exchange::are_settings_sound(),
     };
     let can = Current::take_part(can, settings.bit_rate);

@@ -112,16 +112,19 @@ pub struct Troubles {
     pub has_ethernet: bool,
     /// The clock is that of a crystal.
     pub has_crystal: bool,
+    /// The option bytes of the chip are as the vehicle needs them.
+    pub are_options_right: bool,
 }
 
 impl Troubles {
     /// All of it.
-    pub const NONE: Self = Self { has_ethernet: true, has_crystal: true };
+    pub const NONE: Self = Self { has_ethernet: true, has_crystal: true, are_options_right: true };
 
-    /// Whether anything does not work.
+    /// What does not work, as the bus tells it: a bit for each part.
     #[must_use]
-    pub fn are_there(&self) -> bool {
-        *self != Self::NONE
+    pub fn parts(&self) -> u8 {
+        let Self { has_ethernet, has_crystal, are_options_right } = *self;
+        u8::from(!has_ethernet) | u8::from(!has_crystal) << 1 | u8::from(!are_options_right) << 2
     }
 }
 

@@ -7,7 +7,12 @@ HARDWARE = 0x5000
 TOLD_WITHIN = 200 * MILLISECOND
 
 
-def lives_with(bench, change, is_told=True):
+# Bits of the first detail byte.
+ETHERNET, OPTION_BYTES = 0x01, 0x04
+
+
+def lives_with(bench, change, parts):
+    """Poses go on with what `change` does to the chip, and these parts are told; none if it is 0."""
     chip = bench.chip()
     change(chip)
     chip.run_for(2 * SECOND, stop=lambda: chip.sleeps > 0)
@@ -18,12 +23,10 @@ def lives_with(bench, change, is_told=True):
     check_sound(chip)
     gap = longest_gap(poses(chip, begin), begin, chip.clock.now())
     assert gap <= 20 * MILLISECOND, f"no pose for {gap / 1e6:.1f} ms"
-    told = [time for time, frame in chip.listener.of(0x90) if frame.data[:2] == HARDWARE.to_bytes(2, "little")]
-    if is_told:
-        assert told and told[0] <= begin + TOLD_WITHIN, f"emergencies: {emergencies(chip)}"
-    else:
-        assert not told, f"emergencies: {emergencies(chip)}"
-    return chip
+    code = HARDWARE.to_bytes(2, "little")
+    told = [(time, frame.data[3]) for time, frame in chip.listener.of(0x90) if frame.data[:2] == code]
+    assert [found for _, found in told] == ([parts] if parts else []), f"emergencies: {emergencies(chip)}"
+    assert all(time <= begin + TOLD_WITHIN for time, _ in told), told
 
 
 def lives_without_a_phy(bench):
@@ -32,7 +35,7 @@ def lives_without_a_phy(bench):
     def change(chip):
         chip.phy.is_there = False
 
-    lives_with(bench, change)
+    lives_with(bench, change, ETHERNET)
 
 
 def lives_without_a_reference_clock(bench):
@@ -41,7 +44,7 @@ def lives_without_a_reference_clock(bench):
     def change(chip):
         chip.phy.has_clock = False
 
-    lives_with(bench, change)
+    lives_with(bench, change, ETHERNET)
 
 
 def lives_without_a_cable(bench):
@@ -50,7 +53,23 @@ def lives_without_a_cable(bench):
     def change(chip):
         chip.phy.has_cable = False
 
-    lives_with(bench, change, is_told=False)
+    lives_with(bench, change, 0)
+
+
+def tells_of_option_bytes(bench):
+    """The brown-out reset is off, as at the factory; or the banks of flash are exchanged, where there are two."""
+
+    def without_brown_out(chip):
+        chip.peripherals["FLASH"].put("OPTSR_CUR", "BOR_LEV", 0)
+
+    lives_with(bench, without_brown_out, OPTION_BYTES)
+    if bench.has_one_bank():
+        return
+
+    def exchanged(chip):
+        chip.peripherals["FLASH"].put("OPTSR_CUR", "SWAP_BANK_OPT", 1)
+
+    lives_with(bench, exchanged, OPTION_BYTES)
 
 
 def only_listens_without_a_crystal(bench):
@@ -71,5 +90,6 @@ CHECKS = [
     lives_without_a_phy,
     lives_without_a_reference_clock,
     lives_without_a_cable,
+    tells_of_option_bytes,
     only_listens_without_a_crystal,
 ]

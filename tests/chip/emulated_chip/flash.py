@@ -163,6 +163,10 @@ class Bank:
         self.interface.words[register.offset] = self.interface.words.get(register.offset, 0) & ~word
 
 
+# FLASH_OPTSR_CUR as the factory leaves it, but with the brown-out reset at level 3, as the first power-up has it set.
+OPTIONS = 0x0006_AAFC
+
+
 class FlashInterface(RegisterFile):
     def __init__(self, chip, banks):
         super().__init__(chip, "flash")
@@ -179,7 +183,7 @@ class FlashInterface(RegisterFile):
     def reset(self):
         super().reset()
         self.set("ACR", 0x37)
-        self.set("OPTSR_CUR", 0x0006_AAF0)
+        self.set("OPTSR_CUR", OPTIONS)
         for bank in self.banks:
             bank.reset()
             self.set(bank.name("CR"), 0x30)

@@ -10,6 +10,7 @@ mod ethernet;
 mod faults;
 mod flash;
 mod memory_protection;
+mod option_bytes;
 mod random;
 mod restart_cause;
 mod unused_clocks;
@@ -145,7 +146,11 @@ impl<C: Chip> Board for Nucleo<C> {
         };
         let ethernet = Ethernet::start(queue, wires);
         let flash = SettingsFlash::open(peripherals.FLASH);
-        let troubles = Troubles { has_ethernet: ethernet.is_alive(), has_crystal: source.has_crystal() };
+        let troubles = Troubles {
+            has_ethernet: ethernet.is_alive(),
+            has_crystal: source.has_crystal(),
+            are_options_right: option_bytes::are_right(),
+        };
         Parts { can, ethernet, flash, watchdog, restart_cause, troubles }
     }
 

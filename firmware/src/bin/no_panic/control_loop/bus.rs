@@ -23,8 +23,7 @@ pub struct Bus {
 impl Bus {
     pub fn new() -> Self {
         let settings: Settings = any(Settings::default());
-        let troubles =
-            Troubles { is_board_damaged: any(false), has_panicked: any(false), are_settings_lost: any(false) };
+        let troubles = Troubles { damaged_parts: any(0), has_panicked: any(false), are_settings_lost: any(false) };
         Self {
             bus: ControllerBus::new(&settings, "no_panic", troubles, any(Time::default())),
             settings,
