@@ -1,11 +1,10 @@
 //! Finding the pose of a vehicle that is switched on in a kept map of contours, in slices.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::{KeptMap, KeptPoint, PlaceAnswer, PlaceProgress, PlaceSearch, SurfacePoint, TILE, Tile};
-use agv_core::geometry::{Point, Pose};
+use agv_core::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch};
+use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Mode, Parameters, PoseFix, StartSearch};
 use agv_core::maps::FixedMap;
 use agv_core::measurement::{LaserId, PoseIncrement, Scan, Time};
@@ -14,28 +13,17 @@ use agv_core::sensing::PointScan;
 use agv_core::sources::Places;
 use agv_core::state::Relocalization;
 
-use super::support::walls::{Noise, Walls, corridor, range, room, surfaces};
+use super::support::kept_map::kept_map;
+use super::support::walls::{Noise, Walls, corridor, range, room};
 
 const BEAMS: usize = 720;
 const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
 
 type Search = PlaceSearch<400, 4096, 16_384>;
 
-/// A map of walls. It stays in memory as long as the test runs.
+/// A map of walls where they are.
 fn map(walls: &Walls) -> KeptMap<'static> {
-    let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
-    for (position, normal) in surfaces(walls, 0.1) {
-        let place = Tile::place_of(position.x, position.y).unwrap();
-        let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
-        let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
-        by_tile.entry(place).or_default().push(KeptPoint::of(&point));
-    }
-    let (mut tiles, mut points) = (Vec::new(), Vec::new());
-    for (place, found) in by_tile {
-        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
-        points.extend(found);
-    }
-    KeptMap::new(tiles.leak(), points.leak()).unwrap()
+    kept_map(walls, &Pose::default())
 }
 
 fn ranges(walls: &Walls, laser: &Pose, noise: &mut Noise) -> Vec<f32> {
