@@ -123,6 +123,40 @@ fn without_a_map_or_surfaces_nothing_is_found() {
     assert_eq!(answer(&mut Box::default(), &nothing, &map(&room()), &place, 3000).0, PlaceAnswer::TooFew);
 }
 
+/// Two walls 16 m apart whose ends are out of sight, and boxes of 1 m between them, of which one was moved along by so much.
+fn boxes(places: &[(f64, f64)], moved: f64) -> Walls {
+    let mut walls = vec![[-80.0, -8.0, 80.0, -8.0], [-80.0, 8.0, 80.0, 8.0]];
+    for (number, (x, y)) in places.iter().enumerate() {
+        let x = if number == 0 { x + moved } else { *x };
+        let corners = [[x, *y], [x + 1.0, *y], [x + 1.0, y + 1.0], [x, y + 1.0]];
+        let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+        walls.extend(sides.map(|([ax, ay], [bx, by])| [*ax, *ay, *bx, *by]));
+    }
+    walls
+}
+
+/// The nearest box shows most, and all but it stand where they stood.
+#[test]
+fn one_thing_that_was_moved_does_not_take_the_place_along() {
+    let places = [(2.5, -0.5), (-6.0, 3.0), (-5.0, -5.5), (7.0, 4.0), (8.5, -4.5)];
+    let map = map(&boxes(&places, 0.0));
+    for moved in [-0.45, -0.2, 0.15, 0.4] {
+        let truth = Pose::new(0.0, 0.2, 0.3);
+        let (found, _) = answer(&mut Box::default(), &boxes(&places, moved), &map, &truth, 3000);
+        assert!(matches!(found, PlaceAnswer::Found(fix) if is_near(&fix.pose, &truth)), "{moved}: {found:?}");
+    }
+}
+
+#[test]
+fn between_two_things_of_which_one_was_moved_no_place_is_told() {
+    let places = [(2.5, -0.5), (-6.0, 3.0)];
+    let map = map(&boxes(&places, 0.0));
+    for moved in [-0.4, -0.2, 0.2, 0.4] {
+        let (found, _) = answer(&mut Box::default(), &boxes(&places, moved), &map, &Pose::new(0.0, 0.2, 0.3), 3000);
+        assert!(!matches!(found, PlaceAnswer::Found(_)), "{moved}: {found:?}");
+    }
+}
+
 /// What a controller does: events, and slices of the search in between.
 struct Switched {
     search: Box<StartSearch<Places<'static, 400, 4096>>>,
