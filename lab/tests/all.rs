@@ -6,6 +6,7 @@ mod contour_starts;
 mod event_fuzz;
 mod faults;
 mod features;
+mod loops;
 mod slip;
 mod tape;
 mod trust;
