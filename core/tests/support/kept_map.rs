@@ -1,4 +1,5 @@
 //! Kept maps of contours of known walls.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::BTreeMap;
 
