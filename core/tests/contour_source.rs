@@ -1,10 +1,9 @@
 //! The vehicle's own filter in a kept map of contours: a simulated drive whose truth is kept apart.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::{KeptMap, KeptPoint, SurfacePoint, TILE, Tile};
+use agv_core::contours::KeptMap;
 use agv_core::geometry::{Point, Pose, difference};
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, PoseOutput, SlamSlots};
 use agv_core::maps::Landmark;
@@ -12,7 +11,8 @@ use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflec
 use agv_core::odometry::Vehicle;
 use agv_core::sources::{Contours, SourceStatus};
 
-use super::support::walls::{Noise, Walls, corridor, range, room, surfaces};
+use super::support::kept_map::kept_map;
+use super::support::walls::{Noise, Walls, corridor, range, room};
 
 const BEAMS: usize = 720;
 type Small = Localizer<CapacitiesOf<BEAMS, 16, 16, 4, SlamSlots, Contours<'static, 400, 4096>>>;
@@ -23,24 +23,6 @@ const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
 const SAMPLES: u64 = 12;
 const INTERVAL: u64 = 10_000;
 const REVOLUTION: f64 = (SAMPLES * INTERVAL) as f64 * 1e-6;
-
-/// A map of walls, moved by a pose. It stays in memory as long as the test runs.
-fn map(walls: &Walls, moved: &Pose) -> KeptMap<'static> {
-    let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
-    for (position, normal) in surfaces(walls, 0.1) {
-        let (position, normal) = (moved.transform(&position), moved.transform(&normal) - moved.position());
-        let place = Tile::place_of(position.x, position.y).unwrap();
-        let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
-        let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
-        by_tile.entry(place).or_default().push(KeptPoint::of(&point));
-    }
-    let (mut tiles, mut points) = (Vec::new(), Vec::new());
-    for (place, found) in by_tile {
-        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
-        points.extend(found);
-    }
-    KeptMap::new(tiles.leak(), points.leak()).unwrap()
-}
 
 /// Random walks of the odometry: of the way, m for a root of a metre, and of the heading, rad for one.
 const SLIP: f64 = 0.01;
@@ -174,7 +156,7 @@ fn tour() -> Vec<(f64, f64)> {
 
 #[test]
 fn a_vehicle_in_a_room_stays_where_the_map_has_it() {
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     let (mut squares, mut count) = (0.0, 0);
     for seed in 1..=3 {
         let mut drive = Drive::told(parameters(), room(), Some(map), seed);
@@ -203,7 +185,7 @@ fn a_vehicle_in_a_room_stays_where_the_map_has_it() {
 
 #[test]
 fn contours_that_are_switched_off_leave_no_trace() {
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     let mut without = parameters();
     without.sources.contours = false;
     let mut off = Drive::told(without, room(), Some(map), 7);
@@ -216,7 +198,7 @@ fn contours_that_are_switched_off_leave_no_trace() {
 
 #[test]
 fn in_a_corridor_the_free_axis_stays_free() {
-    let map = map(&corridor(None), &Pose::default());
+    let map = kept_map(&corridor(None), &Pose::default());
     for seed in 1..=3 {
         let mut drive = Drive::told(parameters(), corridor(None), Some(map), seed);
         drive.truth = Pose { theta: 0.0, ..drive.truth };
@@ -242,7 +224,7 @@ fn in_a_corridor_the_free_axis_stays_free() {
 /// A wall of the room and its cupboard have moved, by 5 to 50 cm.
 #[test]
 fn walls_that_have_moved_do_not_take_the_pose_along() {
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     for (wall, by) in [(0, (0.0, -0.05)), (0, (0.0, 0.12)), (1, (0.3, 0.0)), (5, (-0.5, 0.0))] {
         let mut walls = room();
         let [ax, ay, bx, by_] = &mut walls[wall];
@@ -263,7 +245,7 @@ fn walls_that_have_moved_do_not_take_the_pose_along() {
 
 #[test]
 fn a_start_that_is_wrong_is_put_right_and_said() {
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     for wrong in [Pose::new(0.3, -0.2, 0.26), Pose::new(-0.35, 0.1, -0.4), Pose::new(0.0, 0.4, 0.1)] {
         let mut drive = Drive::new(parameters(), room(), Some(map), 4);
         drive.tell(drive.truth.compose(&wrong), 0.1, 0.1);
@@ -282,7 +264,7 @@ fn a_start_that_is_wrong_is_put_right_and_said() {
 /// Of a start 4 m off the map says nothing, or that it is wrong; it does not say that it is right.
 #[test]
 fn a_start_that_is_quite_wrong_is_not_believed() {
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     for wrong in [Pose::new(4.0, 1.0, 0.5), Pose::new(5.0, -1.0, 2.5), Pose::new(3.0, 2.5, -1.5)] {
         let mut drive = Drive::new(parameters(), room(), Some(map), 5);
         drive.tell(drive.truth.compose(&wrong), 0.1, 0.05);
@@ -298,7 +280,7 @@ fn a_start_that_is_quite_wrong_is_not_believed() {
 
 #[test]
 fn standing_in_front_of_one_map_makes_its_error_no_smaller() {
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     let mut drive = Drive::told(parameters(), room(), Some(map), 6);
     for _ in 0..300 {
         drive.revolve((0.0, 0.0), 1.0);
@@ -316,7 +298,7 @@ fn reflectors() -> Vec<Landmark> {
 /// The map of contours lies 3 cm beside that of the reflectors.
 #[test]
 fn reflectors_go_before_contours_and_no_jump_between_them_goes_unsaid() {
-    let map = map(&room(), &Pose::new(0.02, 0.022, 0.0));
+    let map = kept_map(&room(), &Pose::new(0.02, 0.022, 0.0));
     let mut drive = Drive::told(parameters(), room(), Some(map), 8);
     assert_eq!(drive.localizer.add_landmarks(&reflectors()), Ok(()));
     let (mut last, mut used) = (drive.said(), 0);
@@ -354,7 +336,7 @@ fn of_two_places_that_look_alike_the_one_where_the_vehicle_should_be_is_taken() 
             walls.push([x + 0.08, side, x + 0.08, 1.2 * side]);
         }
     }
-    let map = map(&walls, &Pose::default());
+    let map = kept_map(&walls, &Pose::default());
     for seed in 1..=3 {
         let mut drive = Drive::told(parameters(), walls.clone(), Some(map), seed);
         drive.truth = Pose { theta: 0.0, ..drive.truth };
@@ -371,7 +353,7 @@ fn of_two_places_that_look_alike_the_one_where_the_vehicle_should_be_is_taken() 
 #[test]
 fn surroundings_that_are_cut_are_said_to_be() {
     type Narrow = Localizer<CapacitiesOf<BEAMS, 16, 16, 4, SlamSlots, Contours<'static, 400, 256>>>;
-    let map = map(&room(), &Pose::default());
+    let map = kept_map(&room(), &Pose::default());
     let scan = Scan {
         laser: LaserId::FIRST,
         start: Time::from_micros(1_000_000),

@@ -1,11 +1,10 @@
 //! Finding the pose of a vehicle that is switched on in a kept map of contours, in slices.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::{KeptMap, KeptPoint, PlaceAnswer, PlaceProgress, PlaceSearch, SurfacePoint, TILE, Tile};
-use agv_core::geometry::{Point, Pose};
+use agv_core::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch};
+use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Mode, Parameters, PoseFix, StartSearch};
 use agv_core::maps::FixedMap;
 use agv_core::measurement::{LaserId, PoseIncrement, Scan, Time};
@@ -14,28 +13,17 @@ use agv_core::sensing::PointScan;
 use agv_core::sources::Places;
 use agv_core::state::Relocalization;
 
-use super::support::walls::{Noise, Walls, corridor, range, room, surfaces};
+use super::support::kept_map::kept_map;
+use super::support::walls::{Noise, Walls, corridor, range, room};
 
 const BEAMS: usize = 720;
 const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
 
 type Search = PlaceSearch<400, 4096, 16_384>;
 
-/// A map of walls. It stays in memory as long as the test runs.
+/// A map of walls where they are.
 fn map(walls: &Walls) -> KeptMap<'static> {
-    let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
-    for (position, normal) in surfaces(walls, 0.1) {
-        let place = Tile::place_of(position.x, position.y).unwrap();
-        let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
-        let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
-        by_tile.entry(place).or_default().push(KeptPoint::of(&point));
-    }
-    let (mut tiles, mut points) = (Vec::new(), Vec::new());
-    for (place, found) in by_tile {
-        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
-        points.extend(found);
-    }
-    KeptMap::new(tiles.leak(), points.leak()).unwrap()
+    kept_map(walls, &Pose::default())
 }
 
 fn ranges(walls: &Walls, laser: &Pose, noise: &mut Noise) -> Vec<f32> {
@@ -133,6 +121,40 @@ fn without_a_map_or_surfaces_nothing_is_found() {
     assert_eq!(answer(&mut Box::default(), &room(), &empty, &place, 3000).0, PlaceAnswer::Unknown);
     let nothing = Walls::new();
     assert_eq!(answer(&mut Box::default(), &nothing, &map(&room()), &place, 3000).0, PlaceAnswer::TooFew);
+}
+
+/// Two walls 16 m apart whose ends are out of sight, and boxes of 1 m between them, of which one was moved along by so much.
+fn boxes(places: &[(f64, f64)], moved: f64) -> Walls {
+    let mut walls = vec![[-80.0, -8.0, 80.0, -8.0], [-80.0, 8.0, 80.0, 8.0]];
+    for (number, (x, y)) in places.iter().enumerate() {
+        let x = if number == 0 { x + moved } else { *x };
+        let corners = [[x, *y], [x + 1.0, *y], [x + 1.0, y + 1.0], [x, y + 1.0]];
+        let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+        walls.extend(sides.map(|([ax, ay], [bx, by])| [*ax, *ay, *bx, *by]));
+    }
+    walls
+}
+
+/// The nearest box shows most, and all but it stand where they stood.
+#[test]
+fn one_thing_that_was_moved_does_not_take_the_place_along() {
+    let places = [(2.5, -0.5), (-6.0, 3.0), (-5.0, -5.5), (7.0, 4.0), (8.5, -4.5)];
+    let map = map(&boxes(&places, 0.0));
+    for moved in [-0.45, -0.2, 0.15, 0.4] {
+        let truth = Pose::new(0.0, 0.2, 0.3);
+        let (found, _) = answer(&mut Box::default(), &boxes(&places, moved), &map, &truth, 3000);
+        assert!(matches!(found, PlaceAnswer::Found(fix) if is_near(&fix.pose, &truth)), "{moved}: {found:?}");
+    }
+}
+
+#[test]
+fn between_two_things_of_which_one_was_moved_no_place_is_told() {
+    let places = [(2.5, -0.5), (-6.0, 3.0)];
+    let map = map(&boxes(&places, 0.0));
+    for moved in [-0.4, -0.2, 0.2, 0.4] {
+        let (found, _) = answer(&mut Box::default(), &boxes(&places, moved), &map, &Pose::new(0.0, 0.2, 0.3), 3000);
+        assert!(!matches!(found, PlaceAnswer::Found(_)), "{moved}: {found:?}");
+    }
 }
 
 /// What a controller does: events, and slices of the search in between.

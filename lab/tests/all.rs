@@ -1,10 +1,12 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
 mod cloud_drive;
+mod contour_drives;
 mod contour_starts;
 mod event_fuzz;
 mod faults;
 mod features;
+mod loops;
 mod slip;
 mod tape;
 mod trust;

@@ -119,13 +119,8 @@ impl<'a> KeptMap<'a> {
         submap: &mut Submap<ROOM>,
     ) -> usize {
         let (down, right) = beside(number as i32);
-        let row = i16::try_from(i32::from(place.0) + down);
-        let column = i16::try_from(i32::from(place.1) + right);
-        let (Ok(row), Ok(column)) = (row, column) else { return 0 };
-        let Ok(found) = self.tiles.binary_search_by(|tile| tile.place.cmp(&(row, column))) else { return 0 };
-        let Some(tile) = self.tiles.get(found) else { return 0 };
-        let corner = |steps: i32| (f64::from(steps) - 0.5) as f32 * TILE as f32;
-        let shift = ScanPoint::new(corner(right), corner(down));
+        let Some(tile) = self.tile_beside(place, (down, right)) else { return 0 };
+        let shift = corner_of(down, right);
         let points = self.points_of(tile).iter().skip(first).take(count);
         let added = points.len();
         for point in points {
@@ -133,6 +128,42 @@ impl<'a> KeptMap<'a> {
             submap.add_point(&SurfacePoint { position: point.position + shift, ..point });
         }
         added
+    }
+
+    /// Goes through the points within `reach` (m) of a position along each axis; both are in the frame in the middle of a tile. How
+    /// many points were looked at.
+    pub(super) fn for_each_near(
+        &self,
+        place: (i16, i16),
+        position: &ScanPoint,
+        reach: f32,
+        mut with: impl FnMut(SurfacePoint),
+    ) -> u32 {
+        let steps = |length: f32| libm::floorf(length * (1.0 / TILE as f32) + 0.5) as i32;
+        let mut looked_at: u32 = 0;
+        for down in steps(position.y - reach)..=steps(position.y + reach) {
+            for right in steps(position.x - reach)..=steps(position.x + reach) {
+                let Some(tile) = self.tile_beside(place, (down, right)) else { continue };
+                let shift = corner_of(down, right);
+                for point in self.points_of(tile) {
+                    let point = point.unpacked();
+                    let position_of_it = point.position + shift;
+                    if (position_of_it - position).amax() <= reach {
+                        with(SurfacePoint { position: position_of_it, ..point });
+                    }
+                }
+                looked_at = looked_at.saturating_add(u32::from(tile.count));
+            }
+        }
+        looked_at
+    }
+
+    /// The tile so many rows and columns from a place.
+    fn tile_beside(&self, place: (i16, i16), (down, right): (i32, i32)) -> Option<&'a Tile> {
+        let row = i16::try_from(i32::from(place.0).checked_add(down)?).ok()?;
+        let column = i16::try_from(i32::from(place.1).checked_add(right)?).ok()?;
+        let found = self.tiles.binary_search_by(|tile| tile.place.cmp(&(row, column))).ok()?;
+        self.tiles.get(found)
     }
 
     /// All tiles, in order of their places.
@@ -145,6 +176,12 @@ impl<'a> KeptMap<'a> {
         let first = tile.first as usize;
         self.points.get(first..first + usize::from(tile.count)).unwrap_or_default()
     }
+}
+
+/// The corner of a tile so many rows and columns away, from the middle of the tile here.
+fn corner_of(down: i32, right: i32) -> ScanPoint {
+    let corner = |steps: i32| (f64::from(steps) - 0.5) as f32 * TILE as f32;
+    ScanPoint::new(corner(right), corner(down))
 }
 
 /// The tiles around a place by number, ring by ring: rows and columns away.
@@ -198,7 +235,7 @@ impl Loading {
 }
 
 /// The middle of a tile.
-fn middle((row, column): (i16, i16)) -> Pose {
+pub(super) fn middle((row, column): (i16, i16)) -> Pose {
     let middle = |index: i16| (f64::from(index) + 0.5) * TILE;
     Pose::new(middle(column), middle(row), 0.0)
 }

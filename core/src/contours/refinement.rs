@@ -46,8 +46,8 @@ pub struct Refinement {
 }
 
 /// Sums over points.
-#[derive(Clone, Copy, Default)]
-struct Sums {
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
     information: [f32; 6],
     gradient: [f32; 3],
     directions: [f32; 3],
@@ -77,7 +77,13 @@ impl Sums {
     /// Adds what a point says.
     fn see<const ROOM: usize>(&mut self, map: &Submap<ROOM>, point: &SurfacePoint, transform: &Transform, reach: f32) {
         let moved = point.moved(transform);
-        let Some(surface) = map.nearest(&moved, reach) else { return };
+        if let Some(surface) = map.nearest(&moved, reach) {
+            self.lay(&moved, &surface, transform);
+        }
+    }
+
+    /// Adds what a point says that was moved by a transform to where that surface is near.
+    pub(super) fn lay(&mut self, moved: &SurfacePoint, surface: &SurfacePoint, transform: &Transform) {
         let (lever, error) = (moved.position - transform.shift(), moved.position - surface.position);
         let weight = |square: f32| 1.0 / ((1.0 + square / (TOLERANCE * TOLERANCE)) * DEVIATION * DEVIATION);
         self.inliers += 1;
@@ -119,7 +125,22 @@ impl Refining {
 
     /// One iteration; whether another one is due.
     pub(super) fn step<const ROOM: usize>(&mut self, points: &[SurfacePoint], map: &Submap<ROOM>) -> bool {
-        let goes_on = self.try_step(points, map);
+        let (transform, reach) = self.look();
+        let mut sums = Sums::default();
+        for point in points {
+            sums.see(map, point, &transform, reach);
+        }
+        self.finish(&sums)
+    }
+
+    /// Where the points are taken to be at this iteration, and how far their surfaces are looked for, m.
+    pub(super) fn look(&self) -> (Transform, f32) {
+        (Transform::of(&self.pose), if self.iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 })
+    }
+
+    /// Moves by what all points have said; whether another iteration is due.
+    pub(super) fn finish(&mut self, sums: &Sums) -> bool {
+        let goes_on = self.try_move(sums);
         if goes_on.is_none() {
             self.outcome = None;
         }
@@ -127,15 +148,9 @@ impl Refining {
     }
 
     /// None if too few points lie on surfaces.
-    fn try_step<const ROOM: usize>(&mut self, points: &[SurfacePoint], map: &Submap<ROOM>) -> Option<bool> {
+    fn try_move(&mut self, sums: &Sums) -> Option<bool> {
         let (position, heading) = (1.0 / (START.0 * START.0), 1.0 / (START.1 * START.1));
         let Self { start, pose, iteration, .. } = *self;
-        let reach = if iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
-        let transform = Transform::of(&pose);
-        let mut sums = Sums::default();
-        for point in points {
-            sums.see(map, point, &transform, reach);
-        }
         if sums.inliers < FEWEST {
             return None;
         }

@@ -18,6 +18,11 @@ impl SurfacePoint {
         self.normal == ScanPoint::zeros()
     }
 
+    /// Whether both are corners, or face the same way within 32 deg.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.normal.dot(&other.normal) > ALIKE as f32 / (UNIT * UNIT) || (self.is_corner() && other.is_corner())
+    }
+
     /// The point in the frame into which a transform leads.
     #[must_use]
     pub fn moved(&self, transform: &Transform) -> Self {

@@ -1,6 +1,7 @@
 //! A hall and a vehicle in it, whose truth is known to the tests.
 
 pub mod hall;
+pub mod kept_map;
 pub mod reference_drive;
 pub mod stage;
 pub mod view;

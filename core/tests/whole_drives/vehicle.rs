@@ -2,7 +2,6 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::{KeptMap, KeptPoint, SurfacePoint, TILE, Tile};
 use agv_core::filter::{PoseAndSlots, packed_entries, slot_states};
 use agv_core::geometry::{Point, Pose, Twist, difference};
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, OutputPredictor, Parameters, PoseFix};
@@ -18,8 +17,9 @@ use agv_core::odometry::{
 use agv_core::sources::Contours;
 
 use crate::support::hall::{cast, walls};
+use crate::support::kept_map::kept_map;
 use crate::support::stage::{features, reflectors};
-use crate::support::walls::{Noise, surfaces};
+use crate::support::walls::Noise;
 
 const BEAMS: usize = 720;
 const KEYS: usize = 2;
@@ -139,23 +139,6 @@ impl Wrong {
     pub const REFLECTORS: Self = Self { scans: false, ..Self::NOTHING };
 }
 
-/// A map of the hall's walls as contours.
-fn contours() -> KeptMap<'static> {
-    let mut by_tile: std::collections::BTreeMap<(i16, i16), Vec<KeptPoint>> = std::collections::BTreeMap::new();
-    for (position, normal) in surfaces(&walls(), 0.1) {
-        let place = Tile::place_of(position.x, position.y).unwrap();
-        let corner = Point::new(f64::from(place.1), f64::from(place.0)) * TILE;
-        let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
-        by_tile.entry(place).or_default().push(KeptPoint::of(&point));
-    }
-    let (mut tiles, mut points) = (Vec::new(), Vec::new());
-    for (place, found) in by_tile {
-        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
-        points.extend(found);
-    }
-    KeptMap::new(tiles.leak(), points.leak()).unwrap()
-}
-
 pub struct Drive {
     kind: Kind,
     pub localizer: Box<Small>,
@@ -217,7 +200,7 @@ impl Drive {
             let all: Vec<_> = reflectors().into_iter().chain(features()).map(stretched).collect();
             localizer.add_landmarks(&all).unwrap();
         }
-        localizer.set_contours(equipment.contours.then(contours));
+        localizer.set_contours(equipment.contours.then(|| kept_map(&walls(), &Pose::default())));
         let mut drive = Self {
             kind: equipment.kind,
             localizer,

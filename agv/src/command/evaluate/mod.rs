@@ -3,6 +3,7 @@
 mod calibration;
 mod carpark;
 mod cloud_drive;
+mod contour_drives;
 mod contour_map;
 mod contour_starts;
 mod drives;
@@ -54,6 +55,7 @@ enum Experiment {
     Calibration(calibration::Calibration),
     Carpark(carpark::Carpark),
     CloudDrive(cloud_drive::CloudDrive),
+    ContourDrives(contour_drives::ContourDrives),
     ContourMap(contour_map::ContourMap),
     ContourStarts(contour_starts::ContourStarts),
     Drives(drives::Drives),
@@ -80,6 +82,7 @@ impl Evaluate {
             Experiment::Calibration(experiment) => experiment.run(),
             Experiment::Carpark(experiment) => experiment.run(),
             Experiment::CloudDrive(experiment) => experiment.run(),
+            Experiment::ContourDrives(experiment) => experiment.run(),
             Experiment::ContourMap(experiment) => experiment.run(),
             Experiment::ContourStarts(experiment) => experiment.run(),
             Experiment::Drives(experiment) => experiment.run(),

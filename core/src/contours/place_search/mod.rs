@@ -7,6 +7,8 @@
 mod coarse_search;
 mod place_grid;
 mod range_profile;
+mod settling;
+mod support;
 
 use heapless::Vec;
 use nalgebra::Matrix3;
@@ -14,12 +16,15 @@ use nalgebra::Matrix3;
 use coarse_search::{CoarseSearch, PLACES, Place};
 use place_grid::PlaceGrid;
 use range_profile::{InSight, RangeProfile};
+use settling::Settling;
+use support::{Support, Verdict};
 
 use super::kept_map::Loading;
 use super::matcher::weak_axis;
 use super::refinement::Refining;
 use super::{KeptMap, SearchResult, SearchWindow, Submap, SurfacePoint, TILE, find_surface_points, search};
 use crate::geometry::{Point, Pose, ScanPoint, Transform, difference, wrap};
+use crate::order::insertion_sort_by;
 use crate::sensing::PointView;
 
 /// Where a scan may have been taken.
@@ -89,6 +94,12 @@ const LEAST_SHOWN: f32 = 0.55;
 /// A place is as good as the best one if they agree there this much as well.
 const AS_GOOD: f32 = 0.9;
 
+/// Places that are looked at closely,
+const CANDIDATES: usize = 4;
+
+/// if scan and map agree there nearby this much as well as at the best one.
+const WORTH: f32 = 0.6;
+
 /// Two places of a corridor, for whoever asks: along its axis, m.
 const ALONG: f64 = 1.0;
 
@@ -100,7 +111,7 @@ const TURN: f64 = 0.03;
 const WINDOW: SearchWindow = SearchWindow { shifts: 2, shift: 3, turns: 0, turn: 0.0, distance: 10.0 };
 
 /// A place is laid onto the surfaces if the search gives it so much of what it gave the best one before.
-const PROMISING: f32 = 0.8;
+const PROMISING: f32 = 0.5;
 
 /// Points of a map, or of a submap, that are taken in one step.
 const POINTS_A_STEP: usize = 64;
@@ -111,6 +122,41 @@ const LOAD_EFFORT: i64 = 25 * POINTS_A_STEP as i64;
 const TURN_EFFORT: i64 = 2_500;
 const REFINE_EFFORT: i64 = 4_000;
 const LOOK_EFFORT: i64 = 15 * POINTS_A_STEP as i64;
+
+/// What a point of a scan costs that is laid onto all of the map, beside the points of the map that are looked at.
+const SETTLE_EFFORT: i64 = 200;
+
+/// Things agree with a place that is within this of where they have it, m,
+const AGREED: f32 = 0.051;
+
+/// or else it is shifted, so often at the most.
+const MOST_SHIFTS: u8 = 3;
+
+/// What separate things say of a place.
+#[derive(Clone, Copy, Debug)]
+enum Held {
+    /// They hold it.
+    Surely,
+    /// Some say that it is here.
+    Disputed(Pose),
+    /// Too few hold it.
+    ByTooFew,
+}
+
+/// One of the best places.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    fix: PlaceFix,
+    held: Held,
+}
+
+/// The axis along which surfaces say least of a place, or the one across it.
+fn axis_of(fix: &PlaceFix, is_across: bool) -> ScanPoint {
+    let (xx, xy, yy) = (fix.information.m11, fix.information.m12, fix.information.m22);
+    let strong = 0.5 * libm::atan2(2.0 * xy, xx - yy);
+    let (sine, cosine) = libm::sincos(strong);
+    if is_across { ScanPoint::new(cosine as f32, sine as f32) } else { ScanPoint::new(-sine as f32, cosine as f32) }
+}
 
 /// What is to be done next.
 #[derive(Clone, Copy, Debug)]
@@ -131,6 +177,10 @@ enum Step {
     Refine(usize, Refining),
     /// Looking for surfaces that should be in sight.
     Look { fix: PlaceFix, point: usize, found: InSight },
+    /// Laying the scan onto all of the map at one of the best places.
+    Settle { place: usize, settling: Settling },
+    /// Asking which things hold one of them along one axis, and across it.
+    Ask { place: usize, is_across: bool, support: Support },
     /// Telling the answer.
     Answer,
 }
@@ -148,9 +198,12 @@ pub struct PlaceSearch<const POINTS: usize = 400, const ROOM: usize = 6144, cons
     step: Step,
     /// Places that have been looked at.
     done: [bool; PLACES],
-    best: Vec<PlaceFix, 2>,
+    /// The best places, the best first.
+    best: Vec<Candidate, CANDIDATES>,
     /// The best score of a search around a place.
     score: f32,
+    /// Times the place that is looked at was shifted to where most things have it.
+    shifts: u8,
     /// Effort that was spent beyond what was allowed.
     debt: u32,
 }
@@ -170,6 +223,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
             done: [false; PLACES],
             best: Vec::new(),
             score: 0.0,
+            shifts: 0,
             debt: 0,
         }
     }
@@ -215,6 +269,8 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
                 Step::Turn { place, turn, best } => self.turn(place, turn, best, &mut left),
                 Step::Refine(place, refining) => self.refine(place, refining, &mut left),
                 Step::Look { fix, point, found } => self.look(&fix, point, found, &mut left),
+                Step::Settle { place, settling } => self.settle(map, place, settling, &mut left),
+                Step::Ask { place, is_across, support } => self.ask(map, (place, is_across), support, &mut left),
             };
             self.step = next;
         }
@@ -251,7 +307,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
         let mut open = self.coarse.places().iter().zip(self.done).enumerate().filter(|(_, (_, is_done))| !is_done);
         let first = open.clone().next();
         let loaded = open.find(|(_, (place, _))| is_loaded(place));
-        let Some((number, (place, _))) = loaded.or(first) else { return Step::Answer };
+        let Some((number, (place, _))) = loaded.or(first) else { return self.first_settling(0) };
         let place = *place;
         if let Some(done) = self.done.get_mut(number) {
             *done = true;
@@ -351,36 +407,109 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
         Step::Choose
     }
 
-    /// Keeps the best two that are not the same place.
-    fn keep(&mut self, fix: PlaceFix) {
-        if let Some(same) = self.best.iter_mut().find(|other| other.is_same(&fix.pose)) {
-            if fix.overlap() > same.overlap() {
-                *same = fix;
-            }
-        } else if self.best.push(fix).is_err()
-            && let Some(last) = self.best.last_mut().filter(|last| fix.overlap() > last.overlap())
-        {
-            *last = fix;
-        }
-        if let [first, second] = self.best.as_mut_slice()
-            && second.overlap() > first.overlap()
-        {
-            core::mem::swap(first, second);
+    /// Begins to look closely at one of the best places.
+    fn first_settling(&mut self, place: usize) -> Step {
+        self.shifts = 0;
+        let best = self.best.first().map_or(0.0, |best| best.fix.overlap());
+        let fix = self.best.get(place).map(|candidate| candidate.fix).filter(|fix| fix.overlap() >= WORTH * best);
+        match fix.and_then(|fix| Settling::begin(&fix.pose)) {
+            Some(settling) => Step::Settle { place, settling },
+            None => Step::Answer,
         }
     }
 
-    fn answer(&self) -> PlaceAnswer {
-        let Some(best) = self.best.first() else { return PlaceAnswer::Unknown };
-        let second = self.best.get(1).filter(|second| second.overlap() >= AS_GOOD * best.overlap());
-        match (second, best.free_axis) {
-            (Some(second), _) => PlaceAnswer::Ambiguous(*best, *second),
-            (None, Some(axis)) => {
+    fn settle(&mut self, map: &KeptMap, place: usize, mut settling: Settling, left: &mut i64) -> Step {
+        let (looked_at, goes_on) = settling.step(&self.points, map);
+        *left -= SETTLE_EFFORT + i64::from(looked_at);
+        if goes_on {
+            return Step::Settle { place, settling };
+        }
+        if let (Some(Candidate { fix, held }), Some((pose, found))) = (self.best.get_mut(place), settling.outcome()) {
+            let share = found.inliers as f32 / self.points.len().max(1) as f32;
+            if self.shifts > 0 && share < fix.share {
+                // What most things say of an axis, all of them together do not.
+                *held = Held::Disputed(pose);
+                return self.first_settling(place + 1);
+            }
+            // Far walls of a corridor say more of the same; what is nearby may have held the axis that they leave free.
+            let free_axis = fix.free_axis.and(weak_axis(found.directions));
+            *fix = PlaceFix { pose, information: found.information, share, free_axis, ..*fix };
+        }
+        self.first_question(place, false)
+    }
+
+    fn first_question(&mut self, place: usize, is_across: bool) -> Step {
+        let begin = |best: &Candidate| Support::begin(&best.fix.pose, axis_of(&best.fix, is_across));
+        match self.best.get(place).and_then(begin) {
+            Some(support) => Step::Ask { place, is_across, support },
+            None => Step::Answer,
+        }
+    }
+
+    /// What things say of a place along an axis. It is shifted to where they agree.
+    fn ask(&mut self, map: &KeptMap, (place, is_across): (usize, bool), mut support: Support, left: &mut i64) -> Step {
+        let (looked_at, goes_on) = support.step(&self.points, map);
+        *left -= SETTLE_EFFORT + i64::from(looked_at);
+        if goes_on {
+            return Step::Ask { place, is_across, support };
+        }
+        let Some(Candidate { fix, held }) = self.best.get_mut(place) else { return Step::Answer };
+        let axis = axis_of(fix, is_across);
+        let along = |shift: f32| {
+            let (x, y) = (fix.pose.x + f64::from(shift * axis.x), fix.pose.y + f64::from(shift * axis.y));
+            Pose { x, y, ..fix.pose }
+        };
+        *held = match support.verdict() {
+            Verdict::Agreed(shift) if libm::fabsf(shift) <= AGREED => Held::Surely,
+            Verdict::Agreed(shift) if self.shifts < MOST_SHIFTS => {
+                self.shifts += 1;
+                let shifted = Settling::begin(&along(shift));
+                return shifted.map_or(Step::Answer, |settling| Step::Settle { place, settling });
+            }
+            Verdict::Agreed(shift) | Verdict::Disputed(shift) => Held::Disputed(along(shift)),
+            Verdict::TooFew => Held::ByTooFew,
+        };
+        if is_across || !matches!(held, Held::Surely) {
+            self.first_settling(place + 1)
+        } else {
+            self.first_question(place, true)
+        }
+    }
+
+    /// Keeps the best that are not the same place.
+    fn keep(&mut self, fix: PlaceFix) {
+        let candidate = Candidate { fix, held: Held::ByTooFew };
+        if let Some(same) = self.best.iter_mut().find(|other| other.fix.is_same(&fix.pose)) {
+            if fix.overlap() > same.fix.overlap() {
+                *same = candidate;
+            }
+        } else if self.best.push(candidate).is_err()
+            && let Some(last) = self.best.last_mut().filter(|last| fix.overlap() > last.fix.overlap())
+        {
+            *last = candidate;
+        }
+        insertion_sort_by(&mut self.best, |one, other| other.fix.overlap().total_cmp(&one.fix.overlap()));
+    }
+
+    fn answer(&mut self) -> PlaceAnswer {
+        insertion_sort_by(&mut self.best, |one, other| other.fix.overlap().total_cmp(&one.fix.overlap()));
+        let Some((Candidate { fix: best, held }, others)) = self.best.split_first() else {
+            return PlaceAnswer::Unknown;
+        };
+        let is_second =
+            |other: &&Candidate| !best.is_same(&other.fix.pose) && other.fix.overlap() >= AS_GOOD * best.overlap();
+        let at = |pose: Pose| PlaceFix { pose, ..*best };
+        match (others.iter().find(is_second), best.free_axis, held) {
+            (Some(second), ..) => PlaceAnswer::Ambiguous(*best, second.fix),
+            (None, Some(axis), _) => {
                 let (x, y) = (best.pose.x + ALONG * f64::from(axis.x), best.pose.y + ALONG * f64::from(axis.y));
-                PlaceAnswer::Ambiguous(*best, PlaceFix { pose: Pose { x, y, ..best.pose }, ..*best })
+                PlaceAnswer::Ambiguous(*best, at(Pose { x, y, ..best.pose }))
             }
             // One that was not looked at may be as good.
-            (None, None) if self.coarse.is_crowded() => PlaceAnswer::Unknown,
-            (None, None) => PlaceAnswer::Found(*best),
+            (None, None, _) if self.coarse.is_crowded() => PlaceAnswer::Unknown,
+            (None, None, Held::Surely) => PlaceAnswer::Found(*best),
+            (None, None, Held::Disputed(pose)) => PlaceAnswer::Ambiguous(*best, at(*pose)),
+            (None, None, Held::ByTooFew) => PlaceAnswer::Unknown,
         }
     }
 }

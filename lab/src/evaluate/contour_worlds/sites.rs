@@ -111,6 +111,18 @@ impl Site {
         world
     }
 
+    /// What of it stands at the same place in another one.
+    pub(super) fn in_common(&self, other: &Self) -> Self {
+        let groups = self.groups.iter().zip(&other.groups).filter(|(one, other)| one == other);
+        let trucks = self.trucks.iter().zip(&other.trucks).filter(|(one, other)| one == other);
+        Self {
+            walls: self.walls.clone(),
+            groups: groups.map(|(group, _)| group.clone()).collect(),
+            trucks: trucks.map(|(truck, _)| *truck).collect(),
+            floor: self.floor,
+        }
+    }
+
     fn present_trucks(&self) -> impl Iterator<Item = &Rectangle> {
         self.trucks.iter().filter(|(_, is_there)| *is_there).map(|(truck, _)| truck)
     }

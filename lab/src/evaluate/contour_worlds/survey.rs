@@ -13,33 +13,49 @@ use agv_host_sim::simulate::raycast::RayCaster;
 use super::sites::Site;
 
 /// Beams of a revolution.
-const BEAMS: usize = 1440;
+pub(super) const BEAMS: usize = 1440;
+
+/// Angle between two of them, rad.
+const BEARING_STEP: f64 = TAU / BEAMS as f64;
 
 /// Reach, m, and standard deviation of a range, m.
 const FARTHEST: f64 = 60.0;
-const RANGE_NOISE: f64 = 0.01;
+pub(super) const RANGE_NOISE: f64 = 0.01;
 
 /// The map is made of scans so far apart along both axes, m.
 const SPACING: f64 = 2.0;
 
 /// The scan of a vehicle that stands, of a laser at `pose`.
 pub(super) fn scan(caster: &RayCaster, pose: &Pose, start: Time, random: &mut Random) -> RecordedScan {
-    let step = TAU / BEAMS as f64;
+    revolution(caster, |_| *pose, (start, 0.0), random)
+}
+
+/// The scan of a laser that is at `pose_of` while it sends a beam; its first beam, and the time between two, s.
+pub(super) fn revolution(
+    caster: &RayCaster,
+    pose_of: impl Fn(usize) -> Pose,
+    (start, beam_interval): (Time, f64),
+    random: &mut Random,
+) -> RecordedScan {
     let range = |beam: usize| {
-        let (sine, cosine) = (pose.theta - PI + step * beam as f64).sin_cos();
         let error = RANGE_NOISE * random.normal();
-        let hit = caster.first_hit(&pose.position(), &Point::new(cosine, sine), FARTHEST);
-        hit.map_or(0.0, |hit| (hit.distance + error) as f32)
+        distance(caster, &pose_of(beam), beam).map_or(0.0, |distance| (distance + error) as f32)
     };
     RecordedScan {
         laser: LaserId::FIRST,
         start,
-        beam_interval: 0.0,
+        beam_interval,
         first_bearing: -PI,
-        bearing_step: step,
+        bearing_step: BEARING_STEP,
         ranges: (0..BEAMS).map(range).collect(),
         intensities: Vec::new(),
     }
+}
+
+/// The true distance that a beam of a laser at `pose` goes, m.
+pub(super) fn distance(caster: &RayCaster, pose: &Pose, beam: usize) -> Option<f64> {
+    let (sine, cosine) = (pose.theta - PI + BEARING_STEP * beam as f64).sin_cos();
+    caster.first_hit(&pose.position(), &Point::new(cosine, sine), FARTHEST).map(|hit| hit.distance)
 }
 
 /// The map of a world by scans from all places of a lattice where a vehicle has room.
