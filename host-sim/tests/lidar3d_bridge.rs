@@ -128,6 +128,36 @@ fn clouds_tell_how_fast_the_sensor_moves() {
 }
 
 #[test]
+fn speeds_are_those_of_the_middle_of_a_turn_while_they_change() {
+    let lidar = SpinningLidar { noise: 0.03, ..lidar() };
+    // Drives off at 0.5 m/s^2, and after a second steers into a bend within another one.
+    let told = |time: f64| Speed { x: 0.5 * time.min(2.4), y: 0.0, turn: 0.6 * (time - 1.0).clamp(0.0, 1.0) };
+    let mut pose = Pose::new(-3.0, -1.0, 0.0);
+    let mut truth = Vec::new();
+    for step in 0..=3000 {
+        let time = 1e-3 * f64::from(step);
+        truth.push(Truth { time: Time::from_seconds(1.0 + time), pose });
+        let speed = told(time + 0.5e-3);
+        pose = pose.compose(&Pose::new(1e-3 * speed.x, 0.0, 1e-3 * speed.turn));
+    }
+    let mut random = Random::new(1, Stream::MultiBeam);
+    let mut clouds = CloudSpeed::new(projection(&lidar).levelling, lidar.height);
+    let (mut way, mut turn) = (0.0_f64, 0.0_f64);
+    for number in 0..28 {
+        let after = 0.1 * f64::from(number);
+        let start = Time::from_seconds(1.0 + after);
+        let found = clouds.speed(&lidar.revolution(&room(), &truth, start, &mut random).unwrap());
+        let told = told(after + 0.05);
+        if number > 1 {
+            way = way.max((found.x - told.x).hypot(found.y - told.y));
+            turn = turn.max((found.turn - told.turn).abs());
+        }
+    }
+    println!("worst {way:.3} m/s, {turn:.4} rad/s");
+    assert!(way < 0.06 && turn < 0.05, "{way} {turn}");
+}
+
+#[test]
 fn a_live_sensor_answers_when_a_turn_has_ended() {
     let frame = SensorFrame::default();
     let mut sensor = Sensor::new(Drive::live(frame), SensorClockOptions::default(), None, false);

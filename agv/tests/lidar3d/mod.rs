@@ -1,5 +1,6 @@
 //! Multi-beam lidars, on recordings of real ones and in simulation.
 
+mod bridge;
 mod calibration;
 mod command;
 mod manual;

@@ -43,6 +43,14 @@ pub struct Speed {
     pub turn: f64,
 }
 
+impl Speed {
+    /// The way after a time, s, along the axes at its beginning, m: the chord of the arc.
+    pub(super) fn way(&self, time: f64) -> [f64; 2] {
+        let (sin, cos) = libm::sincos(0.5 * self.turn * time);
+        [time * (self.x * cos - self.y * sin), time * (self.x * sin + self.y * cos)]
+    }
+}
+
 /// How clouds become turns of a planar laser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
@@ -131,9 +139,7 @@ impl Projection {
         // What the first round moves changes the time of the beam by less than a millisecond.
         for _ in 0..2 {
             let later = self.beam_time(bearing) - measured;
-            let (half_sin, half_cos) = libm::sincos(0.5 * speed.turn * later);
-            let way =
-                [later * (speed.x * half_cos - speed.y * half_sin), later * (speed.x * half_sin + speed.y * half_cos)];
+            let way = speed.way(later);
             let (sin, cos) = libm::sincos(speed.turn * later);
             let [a, b] = [x - way[0], y - way[1]];
             position = [a * cos + b * sin, b * cos - a * sin];
