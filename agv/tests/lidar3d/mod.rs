@@ -4,5 +4,6 @@ mod bridge;
 mod calibration;
 mod command;
 mod manual;
+mod point_cloud2;
 mod range_images;
 mod refinement;
