@@ -10,6 +10,7 @@ use agv_wire::nav350::SensorFrame;
 use nalgebra::{Rotation3, Vector3};
 
 use super::revolution::Revolution;
+use super::ring_surfaces::lay_onto_surfaces;
 use crate::recording::{RecordedReflectors, RecordedScan};
 
 /// Beams of a turn.
@@ -110,6 +111,7 @@ impl Projection {
             rings.resize_with(rings.len().max(ring + 1), Vec::new);
             rings[ring].push(Seen { position, bearing, level, intensity: point.intensity });
         }
+        self.take_noise_off(&mut rings);
         let mut beams: Vec<Vec<Candidate>> = vec![Vec::new(); BEAMS];
         for ring in &rings {
             ring_beams(ring, &mut beams);
@@ -125,6 +127,18 @@ impl Projection {
             intensities: if self.bright.is_some() { intensities } else { Vec::new() },
         };
         Projected { reflectors: self.reflectors(&rings, start).into(), scan }
+    }
+
+    /// Lays points onto their surfaces. Those of reflectors stay.
+    fn take_noise_off(&self, rings: &mut [Vec<Seen>]) {
+        let mut positions: Vec<Vec<[f64; 2]>> =
+            rings.iter().map(|ring| ring.iter().map(|seen| seen.position).collect()).collect();
+        let is_plain = |seen: &Seen| self.bright.is_none_or(|limit| seen.intensity <= limit);
+        lay_onto_surfaces(&mut positions, |ring, index| is_plain(&rings[ring][index]));
+        for (seen, position) in rings.iter_mut().flatten().zip(positions.into_iter().flatten()) {
+            let bearing = libm::atan2(position[1], position[0]);
+            *seen = Seen { position, bearing, ..*seen };
+        }
     }
 
     /// Time of a direction after the turn's first beam, s.
