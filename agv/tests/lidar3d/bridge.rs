@@ -19,10 +19,11 @@ use agv_host_sim::log::{self, Writer};
 use agv_host_sim::recording::{RecordedEvent, RecordedReflectors, RecordedScan};
 use agv_lidar3d::calibration::{Calibration, Laser};
 use agv_lidar3d::geometry::{Offsets, point};
-use agv_lidar3d::packet::{BLOCKS, LENGTH, Packet, RETURNS, Return, Sensor, Tail};
+use agv_lidar3d::packet::{Return, Sensor};
 use agv_wire::nav350::Configuration;
 use nalgebra::{Rotation3, Vector3};
 
+use super::vlp16::{PACKET, packet};
 use crate::support::Files;
 
 /// Half of the length and of the width of a room, m; its floor and its ceiling below and above the sensor.
@@ -35,13 +36,6 @@ const REFLECTOR: [f64; 3] = [3.0, 1.5, 0.04];
 const LEANING: [f64; 2] = [0.03, -0.02];
 /// Speed of the sensor, m/s.
 const SPEED: f64 = 1.0;
-/// Time between two firings and between two of their lasers, s (VLP-16 manual), and turns a second.
-const FIRING: f64 = 55.296e-6;
-const LASER: f64 = 2.304e-6;
-const FREQUENCY: f64 = 10.0;
-/// Time of a packet, s.
-const PACKET: f64 = 24.0 * FIRING;
-
 /// Where the sensor is, s after it began to send.
 fn pose(time: f64) -> Pose {
     Pose::new(-4.5 + SPEED * time, -0.5, 0.0)
@@ -67,30 +61,13 @@ fn measured(laser: &Laser, azimuth: f64, time: f64) -> Return {
     let (origin, direction) = (at(0.0), at(1.0) - at(0.0));
     let level = direction.xy().norm();
     let sensor = pose(time);
-    let [wall, reflector] = to_surfaces(
-        [sensor.x + origin.x, sensor.y + origin.y],
-        [direction.x / level, direction.y / level],
-    )
-    .map(|range| range / level);
+    let [wall, reflector] =
+        to_surfaces([sensor.x + origin.x, sensor.y + origin.y], [direction.x / level, direction.y / level])
+            .map(|range| range / level);
     let flat = if direction.z > 0.0 { CEILING - origin.z } else { -HEIGHT - origin.z } / direction.z;
     let distance = wall.min(reflector).min(flat);
     let is_foil = distance == reflector;
     Return { distance: (distance / 0.002).round() as u16, intensity: if is_foil { 200 } else { 30 } }
-}
-
-/// The packet of a VLP-16 whose first firing is at `time`.
-fn packet(lasers: &[Laser], time: f64) -> [u8; LENGTH] {
-    let blocks = std::array::from_fn::<_, BLOCKS, _>(|block| {
-        let first = time + 2.0 * FIRING * block as f64;
-        // The sensor states whole hundredths of a degree.
-        let azimuth = |time: f64| (36_000.0 * FREQUENCY * time).round() as u32 % 36_000;
-        let returns = std::array::from_fn::<_, RETURNS, _>(|place| {
-            let later = FIRING * (place / 16) as f64 + LASER * (place % 16) as f64;
-            measured(&lasers[place % 16], TAU * FREQUENCY * (first + later), first + later)
-        });
-        (false, azimuth(first) as u16, returns)
-    });
-    Packet::write(&blocks, Tail([0, 0, 0, 0, 0x37, 0x22]))
 }
 
 /// A running `agv lidar3d bridge`.
@@ -143,7 +120,7 @@ fn send(port: u16, begin: Instant, is_over: &AtomicBool) {
             break;
         }
         let time = PACKET * f64::from(number);
-        let bytes = packet(&lasers, time);
+        let bytes = packet(time, |laser, azimuth, at| measured(&lasers[laser], azimuth, at));
         let end = begin + Duration::from_secs_f64(time + PACKET);
         std::thread::sleep(end.saturating_duration_since(Instant::now()));
         socket.send_to(&bytes, ("127.0.0.1", port)).unwrap();
@@ -174,7 +151,8 @@ fn heard(bridge: &mut Bridge, scans: usize, path: &Path) -> (Vec<RecordedEvent>,
         bridge.notes.read_line(&mut line).unwrap();
         assert!(line.contains("serving"), "{line}");
         let host = format!("127.0.0.1:{}", line.trim().rsplit(' ').next().unwrap());
-        let recorder = Recorder::new(Writer::begin(path, &Parameters::new(Vehicle::Increments, Pose::default()), &[]).unwrap());
+        let recorder =
+            Recorder::new(Writer::begin(path, &Parameters::new(Vehicle::Increments, Pose::default()), &[]).unwrap());
         let mut link = Link::new(&host, Configuration::default(), clock);
         let limits = Limits::until(Time::from_seconds(at + 20.0));
         live::record_nav350(&mut link, &limits, scans, &AtomicBool::new(false), &recorder).unwrap();
@@ -214,7 +192,8 @@ fn packets_become_scans_of_the_room_at_the_times_of_its_beams() {
     let mut bridge = Bridge::start(&["--mount", &mount, "--bright", "100"]);
     let (events, begin) = heard(&mut bridge, 24, Path::new(&files.path("bridge.agvlog")));
     let (code, said) = bridge.interrupt();
-    assert_eq!((code, said.as_str()), (Some(0), ""));
+    // A busy machine may have left out some.
+    assert!(code == Some(0) && (said.is_empty() || said.contains("revolutions were left out")), "{code:?} {said}");
 
     // The sensor was switched on while it moved, which takes some turns.
     let scans: Vec<&RecordedScan> = events

@@ -4,6 +4,8 @@ mod bridge;
 mod calibration;
 mod command;
 mod manual;
+mod mount;
 mod point_cloud2;
 mod range_images;
 mod refinement;
+mod vlp16;

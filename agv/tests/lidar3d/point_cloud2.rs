@@ -76,9 +76,11 @@ impl Cloud {
 /// An MCAP file with such messages, each on its topic.
 fn mcap(messages: &[(&str, Vec<u8>)]) -> Vec<u8> {
     let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
-    let record = |kind: u8, content: Vec<u8>| [vec![kind], (content.len() as u64).to_le_bytes().to_vec(), content].concat();
+    let record =
+        |kind: u8, content: Vec<u8>| [vec![kind], (content.len() as u64).to_le_bytes().to_vec(), content].concat();
     let schema = [&1_u16.to_le_bytes()[..], &text("sensor_msgs/msg/PointCloud2"), &text("ros2msg"), &text("")].concat();
-    let mut file = [b"\x89MCAP0\r\n".to_vec(), record(1, [text("ros2"), text("")].concat()), record(3, schema)].concat();
+    let mut file =
+        [b"\x89MCAP0\r\n".to_vec(), record(1, [text("ros2"), text("")].concat()), record(3, schema)].concat();
     for (number, (topic, message)) in messages.iter().enumerate() {
         let id = (number as u16).to_le_bytes();
         let channel = [&id[..], &1_u16.to_le_bytes(), &text(topic), &text("cdr"), &0_u32.to_le_bytes()].concat();
@@ -164,8 +166,14 @@ fn hesai() -> Cloud {
         data.extend((1.7e9 + time).to_be_bytes());
         data.extend(ring.to_be_bytes());
     }
-    let fields =
-        [("x", 0, F32), ("y", 4, F32), ("z", 8, F32), ("intensity", 12, F32), ("timestamp", 16, F64), ("ring", 24, U16)];
+    let fields = [
+        ("x", 0, F32),
+        ("y", 4, F32),
+        ("z", 8, F32),
+        ("intensity", 12, F32),
+        ("timestamp", 16, F64),
+        ("ring", 24, U16),
+    ];
     Cloud { stamp: [100, 250_000_000], size: [4, 1], fields: fields.into(), is_big: true, steps: [26, 104], data }
 }
 

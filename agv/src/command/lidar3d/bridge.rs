@@ -30,7 +30,8 @@ use crate::command::stop;
 const HELP: &str = "\
 Each cloud becomes a turn of a planar laser: a level slice at the height of the sensor, every point moved to the time of its beam by the
 speed that the clouds themselves tell, and reflectors where returns are bright. A controller connects to this machine instead of the
-laser; its laser stands where the lidar stands, with the lidar's yaw. A recording is served at its own pace.
+laser (nav350.address, nav350.port); its laser stands where the lidar stands, with the lidar's yaw in radians (laser.x, laser.y,
+laser.theta). A recording is served at its own pace.
 
 Examples:
   agv lidar3d bridge udp --mount mount.json
