@@ -72,7 +72,7 @@ const WAITING: usize = 2;
 impl Bridge {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let standing = self.standing()?;
+        let Standing { height, levelling, mount } = self.standing()?;
         let places = self.places.as_deref().map(place_map::read).transpose()?;
         let stop = stop::on_interrupt()?;
         let is_live = matches!(self.source, Source::Live(_));
@@ -88,14 +88,9 @@ impl Bridge {
         let server = Nav350::new(Drive::live(frame), Options::default());
         let shift = source.began().map(|began| server.now() - began.elapsed().as_secs_f64());
         let mut scans = Scans {
-            projection: Projection {
-                levelling: standing.levelling,
-                height: standing.height,
-                bright: self.bright,
-                frame,
-            },
-            speed: CloudSpeed::new(standing.levelling, standing.height),
-            place: FirstPlace { order: RingOrder::new(&setup.lasers), map: places, mount: standing.mount },
+            projection: Projection { levelling, height, bright: self.bright, frame },
+            speed: CloudSpeed::new(levelling, height),
+            place: FirstPlace { order: RingOrder::new(&setup.lasers), map: places, mount },
             shift,
             number: 0,
         };
