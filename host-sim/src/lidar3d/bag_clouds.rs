@@ -100,9 +100,10 @@ fn points(cloud: &PointCloud2) -> Result<Vec<(FilePoint, f64)>, String> {
     let time = field(&["t", "time", "timestamp", "time_stamp", "offset_time"]);
     let step = cloud.point_step as usize;
     let (count, row) = (cloud.width as usize, cloud.row_step as usize);
+    let all = whole_points(cloud).ok_or("a cloud is shorter than it says")?;
     let place = |number: usize| (number / count.max(1)) * row + (number % count.max(1)) * step;
-    let mut points = Vec::with_capacity(count * cloud.height as usize);
-    for number in 0..count * cloud.height as usize {
+    let mut points = Vec::with_capacity(all);
+    for number in 0..all {
         let at = place(number);
         let bytes = cloud.data.get(at..at + step).ok_or("a cloud is shorter than it says")?;
         let read = |field: &PointField| value(field, bytes, cloud.is_bigendian);
@@ -122,6 +123,17 @@ fn points(cloud: &PointCloud2) -> Result<Vec<(FilePoint, f64)>, String> {
         points.push((point, time));
     }
     Ok(points)
+}
+
+/// How many points there are; None if the bytes do not hold so many.
+fn whole_points(cloud: &PointCloud2) -> Option<usize> {
+    let [width, height, step, row] =
+        [cloud.width, cloud.height, cloud.point_step, cloud.row_step].map(|value| value as usize);
+    let all = width.checked_mul(height)?;
+    let own = width.checked_mul(step)?;
+    let end = height.saturating_sub(1).checked_mul(row)?.checked_add(own)?;
+    let is_held = step > 0 && (height == 1 || row >= own) && end <= cloud.data.len();
+    (all == 0 || is_held).then_some(all)
 }
 
 /// `PointField.FLOAT32`; smaller kinds are whole numbers.

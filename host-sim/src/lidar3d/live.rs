@@ -37,6 +37,12 @@ impl Listener {
         Ok(Self { socket, port, ouster, bytes: vec![0; LONGEST], start: Instant::now(), refused: 0 })
     }
 
+    /// When the time of the packets began.
+    #[must_use]
+    pub fn start(&self) -> Instant {
+        self.start
+    }
+
     /// The port.
     #[must_use]
     pub fn port(&self) -> u16 {
@@ -50,7 +56,13 @@ impl Listener {
     pub fn receive(&mut self, take: impl FnOnce(Time, &Datagram<'_>, &[u8])) -> io::Result<bool> {
         let length = match self.socket.recv(&mut self.bytes) {
             Ok(length) => length,
-            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+            // A signal, as that of Ctrl-C, ends the wait too.
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
+                ) =>
+            {
                 return Ok(false);
             }
             Err(error) => return Err(error),

@@ -17,6 +17,7 @@ pub mod place_search;
 pub mod projection;
 pub mod refinement;
 pub mod revolution;
+pub mod ring_surfaces;
 pub mod scan_motion;
 pub mod setup;
 mod setup_options;

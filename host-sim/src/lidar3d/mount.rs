@@ -82,9 +82,9 @@ impl<'a> MountFinder<'a> {
         if self.keys.len() >= KEPT || self.keys.last().is_some_and(|last| !is_far(last)) {
             return false;
         }
-        let columns = revolution.columns().max(1);
-        let points = revolution.organised(&self.order, columns);
-        let stand = Cloud::new(&points, self.order.rings()).and_then(|cloud| FloorStand::find(&cloud, self.height));
+        // All points as one ring: in an organised cloud the nearer of two stays, which lies above the floor more often than below.
+        let points: Vec<Option<[f32; 3]>> = revolution.points.iter().map(|point| Some(point.position)).collect();
+        let stand = Cloud::new(&points, 1).and_then(|cloud| FloorStand::find(&cloud, self.height));
         self.keys.push(Key { start, pose, rings: rings(revolution, self.order.rings()), stand });
         true
     }

@@ -10,6 +10,7 @@ use agv_wire::nav350::SensorFrame;
 use nalgebra::{Rotation3, Vector3};
 
 use super::revolution::Revolution;
+use super::ring_surfaces::lay_onto_surfaces;
 use crate::recording::{RecordedReflectors, RecordedScan};
 
 /// Beams of a turn.
@@ -41,6 +42,14 @@ pub struct Speed {
     pub y: f64,
     /// Of rotation.
     pub turn: f64,
+}
+
+impl Speed {
+    /// The way after a time, s, along the axes at its beginning, m: the chord of the arc.
+    pub(super) fn way(&self, time: f64) -> [f64; 2] {
+        let (sin, cos) = libm::sincos(0.5 * self.turn * time);
+        [time * (self.x * cos - self.y * sin), time * (self.x * sin + self.y * cos)]
+    }
 }
 
 /// How clouds become turns of a planar laser.
@@ -102,6 +111,7 @@ impl Projection {
             rings.resize_with(rings.len().max(ring + 1), Vec::new);
             rings[ring].push(Seen { position, bearing, level, intensity: point.intensity });
         }
+        self.take_noise_off(&mut rings);
         let mut beams: Vec<Vec<Candidate>> = vec![Vec::new(); BEAMS];
         for ring in &rings {
             ring_beams(ring, &mut beams);
@@ -119,6 +129,18 @@ impl Projection {
         Projected { reflectors: self.reflectors(&rings, start).into(), scan }
     }
 
+    /// Lays points onto their surfaces. Those of reflectors stay.
+    fn take_noise_off(&self, rings: &mut [Vec<Seen>]) {
+        let mut positions: Vec<Vec<[f64; 2]>> =
+            rings.iter().map(|ring| ring.iter().map(|seen| seen.position).collect()).collect();
+        let is_plain = |seen: &Seen| self.bright.is_none_or(|limit| seen.intensity <= limit);
+        lay_onto_surfaces(&mut positions, |ring, index| is_plain(&rings[ring][index]));
+        for (seen, position) in rings.iter_mut().flatten().zip(positions.into_iter().flatten()) {
+            let bearing = libm::atan2(position[1], position[0]);
+            *seen = Seen { position, bearing, ..*seen };
+        }
+    }
+
     /// Time of a direction after the turn's first beam, s.
     fn beam_time(&self, bearing: f64) -> f64 {
         self.frame.period * (bearing + PI) / TAU
@@ -131,9 +153,7 @@ impl Projection {
         // What the first round moves changes the time of the beam by less than a millisecond.
         for _ in 0..2 {
             let later = self.beam_time(bearing) - measured;
-            let (half_sin, half_cos) = libm::sincos(0.5 * speed.turn * later);
-            let way =
-                [later * (speed.x * half_cos - speed.y * half_sin), later * (speed.x * half_sin + speed.y * half_cos)];
+            let way = speed.way(later);
             let (sin, cos) = libm::sincos(speed.turn * later);
             let [a, b] = [x - way[0], y - way[1]];
             position = [a * cos + b * sin, b * cos - a * sin];

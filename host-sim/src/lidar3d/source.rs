@@ -4,6 +4,7 @@ use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use agv_core::measurement::Time;
 use agv_lidar3d::packet::{PORT, Packet, STATUS_CYCLE, Sensor, Tally, ouster};
@@ -214,6 +215,15 @@ impl OpenSource {
         match &self.setup {
             Some(setup) => Ok(setup.clone()),
             None => Setup::new(&self.options, &self.survey),
+        }
+    }
+
+    /// When the time of a live source began; None of a recording.
+    #[must_use]
+    pub fn began(&self) -> Option<Instant> {
+        match &self.packets {
+            Packets::Live { listener, .. } => Some(listener.start()),
+            _ => None,
         }
     }
 

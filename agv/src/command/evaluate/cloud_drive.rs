@@ -2,6 +2,7 @@
 
 use agv_lab::evaluate::cloud_drive::{SensorKind, Site, cloud_drives};
 
+use super::arguments::Drives;
 use crate::command::progress;
 
 const HELP: &str = "\
@@ -25,19 +26,15 @@ pub struct CloudDrive {
     /// With which sensor; both if absent.
     #[arg(long)]
     sensor: Option<SensorName>,
-    /// Drives of each.
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
-    runs: u64,
-    /// Seed of the first drive.
-    #[arg(long, default_value_t = 100_000)]
-    seed: u64,
+    #[command(flatten)]
+    drives: Drives,
     /// Only so many seconds of each drive.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
-    /// Print a JSON array instead of a table.
-    #[arg(long)]
-    json: bool,
 }
+
+/// Drives of each kind if nothing is said.
+const RUNS: u32 = 10;
 
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum SiteName {
@@ -69,14 +66,15 @@ impl CloudDrive {
             Some(SensorName::Vlp16) => vec![SensorKind::Vlp16],
             Some(SensorName::Hdl64e) => vec![SensorKind::Hdl64e],
         };
-        let bar = progress::bar("drives", self.runs * (sites.len() * sensors.len()) as u64);
+        let runs = u64::from(self.drives.runs.unwrap_or(RUNS));
+        let bar = progress::bar("drives", runs * (sites.len() * sensors.len()) as u64);
         let mut found = Vec::new();
         for (site, sensor) in sites.iter().flat_map(|site| sensors.iter().map(|sensor| (*site, *sensor))) {
-            let seeds = self.seed..self.seed + self.runs;
+            let seeds = self.drives.seed..self.drives.seed + runs;
             found.push(cloud_drives(site, sensor, self.seconds, seeds, || bar.inc(1))?);
         }
         bar.finish_and_clear();
-        if self.json {
+        if self.drives.json {
             println!("{}", serde_json::to_string_pretty(&found)?);
             return Ok(());
         }

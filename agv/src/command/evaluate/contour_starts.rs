@@ -2,10 +2,11 @@
 
 use agv_lab::evaluate::contour_worlds::{SiteKind, run};
 
+use super::arguments::Starts;
 use crate::command::progress;
 
 const HELP: &str = "\
-An answer is right within 0.1 m and 1 degree. Two fit where a pose that was named has nine tenths of the true one's overlap.
+An answer is right within 0.1 m and 1 degree. Thresholds were chosen with seeds below 1000. Two fit where a pose that was named has nine tenths of the true one's overlap.
 
 Examples:
   agv evaluate contour-starts --starts 200
@@ -15,34 +16,29 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct ContourStarts {
-    /// Starts in worlds of each kind.
-    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
-    starts: u64,
-    /// Seed of the first world; thresholds were chosen with seeds below 1000.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Only worlds whose name contains this.
-    #[arg(long, default_value = "")]
-    only: String,
-    /// Print a JSON array instead of a table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    starts: Starts,
 }
+
+/// Starts in worlds of each kind if nothing is said.
+const STARTS: u64 = 1000;
 
 impl ContourStarts {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
-        let kinds: Vec<_> = SiteKind::ALL.into_iter().filter(|kind| kind.name().contains(&self.only)).collect();
-        anyhow::ensure!(!kinds.is_empty(), "no world's name contains '{}'", self.only);
-        let bar = progress::bar("starting vehicles", 2 * self.starts * kinds.len() as u64);
+        let Starts { starts, seed, only, json } = self.starts;
+        let starts = starts.unwrap_or(STARTS);
+        let kinds: Vec<_> = SiteKind::ALL.into_iter().filter(|kind| kind.name().contains(&only)).collect();
+        anyhow::ensure!(!kinds.is_empty(), "no world's name contains '{only}'");
+        let bar = progress::bar("starting vehicles", 2 * starts * kinds.len() as u64);
         let mut outcomes = Vec::new();
         for kind in kinds {
             for moved_share in [0.0, 0.3] {
-                outcomes.push(run(kind, moved_share, self.seed, self.starts, || bar.inc(1)));
+                outcomes.push(run(kind, moved_share, seed, starts, || bar.inc(1)));
             }
         }
         bar.finish_and_clear();
-        if self.json {
+        if json {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());
         }

@@ -4,6 +4,7 @@ use agv_lab::equipment::VehicleKind;
 use agv_lab::evaluate::gyro::{self, GyroOptions, HeadingRow, SlipRow, SoundRow};
 
 use super::super::progress;
+use super::arguments::Drives;
 
 const HELP: &str = "\
 Examples:
@@ -32,22 +33,18 @@ enum Part {
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Gyro {
-    /// Drives of each kind.
-    #[arg(long, alias = "drives", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    runs: u32,
-    /// First seed.
-    #[arg(long, default_value_t = 100_000)]
-    seed: u64,
+    #[command(flatten)]
+    drives: Drives,
     /// One of the tables only.
     #[arg(long)]
     only: Option<Part>,
     /// This vehicle alone. [default: tricycle, differential, bi-steerable and omni4]
     #[arg(long)]
     vehicle: Option<VehicleKind>,
-    /// JSON instead of tables.
-    #[arg(long)]
-    json: bool,
 }
+
+/// Drives of each kind if nothing is said.
+const RUNS: u32 = 5;
 
 /// The word of a value in JSON.
 fn word(value: impl serde::Serialize) -> String {
@@ -58,8 +55,8 @@ impl Gyro {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let options = GyroOptions {
-            drives: self.runs,
-            seed: self.seed,
+            drives: self.drives.runs.unwrap_or(RUNS),
+            seed: self.drives.seed,
             headings: self.only.is_none_or(|only| only == Part::Headings),
             slips: self.only.is_none_or(|only| only == Part::Slips),
             sound: self.only.is_none_or(|only| only == Part::Sound),
@@ -68,7 +65,7 @@ impl Gyro {
         let bar = progress::bar("driving", options.count());
         let outcome = gyro::run(&options, || bar.inc(1))?;
         bar.finish_and_clear();
-        if self.json {
+        if self.drives.json {
             println!("{}", serde_json::to_string_pretty(&outcome)?);
             return Ok(());
         }

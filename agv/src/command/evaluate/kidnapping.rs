@@ -3,10 +3,12 @@
 use agv_core::relocalization::RelocalizationParameters;
 use agv_lab::evaluate::kidnapping::{Case, feature_map, run};
 
+use super::arguments::Starts;
 use crate::command::progress;
 
 const HELP: &str = "\
 An answer is right within 0.1 m and 1 degree. A revolution misses reflectors independently of the one before.
+Of the cases with 1000 reflectors, and among features, a tenth of the starts is tried. Thresholds were chosen with seeds from 1001 on.
 From a blind start fewer than four reflectors can be seen at all; it counts as not right.
 
 Examples:
@@ -17,19 +19,12 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Kidnapping {
-    /// Starts of each case; a tenth of them where there are 1000 reflectors, and among features.
-    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..))]
-    starts: u64,
-    /// Seed; thresholds were chosen with seeds from 1001 on.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Only cases whose name contains this.
-    #[arg(long, default_value = "")]
-    only: String,
-    /// Print a JSON array instead of a table.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    starts: Starts,
 }
+
+/// Starts of each case if nothing is said.
+const STARTS: u64 = 10_000;
 
 /// Name of the case of [`feature_map`].
 const FEATURES: &str = "block storage, features";
@@ -37,23 +32,25 @@ const FEATURES: &str = "block storage, features";
 impl Kidnapping {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        let Starts { starts: all_starts, seed, only, json } = self.starts;
+        let all_starts = all_starts.unwrap_or(STARTS);
         let cases: Vec<_> = Case::ALL
             .iter()
-            .filter(|case| case.name.contains(&self.only))
-            .map(|case| (case, if case.name.starts_with("1000") { self.starts.div_ceil(10) } else { self.starts }))
+            .filter(|case| case.name.contains(&only))
+            .map(|case| (case, if case.name.starts_with("1000") { all_starts.div_ceil(10) } else { all_starts }))
             .collect();
-        let features = FEATURES.contains(&self.only).then(|| self.starts.div_ceil(10));
-        anyhow::ensure!(!cases.is_empty() || features.is_some(), "no case's name contains '{}'", self.only);
+        let features = FEATURES.contains(&only).then(|| all_starts.div_ceil(10));
+        anyhow::ensure!(!cases.is_empty() || features.is_some(), "no case's name contains '{only}'");
         let all = cases.iter().map(|(_, starts)| starts).sum::<u64>() + features.unwrap_or(0);
         let bar = progress::bar("starting vehicles", all);
         let parameters = RelocalizationParameters::default();
         let mut outcomes: Vec<_> =
-            cases.into_iter().map(|(case, starts)| run(case, self.seed, starts, &parameters, || bar.inc(1))).collect();
+            cases.into_iter().map(|(case, starts)| run(case, seed, starts, &parameters, || bar.inc(1))).collect();
         if let Some(starts) = features {
-            outcomes.push(feature_map::run(self.seed, starts, &feature_map::parameters(), || bar.inc(1))?);
+            outcomes.push(feature_map::run(seed, starts, &feature_map::parameters(), || bar.inc(1))?);
         }
         bar.finish_and_clear();
-        if self.json {
+        if json {
             println!("{}", serde_json::to_string_pretty(&outcomes)?);
             return Ok(());
         }

@@ -1,5 +1,6 @@
 //! `agv evaluate`.
 
+mod arguments;
 mod calibration;
 mod carpark;
 mod cloud_drive;
