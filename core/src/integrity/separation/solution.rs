@@ -153,8 +153,10 @@ fn subtract(covariance: &mut Covariance, shares: &States, weight: f64) {
     }
 }
 
-/// The model is linear within this change of the heading, rad; how often it is linearised at most.
+/// The model is linear within this change of the heading, rad, and if that moves a laser whose place is not known by no more than
+/// this, m: what moves it by more looks like a turn, and tells a place that nothing has shown. How often it is linearised at most.
 const LINEAR_WITHIN: f64 = 0.01;
+const LINEAR_PLACE: f64 = 2.5e-4;
 /// A heading with this variance, rad^2, is not changed by more: it is three deviations.
 const SURE_HEADING: f64 = LINEAR_WITHIN * LINEAR_WITHIN / 9.0;
 const MOST_LINEARISATIONS: usize = 4;
@@ -355,7 +357,8 @@ impl Solution {
         let mut change = States::zeros();
         let mut normalised_square = 0.0;
         let (_, heading) = self.variances();
-        if heading <= SURE_HEADING {
+        let within = self.linear_within();
+        if 9.0 * heading <= within * within {
             (change, normalised_square) = change_by((&pose, &lasting), &told, laser, &change, &mut self.covariance);
         } else {
             let before = self.covariance;
@@ -364,13 +367,20 @@ impl Solution {
                 self.covariance = before;
                 (change, normalised_square) = change_by((&pose, &lasting), &told, laser, &from, &mut self.covariance);
                 let [[_, _, turned, ..]] = (change - from).data.0;
-                if libm::fabs(turned) < LINEAR_WITHIN {
+                if libm::fabs(turned) < within {
                     break;
                 }
             }
         }
         (self.pose, self.lasting) = shifted((&pose, &lasting), &change);
         normalised_square
+    }
+
+    /// The change of the heading within which the model is linear, rad.
+    fn linear_within(&self) -> f64 {
+        let variance = |state: usize| self.covariance.get((state, state)).copied().unwrap_or_default();
+        let place = libm::sqrt(not_negative(libm::fmax(variance(MOUNTING), variance(MOUNTING + 1))));
+        if LINEAR_WITHIN * place > LINEAR_PLACE { LINEAR_PLACE / place } else { LINEAR_WITHIN }
     }
 
     /// Variances of the position's larger axis, m^2, and of the heading, rad^2.
