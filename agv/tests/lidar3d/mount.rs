@@ -76,7 +76,7 @@ fn a_capture_and_a_log_give_the_mount_within_its_deviations() {
         let start = PACKET * f64::from(number);
         let turn = (FREQUENCY * start) as u32;
         // Every fourth turn, whole.
-        if turn % 4 > 0 || (FREQUENCY * (start + PACKET)) as u32 > turn {
+        if !turn.is_multiple_of(4) || (FREQUENCY * (start + PACKET)) as u32 > turn {
             continue;
         }
         // The clock of the capture is three seconds behind that of the vehicle, and a packet comes when it is full.
