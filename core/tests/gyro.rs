@@ -606,3 +606,42 @@ fn a_localiser_that_was_lent_says_what_it_has_learned_of_the_gyro() {
         assert_eq!(errors(&mut *localizer), learned);
     }
 }
+
+/// What is known of a gyro that has told a turn to the left and, faster, one to the right: bias and scale are correlated with the pose,
+/// each in its own way.
+fn turned() -> GyroState {
+    let mut state = GyroState::new(&FITTED);
+    for (angle, duration) in [(1.0, 4.0), (-0.5, 0.3)] {
+        let turn = GyroTurn { angle, duration, variance: 0.0 };
+        let _ = state.predict(0.3, &Pose::new(1.0, 0.1, angle), duration, Some(&turn));
+    }
+    state
+}
+
+fn known(x: f64, theta: f64, variance: f64) -> KnownPose {
+    KnownPose { pose: Pose::new(x, 0.0, theta), covariance: Matrix3::identity() * variance }
+}
+
+/// A pose that is said to be far surer than what the gyro has told of it would leave bias and scale with negative variances.
+#[test]
+fn a_correction_that_no_covariance_allows_changes_nothing() {
+    let mut state = turned();
+    let (errors, covariance) = (*state.errors(), *state.covariance());
+    state.correct(&known(0.0, 0.0, 1e-9), &known(0.01, 0.01, 1e-12));
+    assert_eq!((state.errors(), state.covariance()), (&errors, &covariance));
+    state.correct(&known(0.0, 0.0, 1e-2), &known(0.01, 0.01, f64::NAN));
+    assert_eq!((state.errors(), state.covariance()), (&errors, &covariance));
+    // A sound one changes both.
+    state.correct(&known(0.0, 0.0, 1e-2), &known(0.01, 0.01, 1e-3));
+    assert!(state.errors().bias != errors.bias && state.errors().scale != errors.scale);
+    assert!(state.covariance().m11 < covariance.m11 && state.covariance().m22 < covariance.m22);
+}
+
+#[test]
+fn a_pose_that_begins_anew_says_nothing_of_the_gyro() {
+    let mut state = turned();
+    state.begin_pose();
+    let (errors, covariance) = (*state.errors(), *state.covariance());
+    state.correct(&known(0.0, 0.0, 1e-2), &known(0.01, 0.01, 1e-3));
+    assert_eq!((state.errors(), state.covariance()), (&errors, &covariance));
+}

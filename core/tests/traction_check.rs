@@ -107,3 +107,94 @@ fn one_revolution_alone_tells_nothing() {
     check.correct(&estimate(0.0, 2e-5, STEP), &estimate(-0.2, 1e-5, 0.0), now);
     assert!(!check.slips(now));
 }
+
+/// An estimate that is sure, with that covariance, so far behind the last correction.
+fn sure(pose: Pose, covariance: Matrix3<f64>, distance: f64) -> Estimate {
+    Estimate { pose, odometry_pose: Pose::default(), covariance, is_sure: true, distance }
+}
+
+/// Corrections of a vehicle at a heading, each a way and what was put right along and in the heading, m and rad; the covariance shrinks by
+/// the same each time. Whether a slip is told.
+fn is_told(heading: f64, shrunk: &Matrix3<f64>, corrections: &[(f64, f64, f64)]) -> bool {
+    let mut check = TractionCheck::new();
+    let now = Time::from_seconds(1.0);
+    for (way, along, turn) in corrections {
+        let moved = Pose::new(along * heading.cos(), along * heading.sin(), heading + turn);
+        let before = sure(Pose::new(0.0, 0.0, heading), Matrix3::identity() + shrunk, *way);
+        check.correct(&before, &sure(moved, Matrix3::identity(), 0.0), now);
+    }
+    check.slips(now)
+}
+
+/// The variance of a correction along the way is u' P u, where u is the heading's unit vector.
+#[test]
+fn the_limit_along_is_that_of_the_variance_in_the_direction_of_the_heading() {
+    let shrunk = Matrix3::new(4e-5, 1.5e-5, 0.0, 1.5e-5, 1e-5, 0.0, 0.0, 0.0, 1e-6);
+    for heading in [0.0_f64, 0.6, 1.3, 2.4, -0.9] {
+        let unit = nalgebra::Vector3::new(heading.cos(), heading.sin(), 0.0);
+        let variance = unit.dot(&(shrunk * unit));
+        // Two parts of a tenth of a metre: 2 a = 4.4 sqrt(2 variance) + 0.02 0.2 m.
+        let limit = 0.5 * (4.4 * (2.0 * variance).sqrt() + 0.004);
+        for sign in [1.0, -1.0] {
+            let twice = |share: f64| [(0.1, sign * share * limit, 0.0); 2];
+            assert!(!is_told(heading, &shrunk, &twice(0.99)), "below the limit at {heading}");
+            assert!(is_told(heading, &shrunk, &twice(1.01)), "above the limit at {heading}");
+        }
+    }
+}
+
+#[test]
+fn the_limit_of_the_heading_is_that_of_its_own_variance() {
+    let shrunk = Matrix3::from_diagonal(&nalgebra::Vector3::new(1e-4, 1e-4, 2e-6));
+    // 2 a = 4.4 sqrt(4e-6) + 0.01 0.2 rad.
+    let limit = 0.5 * (4.4 * 2e-3 + 2e-3);
+    for sign in [1.0, -1.0] {
+        let twice = |share: f64| [(0.1, 0.0, sign * share * limit); 2];
+        assert!(!is_told(0.4, &shrunk, &twice(0.99)));
+        assert!(is_told(0.4, &shrunk, &twice(1.01)));
+    }
+}
+
+/// A knock is put right once and to one side; a slip again and again to the same.
+#[test]
+fn corrections_of_both_signs_are_no_slip() {
+    let shrunk = Matrix3::identity() * 1e-6;
+    assert!(is_told(0.0, &shrunk, &[(0.1, 0.05, 0.0), (0.1, 0.05, 0.0)]));
+    assert!(!is_told(0.0, &shrunk, &[(0.1, -0.01, 0.0), (0.1, 0.05, 0.0)]));
+    assert!(is_told(0.0, &shrunk, &[(0.1, 0.0, 0.05), (0.1, 0.0, 0.05)]));
+    assert!(!is_told(0.0, &shrunk, &[(0.1, 0.0, -0.01), (0.1, 0.0, 0.05)]));
+    // One of another sign among three.
+    assert!(!is_told(0.0, &shrunk, &[(0.1, 0.05, 0.0), (0.1, -0.001, 0.0), (0.1, 0.05, 0.0)]));
+    assert!(!is_told(0.0, &shrunk, &[(0.1, 0.0, 0.05), (0.1, 0.0, -0.001), (0.1, 0.0, 0.05)]));
+    // Along and heading have each their own sign.
+    assert!(is_told(0.0, &shrunk, &[(0.1, 0.05, -0.001), (0.1, 0.05, 0.001)]));
+    assert!(is_told(0.0, &shrunk, &[(0.1, 0.001, 0.05), (0.1, -0.001, 0.05)]));
+}
+
+#[test]
+fn short_ways_are_one_part_and_long_ones_none_together() {
+    let shrunk = Matrix3::identity() * 1e-6;
+    // Less than 0.06 m: both corrections are of one part.
+    assert!(!is_told(0.0, &shrunk, &[(0.02, 0.05, 0.0), (0.02, 0.05, 0.0)]));
+    assert!(is_told(0.0, &shrunk, &[(0.07, 0.05, 0.0), (0.07, 0.05, 0.0)]));
+    // More than 0.5 m together.
+    assert!(!is_told(0.0, &shrunk, &[(0.28, 0.2, 0.0), (0.28, 0.2, 0.0)]));
+    assert!(is_told(0.0, &shrunk, &[(0.22, 0.2, 0.0), (0.22, 0.2, 0.0)]));
+}
+
+#[test]
+fn what_was_put_right_while_unsure_tells_nothing() {
+    let now = Time::from_seconds(1.0);
+    let shrunk = Matrix3::identity() * 1e-6;
+    let (before, after) = (
+        sure(Pose::default(), Matrix3::identity() + shrunk, 0.1),
+        sure(Pose::new(0.05, 0.0, 0.0), Matrix3::identity(), 0.0),
+    );
+    let mut check = TractionCheck::new();
+    check.correct(&before, &after, now);
+    check.correct(&Estimate { is_sure: false, ..before }, &after, now);
+    check.correct(&before, &after, now);
+    assert!(!check.slips(now));
+    check.correct(&before, &after, now);
+    assert!(check.slips(now));
+}
