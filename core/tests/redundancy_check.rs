@@ -186,3 +186,77 @@ fn what_wanders_to_and_fro_is_no_slip() {
     };
     assert_eq!(told(omni(), OMNI, 20.0, shaking), None);
 }
+
+/// What does not fit is the same on each metre; the way goes on.
+fn even(check: &mut RedundancyCheck, way: f64, slip: f64, errors: &WheelErrors, steps: u32) -> bool {
+    let at = |number: u32| Time::from_micros(1_000_000 + 10_000 * u64::from(number));
+    (0..steps).any(|number| {
+        let mut motion = Motion { start: at(number), ..Motion::none(at(number + 1)) };
+        motion.distance = way;
+        check.travel(&motion, slip, errors);
+        check.slips(motion.end)
+    })
+}
+
+/// A window of 0.3 m: the sum of `n` steps has the variance of so much way, that of what lasts, and a step of a wheel.
+#[test]
+fn the_limit_is_that_of_the_stated_errors() {
+    for errors in [ERRORS, WheelErrors { slip: 0.0, lasting: 2.2e-3 }, WheelErrors { slip: 6e-3, lasting: 0.0 }] {
+        let way: f64 = 0.15;
+        // One step: what was learnt is still what is stated.
+        let limit = 5.6 * (errors.slip.powi(2) * way + (errors.lasting * way).powi(2) + 3e-4_f64.powi(2)).sqrt();
+        for sign in [1.0, -1.0] {
+            assert!(!even(&mut RedundancyCheck::new(), way, sign * 0.99 * limit, &errors, 1), "{errors:?}");
+            assert!(even(&mut RedundancyCheck::new(), way, sign * 1.01 * limit, &errors, 1), "{errors:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_behind_a_new_pose_is_forgotten() {
+    let errors = WheelErrors { slip: 0.0, lasting: 0.0 };
+    // Three steps of 0.6 times the limit of a step: two are too much, one is not.
+    let slip = 0.6 * 5.6 * 3e-4;
+    let mut check = RedundancyCheck::new();
+    assert!(!even(&mut check, 0.01, slip, &errors, 1));
+    check.clear();
+    assert!(!even(&mut check, 0.01, slip, &errors, 1));
+    assert!(even(&mut check, 0.01, slip, &errors, 1));
+}
+
+/// Wheels that fit are known to slip by half of what is stated, after ten metres; then less is told.
+#[test]
+fn wheels_that_fit_are_held_to_less() {
+    let errors = WheelErrors { slip: 6e-3, lasting: 0.0 };
+    let limit = |slip: f64, way: f64| 5.6 * (slip * slip * way + 3e-4_f64.powi(2)).sqrt();
+    let mut check = RedundancyCheck::new();
+    // 9 m without slip: (0 + 3.6e-5 1) / (9 + 1) is below a quarter of what is stated, which is the least.
+    assert!(!even(&mut check, 0.3, 0.0, &errors, 30));
+    let mut unlearnt = RedundancyCheck::new();
+    let slip = 1.02 * limit(3e-3, 0.3);
+    assert!(slip < 0.9 * limit(6e-3, 0.3));
+    assert!(!even(&mut unlearnt, 0.3, slip, &errors, 1));
+    // The window of that step begins with it, the others are longer.
+    assert!(even(&mut check, 0.3, slip, &errors, 1));
+}
+
+/// Half of the way to what was learnt: as much as was seen, and what is stated for a metre.
+#[test]
+fn what_was_seen_for_a_metre_weighs_as_much_as_what_is_stated() {
+    let errors = WheelErrors { slip: 6e-3, lasting: 0.0 };
+    // A metre in four steps, two of which are off by a: 2 a^2 on a metre, and 3.6e-5 on another. Signs alternate, so that nothing is told.
+    let off: f64 = 3e-3;
+    let mut check = RedundancyCheck::new();
+    for slip in [off, -off, 0.0, 0.0] {
+        assert!(!even(&mut check, 0.25, slip, &errors, 1));
+    }
+    let kept = |way: f64| 1.0 - way / 10.0;
+    // Each step forgets a fortieth of what was before.
+    let squares = (kept(0.25) * off * off + off * off) * kept(0.25).powi(2);
+    let way = (0..4).fold(0.0, |way, _| kept(0.25) * way + 0.25);
+    let variance = (squares + 3.6e-5) / (way + 1.0);
+    assert!(variance > 0.25 * 3.6e-5 && variance < 3.6e-5);
+    let limit = 5.6 * (variance * 0.25 + 3e-4_f64.powi(2)).sqrt();
+    assert!(!even(&mut check.clone(), 0.25, 0.99 * limit, &errors, 1));
+    assert!(even(&mut check, 0.25, 1.01 * limit, &errors, 1));
+}
