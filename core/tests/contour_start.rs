@@ -220,3 +220,32 @@ fn an_ambiguous_start_is_told_and_no_pose() {
     }
     assert_eq!(vehicle.search.state(), Relocalization::Ambiguous);
 }
+
+/// Between two looks the vehicle is carried, to the side or round its laser, and the odometry does not see it.
+#[test]
+fn two_looks_at_different_places_tell_nothing() {
+    for carried in [Pose::new(0.0, 0.4, 0.0), Pose::new(0.4, 0.0, 0.0), Pose::new(0.0, 0.0, 0.2)] {
+        let mut vehicle = Switched::new(map(&room()), Pose::new(0.5, 1.0, -0.6));
+        assert_eq!(vehicle.revolve(&room(), &Pose::default()), None);
+        vehicle.pose = vehicle.pose.compose(&carried);
+        assert_eq!(vehicle.revolve(&room(), &Pose::default()), None, "{carried:?}");
+        let fix = vehicle.revolve(&room(), &Pose::default()).unwrap();
+        assert!(is_near(&fix.pose, &vehicle.pose), "{fix:?} instead of {:?}", vehicle.pose);
+    }
+}
+
+#[test]
+fn what_was_seen_before_another_map_or_another_pose_tells_nothing() {
+    let two = |between: &dyn Fn(&mut Switched)| {
+        let mut vehicle = Switched::new(map(&room()), Pose::new(0.5, 1.0, -0.6));
+        assert_eq!(vehicle.revolve(&room(), &Pose::default()), None);
+        between(&mut vehicle);
+        vehicle.revolve(&room(), &Pose::default()).is_some()
+    };
+    assert!(two(&|_| ()), "two looks are enough");
+    assert!(!two(&|vehicle| vehicle.search.forget_contours()), "the map was replaced");
+    let reflectors = Box::new(FixedMap::<4>::new());
+    // The localiser has a pose for a while.
+    let silence = Event::EncoderFaults(agv_core::measurement::EncoderFaults::default());
+    assert!(!two(&|vehicle| vehicle.search.handle(&silence, Mode::Reflectors, reflectors.view())), "it was localised");
+}

@@ -37,3 +37,19 @@ fn a_pose_for_half_a_second_ahead_is_kept_and_one_for_longer_is_of_another_clock
         assert_eq!((said.mode, said.reason), expected, "{micros} us ahead");
     }
 }
+
+/// A pose of a while ago: what was driven since is the distance without landmarks.
+#[test]
+fn the_distance_since_a_pose_in_the_past_is_what_was_driven_since() {
+    let mut stage = Stage::told(parameters());
+    let time = stage.time();
+    for step in 1..=20 {
+        stage.sample += 1;
+        stage.report(&agv_core::geometry::Pose::new(0.001 * f64::from(step), 0.0, 0.0));
+    }
+    // The last twelve samples have gone 0.009 + ... + 0.020 m.
+    let fix =
+        PoseFix { time: time.offset(0.08), pose: stage.truth, position_deviation: 0.01, heading_deviation: 0.003 };
+    let said = stage.localizer.handle(&Event::SetPose(fix)).pose;
+    assert!((said.dead_reckoning_distance - 0.174).abs() < 1e-9, "{said:?}");
+}

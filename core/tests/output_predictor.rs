@@ -206,3 +206,29 @@ fn a_pose_that_rests_on_landmarks_is_dead_reckoning_from_half_a_metre_on() {
         }
     }
 }
+
+#[test]
+fn speeds_and_increments_move_the_pose_from_the_first_output_on() {
+    use agv_core::measurement::{PoseIncrement, SpeedSample};
+    use agv_core::odometry::TricycleSpeed;
+    let laser = Pose::new(0.9, 0.0, 0.0);
+    let mut predictor: OutputPredictor = OutputPredictor::new(&Parameters::new(Vehicle::Increments, laser));
+    let step = Pose::new(0.01, 0.0, 0.002);
+    let increment = |number: u64| PoseIncrement { time: time(10_000 * number), displacement: step };
+    predictor.increment(&increment(0));
+    assert!(!predictor.has_output() && predictor.output().is_none());
+    predictor.update(&base(time(0)), &OdometryBias::default());
+    assert!(predictor.has_output());
+    predictor.increment(&increment(1));
+    let off = base(time(0)).pose.compose(&step).between(&predictor.output().expect("there is one").pose);
+    assert!(off.x.hypot(off.y) < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
+
+    let vehicle = TricycleSpeed { wheelbase: 1.5, steering_offset: 0.0 };
+    let mut predictor: OutputPredictor = OutputPredictor::new(&Parameters::new(Vehicle::TricycleSpeed(vehicle), laser));
+    let sample = |number: u64| SpeedSample { time: time(10_000 * number), speed: 0.8, steering: 0.0 };
+    predictor.speed(&sample(0));
+    predictor.update(&base(time(0)), &OdometryBias::default());
+    predictor.speed(&sample(1));
+    let off = base(time(0)).pose.between(&predictor.output().expect("there is one").pose);
+    assert!((off.x - 8e-3).abs() < 1e-12 && off.y.abs() < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
+}

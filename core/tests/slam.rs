@@ -245,3 +245,24 @@ fn a_scale_that_changes_is_learnt_again_on_the_way_and_at_once_when_a_pose_is_gi
     drive_for(&mut told, 200);
     assert!(blind_error(&told).abs() < 0.01, "25 m after it was told: {} m", blind_error(&told));
 }
+
+/// What a controller asks any localiser: the same as of the one behind it.
+fn asked(localizer: &impl agv_core::localizer::Localize) -> agv_core::odometry::OdometryBias {
+    localizer.odometry_bias()
+}
+
+#[test]
+fn any_localiser_tells_the_bias_that_it_has_learnt() {
+    let mut parameters = parameters();
+    parameters.maps.features = false;
+    let mut drive = Drive::start(parameters, 1.0);
+    drive.scale = 0.004;
+    for _ in 0..400 {
+        let start = drive.drive();
+        drive.see(start, &aisle(drive.way));
+    }
+    let bias = drive.localizer.odometry_bias();
+    assert!(bias.scale.abs() > 1e-3, "{bias:?}");
+    assert_eq!(asked(&*drive.localizer), bias);
+    assert_eq!(asked(&&mut *drive.localizer), bias);
+}

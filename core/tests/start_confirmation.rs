@@ -80,22 +80,25 @@ impl Start {
     /// A scan of a wide place in which these things stand, 0.1 m wide.
     fn scan(&mut self, things: &[Point]) {
         let sensor = self.sensor();
-        let ranges: Vec<f32> = (0..BEAMS)
-            .map(|beam| {
-                let bearing = beam as f64 * TAU / BEAMS as f64 - PI;
-                let hits = things
-                    .iter()
-                    .map(|thing| sensor.inverse_transform(thing))
-                    .filter(|thing| difference(thing.y.atan2(thing.x), bearing).abs() < 0.05 / thing.norm());
-                hits.map(|thing| thing.norm()).fold(30.0, f64::min) as f32
-            })
-            .collect();
+        self.scan_of(1.0, |bearing| {
+            let hits = things
+                .iter()
+                .map(|thing| sensor.inverse_transform(thing))
+                .filter(|thing| difference(thing.y.atan2(thing.x), bearing).abs() < 0.05 / thing.norm());
+            hits.map(|thing| thing.norm()).fold(30.0, f64::min)
+        });
+    }
+
+    /// A scan with that range at each bearing, counter-clockwise (1) or clockwise (-1).
+    fn scan_of(&mut self, sense: f64, range: impl Fn(f64) -> f64) {
+        let bearing = |beam: usize| sense * (beam as f64 * TAU / BEAMS as f64 - PI);
+        let ranges: Vec<f32> = (0..BEAMS).map(|beam| range(bearing(beam)) as f32).collect();
         self.tell(&Event::Scan(Scan {
             laser: LaserId::FIRST,
             start: Time::from_seconds(self.time),
             beam_interval: 0.0,
-            first_bearing: -PI,
-            bearing_step: TAU / BEAMS as f64,
+            first_bearing: -sense * PI,
+            bearing_step: sense * TAU / BEAMS as f64,
             ranges: &ranges,
             intensities: &[],
         }));
@@ -212,4 +215,41 @@ fn a_reflector_that_is_seen_now_and_then_is_not_missing() {
         told.is_some()
     });
     assert_eq!(told, Some(7));
+}
+
+/// Whether all but the first reflector, which is behind the beams of a scan with that range at each bearing from it (rad) and its own
+/// range, are believed.
+fn is_told_beside(sense: f64, range: impl Fn(f64, f64) -> f64) -> bool {
+    let all = places(0..12);
+    let mut start = Start::new(&reflectors());
+    let missing = start.sensor().inverse_transform(&all[0]);
+    let (own, towards) = (missing.norm(), missing.y.atan2(missing.x));
+    let told = (0..20).find(|_| {
+        let told = start.told_after(&all[1..], 1);
+        start.scan_of(sense, |bearing| range(difference(bearing, towards), own));
+        told.is_some()
+    });
+    assert!(told.is_none_or(|told| told == 7), "{told:?}");
+    told.is_some()
+}
+
+/// Beams within 0.2 m of the place, and as much as the laser turns in half a revolution, 0.02 rad, must all have passed.
+#[test]
+fn a_place_is_seen_through_if_all_beams_beside_it_pass() {
+    const STEP: f64 = TAU / BEAMS as f64;
+    let reach = |own: f64| 0.2 / own + 0.02;
+    for sense in [1.0, -1.0] {
+        for side in [1.0, -1.0] {
+            let post = |middle: f64| {
+                move |off: f64, own: f64| {
+                    let is_post = (off - side * (reach(own) + middle * STEP)).abs() < 0.5 * STEP;
+                    if is_post { 0.5 * own } else { 30.0 }
+                }
+            };
+            assert!(is_told_beside(sense, post(-1.0)), "a post within reach, {sense}, {side}");
+            assert!(!is_told_beside(sense, post(3.0)), "a post beside it, {sense}, {side}");
+        }
+        assert!(is_told_beside(sense, |_, own| own + 0.45), "a wall close behind it, {sense}");
+        assert!(!is_told_beside(sense, |_, own| own + 0.55), "a wall farther behind it, {sense}");
+    }
 }

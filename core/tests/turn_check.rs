@@ -47,3 +47,82 @@ fn a_turn_while_the_wheels_stand_is_told() {
     });
     assert!(told.is_some_and(|number| number <= 20), "{told:?}");
 }
+
+/// Sums since the window began: the square of the difference over what is expected of it, over that of the gate of six deviations.
+#[test]
+fn the_ratio_is_that_of_the_sums() {
+    let lasting = LastingErrors { steering: 2e-3, turn: 0.05, bias: 1e-3 };
+    let mut check = TurnCheck::new();
+    let (mut difference, mut variance, mut way, mut turned, mut seconds) = (0.0_f64, 0.0, 0.0, 0.0, 0.0);
+    // All of it within the first half of the first window.
+    for number in 0..14 {
+        let sign = if number % 3 == 0 { -1.0 } else { 1.0 };
+        let (wheels, gyro) = (motion(number, 0.01, 0.002, 3e-9), motion(number, 0.01, sign * 0.0015, 1e-9));
+        let rate = 0.1 + 0.01 * f64::from(number);
+        let ratio = check.travel(&wheels, &gyro, rate, &lasting);
+        difference += 0.002 - sign * 0.0015;
+        (variance, way, turned, seconds) = (variance + 4e-9, way + 0.01, turned + 0.0015, seconds + PERIOD);
+        // The window began with a gyro of which nothing was known: it stood.
+        let parts = [2e-3 * way, 0.05 * turned, 1e-3 * seconds, 0.01 * rate, 1e-4];
+        let expected = variance + parts.iter().map(|part| part * part).sum::<f64>();
+        let first = difference * difference / expected / 36.0;
+        // The second window begins anew with each motion.
+        let (since, last) = (0.002 - sign * 0.0015, [2e-3 * 0.01, 0.05 * 0.0015, 1e-3 * PERIOD, 1e-4]);
+        let change = 0.01 * if number == 0 { rate } else { 0.01 };
+        let of_last = 4e-9 + change * change + last.iter().map(|part| part * part).sum::<f64>();
+        let largest = first.max(since * since / of_last / 36.0);
+        assert!((ratio - largest).abs() < 1e-9 * largest, "{number}: {ratio} {largest}");
+    }
+}
+
+/// A difference that grows evenly for so many samples from one on, of a vehicle that stands.
+fn is_told(spans: &[(u32, u32)], rate: f64) -> bool {
+    let lasting = LastingErrors { steering: 0.0, turn: 0.0, bias: 0.0 };
+    let mut check = TurnCheck::new();
+    (0..700).any(|number| {
+        let grows = spans.iter().any(|(from, until)| (*from..*until).contains(&number));
+        let turn = if grows { rate } else { 0.0 };
+        let _ = check.travel(&motion(number, 0.0, turn, 0.0), &motion(number, 0.0, 0.0, 0.0), 0.0, &lasting);
+        check.slips(motion(number, 0.0, 0.0, 0.0).end)
+    })
+}
+
+/// Windows of three seconds begin every one and a half: what grows on both sides of the end of one is within the next.
+#[test]
+fn windows_overlap_by_half() {
+    // Six deviations of a step of the wheels: 6e-4 rad.
+    assert!(!is_told(&[(160, 290)], 3.5e-6), "4.6e-4 rad");
+    assert!(!is_told(&[(305, 430)], 3.5e-6), "4.4e-4 rad");
+    assert!(is_told(&[(160, 290), (305, 430)], 3.5e-6), "8.9e-4 rad");
+}
+
+#[test]
+fn a_gyro_is_frozen_only_if_the_wheels_move() {
+    let reading =
+        |number: u32| agv_core::measurement::GyroSample { time: motion(number, 0.0, 0.0, 0.0).end, rate: 0.01 };
+    for (way, has_turn, is_frozen) in [(0.01, true, true), (0.0, true, false), (0.01, false, true), (0.0, false, false)]
+    {
+        let mut check = TurnCheck::new();
+        let found = (0..30).any(|number| {
+            let moved = motion(number, way, 0.0, 1e-9);
+            if has_turn {
+                let _ = check.travel(&moved, &moved, 0.01, &LASTING);
+            } else {
+                check.travel_alone(&moved, Some(moved.start));
+            }
+            !check.sample(&reading(number))
+        });
+        assert_eq!(found, is_frozen, "{way} m, {has_turn}");
+    }
+}
+
+#[test]
+fn a_gyro_is_missing_after_a_tenth_of_a_second() {
+    use agv_core::integrity::GyroFault;
+    let moved = motion(30, 0.01, 0.0, 1e-9);
+    for (last, fault) in [(21, None), (19, Some(GyroFault::Missing))] {
+        let mut check = TurnCheck::new();
+        check.travel_alone(&moved, Some(motion(last, 0.0, 0.0, 0.0).end));
+        assert_eq!(check.fault(moved.end), fault, "{last}");
+    }
+}
