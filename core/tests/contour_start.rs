@@ -249,3 +249,42 @@ fn what_was_seen_before_another_map_or_another_pose_tells_nothing() {
     let silence = Event::EncoderFaults(agv_core::measurement::EncoderFaults::default());
     assert!(!two(&|vehicle| vehicle.search.handle(&silence, Mode::Reflectors, reflectors.view())), "it was localised");
 }
+
+/// A laser that takes the time of a revolution for a scan, on a vehicle that drives a bend: the surfaces are where it saw them from.
+#[test]
+fn a_laser_that_moves_while_it_looks_is_found_where_it_is() {
+    const REVOLUTION: f64 = 0.125;
+    let map = map(&room());
+    let reflectors = Box::new(FixedMap::<4>::new());
+    let twist = agv_core::geometry::Twist { x: 1.2, y: 0.0, theta: 0.8 };
+    let moved = |seconds: f64| {
+        Pose::exp(&agv_core::geometry::Twist { x: twist.x * seconds, y: 0.0, theta: twist.theta * seconds })
+    };
+    let mut search: Box<StartSearch<Places<'static, 400, 4096>>> =
+        Box::new(StartSearch::new(&Parameters::new(Vehicle::Increments, LASER), true));
+    let (mut pose, mut time, mut noise) = (Pose::new(-0.5, 0.2, 0.0), 1.0, Noise(5));
+    let fix = (0..8).find_map(|_| {
+        let (from, start) = (pose, Time::from_seconds(time));
+        for _ in 0..5 {
+            time += 0.2 * REVOLUTION;
+            pose = pose.compose(&moved(0.2 * REVOLUTION));
+            let increment = PoseIncrement { time: Time::from_seconds(time), displacement: moved(0.2 * REVOLUTION) };
+            search.handle(&Event::Increment(increment), Mode::NotLocalised, reflectors.view());
+        }
+        let ranges: Vec<f32> = (0..BEAMS)
+            .map(|beam| {
+                let share = beam as f64 / BEAMS as f64;
+                let laser = from.compose(&moved(share * REVOLUTION)).compose(&LASER);
+                range(&room(), &Pose { theta: laser.theta - PI + TAU * share, ..laser }, &mut noise)
+            })
+            .collect();
+        let scan = Scan { beam_interval: REVOLUTION / BEAMS as f64, ..scan(&ranges, start) };
+        search.handle(&Event::Scan(scan), Mode::NotLocalised, reflectors.view());
+        (0..10_000).find_map(|_| {
+            let (is_busy, found) = search.advance(reflectors.view(), Some(&map));
+            (found.is_some() || !is_busy).then_some(found)
+        })?
+    });
+    let off = pose.between(&fix.expect("it is found").pose);
+    assert!(off.position().norm() < 0.02 && off.theta.abs() < 0.005, "{off:?}");
+}

@@ -645,3 +645,39 @@ fn a_pose_that_begins_anew_says_nothing_of_the_gyro() {
     state.correct(&known(0.0, 0.0, 1e-2), &known(0.01, 0.01, 1e-3));
     assert_eq!((state.errors(), state.covariance()), (&errors, &covariance));
 }
+
+/// What the turns of the way behind have in common with the bias says nothing of a pose that somebody gives.
+#[test]
+fn a_given_pose_that_is_wrong_teaches_the_gyro_nothing() {
+    let mut drive = fitted(4);
+    drive.stand(5.0);
+    drive.sees = false;
+    drive.go(20.0, 0.5, 0.3, |_| false);
+    let pose = Pose { theta: drive.truth.theta + 0.05, ..drive.truth };
+    let fix = PoseFix { time: drive.now(), pose, position_deviation: 0.05, heading_deviation: 0.05 };
+    drive.localizer.handle(&Event::SetPose(fix));
+    let before = drive.localizer.gyro_errors().unwrap().bias;
+    drive.revolve();
+    let after = drive.localizer.gyro_errors().unwrap().bias;
+    assert!(drive.heading_error().abs() < 0.02, "the heading is put right: {}", drive.heading_error());
+    assert!((after - before).abs() < 1e-5, "{before} {after}");
+}
+
+/// Whether a vehicle without odometry stands, nobody knows.
+#[test]
+fn while_the_wheels_tell_nothing_no_bias_is_learnt() {
+    use agv_core::measurement::{EncoderFault, EncoderFaults};
+    let mut drive = fitted(5);
+    drive.sees = false;
+    drive.stand(5.0);
+    let mut before = None;
+    for step in 1..=20 {
+        let time = drive.now().offset(0.01 * f64::from(step));
+        let faults = EncoderFaults { time, drive: Some(EncoderFault::Late), steering: None };
+        drive.localizer.handle(&Event::EncoderFaults(faults));
+        before = before.or(drive.localizer.gyro_errors());
+        let rate = drive.told + 1e-4 * f64::from(step % 2);
+        drive.localizer.handle(&Event::Gyro(GyroSample { time: time.offset(0.005), rate }));
+    }
+    assert_eq!(before, drive.localizer.gyro_errors());
+}

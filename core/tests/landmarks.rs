@@ -137,3 +137,46 @@ fn a_map_refuses_what_does_not_fit() {
     assert_eq!(map.landmarks().len(), 2);
     assert_eq!(map.near(Point::new(1.0, 0.0), 0.1).count(), 1);
 }
+
+/// A map that holds four reflectors and six features.
+#[test]
+fn a_map_is_replaced_as_a_whole_or_not_at_all() {
+    use agv_core::localizer::{CapacitiesOf, Localizer, Parameters};
+    use agv_core::maps::MapError;
+    use agv_core::odometry::Vehicle;
+    let of = |reflectors: u16, features: u16| {
+        let mut all: Vec<Landmark> = (0..reflectors + features)
+            .map(|id| Landmark::reflector(id, Point::new(f64::from(id), 1.0), 0.002))
+            .collect();
+        all.iter_mut().take(usize::from(features)).for_each(|landmark| landmark.kind = LandmarkKind::Corner);
+        all
+    };
+    let parameters = Parameters::new(Vehicle::Increments, agv_core::geometry::Pose::default());
+    let mut localizer = Box::new(Localizer::<CapacitiesOf<360, 4, 6, 8>>::new(parameters));
+    for (reflectors, features, fits) in
+        [(4, 6, true), (5, 0, false), (0, 7, false), (4, 5, true), (1, 6, true), (5, 6, false)]
+    {
+        let before = localizer.reflectors().landmarks().len();
+        let expected = if fits { Ok(()) } else { Err(MapError::Full) };
+        assert_eq!(localizer.replace_landmarks(&of(reflectors, features)), expected, "{reflectors} and {features}");
+        let now = if fits { usize::from(reflectors) } else { before };
+        assert_eq!(localizer.reflectors().landmarks().len(), now);
+    }
+}
+
+#[test]
+fn a_map_that_is_lent_is_in_use_or_refused() {
+    use agv_core::localizer::{Localizer, Parameters, SlamWithLentMap};
+    use agv_core::maps::LendError;
+    use agv_core::odometry::Vehicle;
+    let parameters = Parameters::new(Vehicle::Increments, agv_core::geometry::Pose::default());
+    let good =
+        [Landmark::reflector(1, Point::new(1.0, 2.0), 0.002), Landmark::reflector(2, Point::new(3.0, 2.0), 0.002)];
+    let corner = Landmark { kind: LandmarkKind::Corner, ..good[0] };
+    let turned = [corner, good[1]];
+    let mut localizer = Box::new(Localizer::<SlamWithLentMap>::new(parameters));
+    assert_eq!(localizer.lend_landmarks(&good), Ok(()));
+    assert_eq!(localizer.reflectors().landmarks(), &good[..]);
+    assert_eq!(localizer.lend_landmarks(&turned), Err(LendError::Order));
+    assert_eq!(localizer.reflectors().landmarks(), &good[..]);
+}

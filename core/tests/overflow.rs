@@ -112,3 +112,28 @@ fn of_too_many_features_the_best_known_are_kept() {
     kept.sort_by(f32::total_cmp);
     assert_eq!(kept, sorted[..6]);
 }
+
+#[test]
+fn bright_spots_that_find_no_room_are_counted() {
+    for (count, overflows) in [(80_u32, 0), (128, 0), (129, 1), (300, 1)] {
+        let beams = 4 * count as usize;
+        let ranges = vec![5.0; beams];
+        let intensities: Vec<u16> = (0..beams).map(|beam| u16::from(beam % 4 == 1)).collect();
+        let mut parameters = Parameters::new(Vehicle::Increments, Pose::default());
+        parameters.reflectors.detection = Some(ReflectorDetection::default());
+        let mut localizer = Box::new(Localizer::<CapacitiesOf<1440, 8, 8, 8>>::new(parameters));
+        let time = Time::from_micros(1_000_000);
+        let fix = PoseFix { time, pose: Pose::default(), position_deviation: 0.1, heading_deviation: 0.1 };
+        localizer.handle(&Event::SetPose(fix));
+        let scan = Scan {
+            laser: LaserId::FIRST,
+            start: time,
+            beam_interval: 0.0,
+            first_bearing: -PI,
+            bearing_step: TAU / beams as f64,
+            ranges: &ranges,
+            intensities: &intensities,
+        };
+        assert_eq!(localizer.handle(&Event::Scan(scan)).pose.overflows, overflows, "{count}");
+    }
+}

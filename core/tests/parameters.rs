@@ -94,3 +94,12 @@ fn samples_may_be_two_and_a_half_times_as_far_apart_as_is_extrapolated_and_a_qua
         assert!((limits.longest_interval() - expected).abs() < 1e-12, "{longest_extrapolation} s: {limits:?}");
     }
 }
+
+#[test]
+fn a_gyro_that_is_fitted_has_a_factor() {
+    for (is_fitted, factor, error) in [(true, 0.0, Some("gyro.factor")), (true, 1.0, None), (false, 0.0, None)] {
+        let mut changed = parameters();
+        (changed.gyro.is_fitted, changed.gyro.factor) = (is_fitted, factor);
+        assert_eq!(changed.check().err().map(|error| error.leaf), error, "{is_fitted}, {factor}");
+    }
+}

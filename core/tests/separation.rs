@@ -91,6 +91,12 @@ fn what_is_left_out_was_never_added() {
     let (square, freedom) = left.misfit();
     let (expected, expected_freedom) = sum(&others, &sensor).misfit();
     assert!((square / expected - 1.0).abs() < 1e-6 && freedom == expected_freedom, "{square} {expected} {freedom}");
+    // So are the errors of the map.
+    let (left, expected) = (left.map_variances(1.0).unwrap(), sum(&others, &sensor).map_variances(1.0).unwrap());
+    assert!(
+        (left.0 / expected.0 - 1.0).abs() < 1e-6 && (left.1 / expected.1 - 1.0).abs() < 1e-6,
+        "{left:?} {expected:?}"
+    );
 }
 
 /// The errors of a map that stay are those of weighted least squares: drawn, not computed.

@@ -58,3 +58,14 @@ fn it_turns_on_the_spot() {
     let wild = SpeedSample { time: at(2), speed: 0.6, steering: 3.2 };
     assert_eq!(odometer.speed(&wild), Err(OdometryError::Implausible));
 }
+
+/// Between two speeds anything may have happened: a quarter of a second is the most.
+#[test]
+fn a_longer_pause_is_told() {
+    for (step, expected) in [(25, None), (26, Some(OdometryError::Pause))] {
+        let mut odometer = odometer();
+        let sample = |step| SpeedSample { time: at(step), speed: 0.5, steering: 0.0 };
+        assert_eq!(odometer.speed(&sample(0)), Err(OdometryError::First));
+        assert_eq!(odometer.speed(&sample(step)).err(), expected, "{step}");
+    }
+}

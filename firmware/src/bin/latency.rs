@@ -13,7 +13,7 @@ use agv_core::measurement::{EncoderSample, Scan, Time};
 use agv_core::record::Record;
 use agv_firmware::app::log_stream::{LONGEST, LogWriter};
 use agv_firmware::app::{exchange, localize};
-use agv_firmware::board::an500::host_file::HostFile;
+use agv_firmware::board::an500::host_file::{HostFile, HostFileError};
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
 use agv_firmware::board::an500::log_file::LogBuffer;
 use agv_firmware::board::an500::{panic, time_driver, uart};
@@ -126,13 +126,7 @@ fn main() -> ! {
         }
         _ => {}
     });
-    let mut text: String<256> = String::new();
-    let samples = SAMPLES.load(Ordering::Relaxed);
-    let during = DURING_SCANS.load(Ordering::Relaxed);
-    let latest = LATEST.load(Ordering::Relaxed);
-    let _ = writeln!(text, "scans,samples,samples during scans,latest prediction in us at 64 ns an instruction,lost");
-    let _ = writeln!(text, "{scans},{samples},{during},{latest},{}", exchange::lost_events());
-    let written = HostFile::create(c"latency.csv").and_then(|mut file| file.write(text.as_bytes()));
+    let written = write_table(scans);
     if outcome == Ok(0) && written.is_ok() {
         debug::exit(debug::EXIT_SUCCESS);
     }
@@ -141,4 +135,15 @@ fn main() -> ! {
     loop {
         cortex_m::asm::wfi();
     }
+}
+
+/// Writes `latency.csv`.
+fn write_table(scans: u32) -> Result<(), HostFileError> {
+    let mut text: String<256> = String::new();
+    let samples = SAMPLES.load(Ordering::Relaxed);
+    let during = DURING_SCANS.load(Ordering::Relaxed);
+    let latest = LATEST.load(Ordering::Relaxed);
+    let _ = writeln!(text, "scans,samples,samples during scans,latest prediction in us at 64 ns an instruction,lost");
+    let _ = writeln!(text, "{scans},{samples},{during},{latest},{}", exchange::lost_events());
+    HostFile::create(c"latency.csv")?.write(text.as_bytes())
 }

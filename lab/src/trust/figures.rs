@@ -93,23 +93,14 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
     let accepted = OfSize { size: 0.0, rows: sound.rows.iter().copied().filter(|row| row.is_accepted).collect() };
     let share = |part: u64, whole: u64| (whole > 0).then(|| part as f64 / whole as f64);
     let km = accepted.sum(|outcome| outcome.driven_um) as f64 * 1e-9;
-    let recovering: Vec<&Row> = rows.iter().copied().filter(|row| row.can_recover).collect();
-    let ends_right = |rows: &[&Row]| {
-        rows.iter().filter(|row| row.outcome.as_ref().is_some_and(|outcome| outcome.ends_right)).count() as u64
-    };
-    let first_claims = Spread::of(sound.rows.iter().filter_map(|row| {
-        let outcome = row.outcome.as_ref()?;
-        // A vehicle that never claims has waited for all of the run.
-        Some(outcome.first_claim.unwrap_or(outcome.outputs) as f64 * super::judge::STEP)
-    }));
+    let recovering = OfSize { size: 0.0, rows: rows.iter().copied().filter(|row| row.can_recover).collect() };
+    let first_claims = first_claims(&sound);
     let seeds = rows.iter().map(|row| row.seed);
     let of_kinds = per_fault(&rows, catalogue);
     Figures {
         runs: rows.len(),
         panics: rows.iter().filter(|row| row.outcome.is_none()).count(),
-        mi_share: rows.iter().filter(|row| row.outcome.as_ref().is_some_and(|outcome| outcome.misleading > 0)).count()
-            as f64
-            / rows.len().max(1) as f64,
+        mi_share: all.count(|outcome| outcome.misleading > 0) as f64 / rows.len().max(1) as f64,
         hmi_events: all.sum(|outcome| u64::from(outcome.hazards)),
         worst_hmi_s: all.most(|outcome| outcome.worst_hazard_s),
         worst_hmi_m: all.most(|outcome| outcome.worst_hazard_m),
@@ -130,8 +121,8 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
         ),
         continuity_per_100km: (km > 0.0).then(|| accepted.sum(|outcome| u64::from(outcome.losses)) as f64 / km * 100.0),
         false_alarms: false_alarms(&accepted),
-        recovered_share: share(ends_right(&recovering), recovering.len() as u64),
-        recovered_share_of_all: ends_right(&all.rows) as f64 / rows.len().max(1) as f64,
+        recovered_share: share(recovering.count(|outcome| outcome.ends_right), recovering.rows.len() as u64),
+        recovered_share_of_all: all.count(|outcome| outcome.ends_right) as f64 / rows.len().max(1) as f64,
         pl_nominal_mm: mark(&accepted, |outcome| &outcome.nominal_mm),
         pl_nominal_deg: mark(&accepted, |outcome| &outcome.nominal_cdeg).map(|hundredths| 0.01 * hundredths),
         error_over_pl_max: sound.most(|outcome| outcome.most_over_level),
@@ -160,6 +151,15 @@ fn mark(of: &OfSize, values: fn(&Outcome) -> &BTreeMap<u32, u64>) -> Option<f64>
         below += count;
         (total > 0 && below * 100 >= total * 95).then_some(f64::from(value))
     })
+}
+
+/// Times to the first claim, s.
+fn first_claims(of: &OfSize) -> Spread {
+    Spread::of(of.rows.iter().filter_map(|row| {
+        let outcome = row.outcome.as_ref()?;
+        // A vehicle that never claims has waited for all of the run.
+        Some(outcome.first_claim.unwrap_or(outcome.outputs) as f64 * super::judge::STEP)
+    }))
 }
 
 fn false_alarms(of: &OfSize) -> BTreeMap<String, u64> {

@@ -139,6 +139,12 @@ impl OfSize<'_> {
         self.rows.iter().filter_map(|row| row.outcome.as_ref()).map(value).sum()
     }
 
+    /// The number of runs that did not panic and of which something holds.
+    #[must_use]
+    pub fn count(&self, holds: impl Fn(&Outcome) -> bool) -> u64 {
+        self.sum(|outcome| u64::from(holds(outcome)))
+    }
+
     /// The greatest value of a run that did not panic.
     #[must_use]
     pub fn most(&self, value: impl Fn(&Outcome) -> f64) -> f64 {

@@ -66,15 +66,7 @@ impl Trial<'_> {
             let from = kind.draw_begin(seconds, &timetable.standing, &mut random);
             drawn.push((from, kind.at(size, from).map_err(CampaignError::Kind)?));
         }
-        let mut faults: Vec<&Fault> = Vec::new();
-        for (_, drawn) in &drawn {
-            match drawn {
-                Drawn::Nothing => {}
-                Drawn::Fault(fault) => faults.push(fault),
-                Drawn::Knock(knock) => scenario.laser.knocks.push(*knock),
-                Drawn::Carry(carry) => scenario.drive.carries.push(*carry),
-            }
-        }
+        let faults = enter(&drawn, &mut scenario);
         let simulation = simulate_with(&scenario, &faults, &mut random)?;
         let mut recording = simulation.recording;
         settings(&mut recording.parameters);
@@ -116,6 +108,20 @@ impl Trial<'_> {
         };
         Ok(Tried { outcome: judge.outcome(), is_accepted, can_recover })
     }
+}
+
+/// Enters what was drawn into the scenario, where that simulates it. Returns the faults of what is measured and told.
+fn enter<'a>(drawn: &'a [(f64, Drawn)], scenario: &mut Scenario) -> Vec<&'a Fault> {
+    let mut faults = Vec::new();
+    for (_, drawn) in drawn {
+        match drawn {
+            Drawn::Nothing => {}
+            Drawn::Fault(fault) => faults.push(fault),
+            Drawn::Knock(knock) => scenario.laser.knocks.push(*knock),
+            Drawn::Carry(carry) => scenario.drive.carries.push(*carry),
+        }
+    }
+    faults
 }
 
 /// A vehicle that is further away after a hundredth of a second, m, was carried.

@@ -132,24 +132,29 @@ fn main() -> ! {
         })
         .expect("the log can be read");
     associate(&stopwatch, &mut counts, map);
+    write_table(&stopwatch, counts, map);
+    debug::exit(debug::EXIT_SUCCESS);
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+/// Counts what needs no drive, and writes `instructions.csv`.
+fn write_table(stopwatch: &Stopwatch, counts: Counts, map: &mut FixedMap<1000>) {
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
     let Counts { prediction, reflector, scan, slam, falko, association, map_update } = counts;
-    let [few, many] = search::count(&stopwatch, map);
-    let [six, twenty] = separation::count(&stopwatch);
+    let [few, many] = search::count(stopwatch, map);
+    let [six, twenty] = separation::count(stopwatch);
     for count in
-        [prediction, reflector, association, falko, map_update, scan, slam, decode(&stopwatch), few, many, six, twenty]
+        [prediction, reflector, association, falko, map_update, scan, slam, decode(stopwatch), few, many, six, twenty]
     {
         let mean = count.total / count.runs.max(1);
         writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");
     }
     hprintln!("{}", text);
     output.write(text.as_bytes()).expect("the folder can be written");
-    debug::exit(debug::EXIT_SUCCESS);
-    loop {
-        cortex_m::asm::wfi();
-    }
 }
 
 /// Counts one event; reflectors one by one, as each is an update of its own.

@@ -18,6 +18,27 @@ pub fn has_setting(unknown: &Unknown) -> bool {
 /// The believed vehicle with what a fit has found of its wheels; none if it is of another kind.
 #[must_use]
 pub fn fitted_vehicle(believed: &Vehicle, found: &WheeledModel) -> Option<Vehicle> {
+    match believed {
+        Vehicle::Tricycle(believed) => fitted_tricycle(believed, found).map(Vehicle::Tricycle),
+        Vehicle::Wheels(believed) => fitted_wheels(believed, found).map(Vehicle::Wheels),
+        _ => None,
+    }
+}
+
+fn fitted_tricycle(believed: &Tricycle, found: &WheeledModel) -> Option<Tricycle> {
+    let found = found.wheels.first()?;
+    let offset = found.heading - believed.steering_offset_forward;
+    Some(Tricycle {
+        wheelbase: found.x,
+        drive_scale: believed.drive_scale * found.radius,
+        steering_scale: believed.steering_scale * ratio(found),
+        steering_offset_forward: found.heading,
+        steering_offset_backward: believed.steering_offset_backward + offset,
+        ..*believed
+    })
+}
+
+fn fitted_wheels(believed: &WheelVehicle, found: &WheeledModel) -> Option<WheelVehicle> {
     let wheel = |number: usize| found.wheels.get(number);
     let driven = |number: usize, before: &DrivenWheel| Some(DrivenWheel { radius: wheel(number)?.radius, ..*before });
     let steered = |number: usize, before: &SteeredWheel| {
@@ -35,23 +56,7 @@ pub fn fitted_vehicle(believed: &Vehicle, found: &WheeledModel) -> Option<Vehicl
         })
     };
     let arm = || wheel(0).map(|wheel| wheel.x.hypot(wheel.y));
-    let vehicle = match believed {
-        Vehicle::Tricycle(before) => {
-            let found = wheel(0)?;
-            let offset = found.heading - before.steering_offset_forward;
-            return Some(Vehicle::Tricycle(Tricycle {
-                wheelbase: found.x,
-                drive_scale: before.drive_scale * found.radius,
-                steering_scale: before.steering_scale * ratio(found),
-                steering_offset_forward: found.heading,
-                steering_offset_backward: before.steering_offset_backward + offset,
-                ..*before
-            }));
-        }
-        Vehicle::Wheels(vehicle) => vehicle,
-        _ => return None,
-    };
-    Some(Vehicle::Wheels(match vehicle {
+    Some(match believed {
         WheelVehicle::Differential(before) => WheelVehicle::Differential(axle(before)?),
         WheelVehicle::BiSteerable(before) => {
             let (front, rear) = (steered(0, &before.front)?, steered(1, &before.rear)?);
@@ -82,7 +87,7 @@ pub fn fitted_vehicle(believed: &Vehicle, found: &WheeledModel) -> Option<Vehicl
                 driven: all(before.driven, found),
             })
         }
-    }))
+    })
 }
 
 /// True steering angle over the one that the believed encoder states.

@@ -157,14 +157,6 @@ impl Fault {
         random: &mut Random,
     ) {
         match self.what {
-            FaultKind::LaserTurned { deg } => turn(seen, -deg.to_radians()),
-            FaultKind::LaserTurns { deg, seconds } => turn(seen, -deg.to_radians() * self.grown(time, seconds)),
-            FaultKind::LaserShaken { deg } => turn(seen, deg.to_radians() * random.normal()),
-            FaultKind::LaserShifted { x, y } => {
-                for observation in seen.iter_mut() {
-                    set_position(observation, &(position(observation) - Point::new(x, y)));
-                }
-            }
             FaultKind::WindowDirty { from_deg, to_deg, share } => seen.retain(|observation| {
                 let bearing = f64::from(observation.bearing).to_degrees();
                 !(is_behind(bearing, from_deg, to_deg) && random.happens(share))
@@ -182,6 +174,35 @@ impl Fault {
                     add(seen, libm::atan2(image.y, image.x), image.norm());
                 }
             }
+            FaultKind::PeopleShine { .. } => {
+                for point in laser.people(time) {
+                    add(seen, libm::atan2(point.y, point.x), point.norm());
+                }
+            }
+            FaultKind::ReflectorsGone { .. } => seen.retain(|observation| !laser.has_gone(observation)),
+            FaultKind::SunShines { towards_deg, half_width_deg } => {
+                let sensor = seen.first().and_then(|first| laser.sensor(first.time));
+                if let Some(sensor) = sensor.filter(|_| half_width_deg > 0.0) {
+                    dazzle(seen, towards_deg - sensor.theta.to_degrees(), half_width_deg, random);
+                }
+            }
+            _ => {}
+        }
+        self.falsify(seen, time, laser, random);
+        seen.sort_by_key(|observation| observation.time);
+    }
+
+    /// Makes ranges and bearings of all reflectors false.
+    fn falsify(&self, seen: &mut [ReflectorObservation], time: f64, laser: &mut LaserState, random: &mut Random) {
+        match self.what {
+            FaultKind::LaserTurned { deg } => turn(seen, -deg.to_radians()),
+            FaultKind::LaserTurns { deg, seconds } => turn(seen, -deg.to_radians() * self.grown(time, seconds)),
+            FaultKind::LaserShaken { deg } => turn(seen, deg.to_radians() * random.normal()),
+            FaultKind::LaserShifted { x, y } => {
+                for observation in seen.iter_mut() {
+                    set_position(observation, &(position(observation) - Point::new(x, y)));
+                }
+            }
             FaultKind::RangesLong { metres } => {
                 for observation in seen.iter_mut() {
                     observation.range += metres as f32;
@@ -192,12 +213,6 @@ impl Fault {
                     observation.range = (observation.range + (metres * random.normal()) as f32).max(0.1);
                 }
             }
-            FaultKind::PeopleShine { .. } => {
-                for point in laser.people(time) {
-                    add(seen, libm::atan2(point.y, point.x), point.norm());
-                }
-            }
-            FaultKind::ReflectorsGone { .. } => seen.retain(|observation| !laser.has_gone(observation)),
             FaultKind::RangesWander { metres, seconds } => {
                 let error = laser.wandering(metres, seconds, revolution_of(time), random);
                 for observation in seen.iter_mut() {
@@ -213,15 +228,8 @@ impl Fault {
                     set_position(observation, &tilt.seen(&position(observation)));
                 }
             }
-            FaultKind::SunShines { towards_deg, half_width_deg } => {
-                let sensor = seen.first().and_then(|first| laser.sensor(first.time));
-                if let Some(sensor) = sensor.filter(|_| half_width_deg > 0.0) {
-                    dazzle(seen, towards_deg - sensor.theta.to_degrees(), half_width_deg, random);
-                }
-            }
             _ => {}
         }
-        seen.sort_by_key(|observation| observation.time);
     }
 }
 
