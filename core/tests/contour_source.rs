@@ -375,3 +375,22 @@ fn surroundings_that_are_cut_are_said_to_be() {
     }
     assert_eq!((narrow.outputs().pose.overflows, wide.outputs().pose.overflows), (1, 0));
 }
+
+/// What a controller asks any localiser.
+fn has_map(localizer: &impl agv_core::localizer::Localize) -> bool {
+    localizer.contours().is_some()
+}
+
+#[test]
+fn any_localiser_tells_its_map_if_it_is_used() {
+    let map = kept_map(&room(), &Pose::default());
+    for (is_on, map) in [(true, Some(map)), (true, None), (false, Some(map))] {
+        let mut parameters = parameters();
+        parameters.sources.contours = is_on;
+        let mut drive = Drive::new(parameters, room(), map, 1);
+        let expected = is_on && map.is_some();
+        assert_eq!(drive.localizer.contours().is_some(), expected);
+        assert_eq!(has_map(&*drive.localizer), expected);
+        assert_eq!(has_map(&&mut *drive.localizer), expected);
+    }
+}

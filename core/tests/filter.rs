@@ -430,3 +430,11 @@ proptest! {
         prop_assert_eq!(with_entries(entries).covariance_entries(), entries);
     }
 }
+
+#[test]
+fn states_are_equal_if_pose_and_covariance_are() {
+    let state = |x: f64, variance: f64| Ekf::with_covariance(Pose::new(x, 1.0, 0.2), &(Matrix3::identity() * variance));
+    assert_eq!(state(0.5, 1e-4), state(0.5, 1e-4));
+    assert_ne!(state(0.5, 1e-4), state(0.5, 2e-4));
+    assert_ne!(state(0.5, 1e-4), state(0.6, 1e-4));
+}

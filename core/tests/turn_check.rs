@@ -94,6 +94,7 @@ fn windows_overlap_by_half() {
     assert!(!is_told(&[(160, 290)], 3.5e-6), "4.6e-4 rad");
     assert!(!is_told(&[(305, 430)], 3.5e-6), "4.4e-4 rad");
     assert!(is_told(&[(160, 290), (305, 430)], 3.5e-6), "8.9e-4 rad");
+    assert!(!is_told(&[(10, 140), (500, 630)], 3.5e-6), "in no window together");
 }
 
 #[test]

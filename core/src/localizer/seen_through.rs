@@ -77,10 +77,12 @@ fn passes(scan: &Scan, place: &Point) -> bool {
     let reach = BESIDE.0 / range + BESIDE.1;
     let from_first = (libm::atan2(place.y, place.x) - scan.first_bearing) * libm::copysign(1.0, scan.bearing_step);
     let beams = libm::ceil(2.0 * reach / step) as usize + 1;
+    let turn = libm::round(TAU / step) as usize;
     (0..beams.min(scan.ranges.len())).all(|beam| {
         let angle = (from_first - reach + beam as f64 * step) % TAU;
         let angle = if angle < 0.0 { angle + TAU } else { angle };
-        let end = scan.ranges.get(libm::round(angle / step) as usize);
+        // Past the last beam of a whole turn is the first one.
+        let end = (libm::round(angle / step) as usize).checked_rem(turn).and_then(|index| scan.ranges.get(index));
         end.is_some_and(|end| end.is_finite() && f64::from(*end) > range + BEHIND)
     })
 }
