@@ -288,3 +288,17 @@ fn a_laser_that_moves_while_it_looks_is_found_where_it_is() {
     let off = pose.between(&fix.expect("it is found").pose);
     assert!(off.position().norm() < 0.02 && off.theta.abs() < 0.005, "{off:?}");
 }
+
+/// The map is replaced by that of a room that stands elsewhere, as the same hall in the frame of another survey.
+#[test]
+fn in_another_map_the_place_is_that_of_the_other_map() {
+    let shift = Pose::new(3.0, -2.0, 0.0);
+    let moved: Walls =
+        room().iter().map(|[ax, ay, bx, by]| [ax + shift.x, ay + shift.y, bx + shift.x, by + shift.y]).collect();
+    let mut vehicle = Switched::new(map(&room()), Pose::new(0.5, 1.0, -0.6));
+    assert_eq!(vehicle.revolve(&room(), &Pose::default()), None);
+    vehicle.map = map(&moved);
+    vehicle.search.forget_contours();
+    let fix = (0..6).find_map(|_| vehicle.revolve(&room(), &Pose::default())).unwrap();
+    assert!(is_near(&fix.pose, &shift.compose(&vehicle.pose)), "{fix:?}");
+}

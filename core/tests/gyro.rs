@@ -650,11 +650,10 @@ fn a_pose_that_begins_anew_says_nothing_of_the_gyro() {
 #[test]
 fn a_given_pose_that_is_wrong_teaches_the_gyro_nothing() {
     let mut drive = fitted(4);
-    drive.stand(5.0);
     drive.sees = false;
-    drive.go(20.0, 0.5, 0.3, |_| false);
+    drive.go(10.0, 0.5, 0.3, |_| false);
     let pose = Pose { theta: drive.truth.theta + 0.05, ..drive.truth };
-    let fix = PoseFix { time: drive.now(), pose, position_deviation: 0.05, heading_deviation: 0.05 };
+    let fix = PoseFix { time: drive.now(), pose, position_deviation: 0.05, heading_deviation: 0.09 };
     drive.localizer.handle(&Event::SetPose(fix));
     let before = drive.localizer.gyro_errors().unwrap().bias;
     drive.revolve();
@@ -680,4 +679,34 @@ fn while_the_wheels_tell_nothing_no_bias_is_learnt() {
         drive.localizer.handle(&Event::Gyro(GyroSample { time: time.offset(0.005), rate }));
     }
     assert_eq!(before, drive.localizer.gyro_errors());
+}
+
+/// A vehicle that turns on the spot as slowly as the bias may be does not stand.
+#[test]
+fn a_slow_turn_is_not_taken_for_the_bias() {
+    let mut drive = fitted(6);
+    drive.sees = false;
+    drive.go(2.0, 0.3, 0.0, |_| false);
+    let before = drive.localizer.gyro_errors().unwrap().bias;
+    drive.go(10.0, 0.0, 0.01, |_| false);
+    let after = drive.localizer.gyro_errors().unwrap().bias;
+    assert!((after - before).abs() < 1e-3, "{before} {after}");
+}
+
+/// By finite differences of the displacement itself: what the turn's variance adds is along its derivative.
+#[test]
+fn the_covariance_of_another_turn_is_that_of_its_derivative() {
+    let covariance = Matrix3::new(4e-4, 1e-4, 0.0, 1e-4, 3e-4, 0.0, 0.0, 0.0, 2e-4);
+    let displacement = Pose::new(0.3, -0.4, 0.2);
+    let motion = Motion { displacement, covariance, ..Motion::none(Time::from_micros(5)) };
+    for (turn, variance) in [(0.2, 1e-2), (-0.5, 2e-2), (0.9, 5e-3)] {
+        let at = |turn: f64| motion.with_turn(turn, variance).displacement;
+        let (less, more) = (at(turn - 1e-6), at(turn + 1e-6));
+        let by = nalgebra::Vector3::new((more.x - less.x) / 2e-6, (more.y - less.y) / 2e-6, 1.0);
+        let mut own = covariance;
+        own.m33 = 0.0;
+        let expected = own + by * by.transpose() * variance;
+        let found = motion.with_turn(turn, variance).covariance;
+        assert!((found - expected).norm() < 1e-9, "{found} {expected}");
+    }
 }

@@ -727,3 +727,30 @@ fn the_heading_is_bounded_by_what_is_known_of_the_bias_of_a_gyro() {
         assert!((found / expected - 1.0).abs() < 0.02, "{known}: {found} {expected}");
     }
 }
+
+/// The laser stands elsewhere than is believed; a pose that is known, on the spot where the vehicle turns, tells where.
+#[test]
+fn a_free_mounting_finds_where_the_laser_is() {
+    let (mount, truth) = (Pose::new(0.8, 0.1, 0.0), Pose::new(0.95, -0.1, 0.04));
+    let reflectors: Vec<Point> = (0..6).map(|number| Point::new(9.0 - 4.0 * f64::from(number), 7.0)).collect();
+    let mut solution =
+        Solution::new(Pose::default(), &[1e-8, 0.0, 1e-8, 0.0, 0.0, 1e-10], &AssumedDeviations::default());
+    assert_eq!(solution.mounting_error(), (0.0, 0.0));
+    solution.free_mounting();
+    for _ in 0..8 {
+        let sensor = truth;
+        let see = |landmark: &Point| Seen {
+            position: sensor.inverse_transform(landmark),
+            covariance: Matrix2::identity() * 1e-6,
+            landmark: *landmark,
+            landmark_variance: 1e-9,
+        };
+        let all: Vec<Seen> = reflectors.iter().map(see).collect();
+        let believed = solution.pose().compose(&mount);
+        let laser = Laser { mount, sensor: believed, velocity: Vector3::zeros() };
+        let _ = solution.correct(&sum(&all, &believed), &laser);
+    }
+    let (place, yaw) = solution.mounting_error();
+    let expected = 0.15_f64.hypot(0.2);
+    assert!((place - expected).abs() < 0.01 && (yaw - 0.04).abs() < 2e-3, "{place} m, {yaw} rad");
+}

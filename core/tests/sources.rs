@@ -241,3 +241,17 @@ fn a_vehicle_rests_on_an_aid_that_says_all_of_the_pose() {
         assert_eq!(stage.said().mode, mode);
     }
 }
+
+#[test]
+fn a_source_says_when_it_was_used_last_while_it_tells_nothing_of_use() {
+    let mut stage = driven(Switches::ALL, false);
+    let before = stage.localizer.outputs().sources.reflectors;
+    assert!(before.used.is_some() && before.told.is_some());
+    stage.drive(0.6, 0.1);
+    let time = stage.time();
+    stage.localizer.handle(&agv_core::localizer::Event::Reflectors(agv_core::measurement::Reflectors::of_first(&[
+        agv_core::measurement::ReflectorObservation { time, range: 2.0, bearing: 0.7 },
+    ])));
+    let after = stage.localizer.outputs().sources.reflectors;
+    assert_eq!((after.used, after.accepted, after.told), (before.used, 0, Some(time)));
+}

@@ -59,13 +59,25 @@ fn it_turns_on_the_spot() {
     assert_eq!(odometer.speed(&wild), Err(OdometryError::Implausible));
 }
 
-/// Between two speeds anything may have happened: a quarter of a second is the most.
+/// Speeds cannot be taken for others, as counters can after a whole turn: the settings alone say what a pause is.
 #[test]
-fn a_longer_pause_is_told() {
-    for (step, expected) in [(25, None), (26, Some(OdometryError::Pause))] {
-        let mut odometer = odometer();
+fn the_longest_interval_is_that_of_the_settings() {
+    let vehicle = Vehicle::TricycleSpeed(TricycleSpeed { wheelbase: WHEELBASE, steering_offset: OFFSET });
+    for (longest_interval, step, expected) in [
+        (0.25, 25, None),
+        (0.25, 26, Some(OdometryError::Pause)),
+        (2.0, 150, None),
+        (2.0, 201, Some(OdometryError::Pause)),
+    ] {
+        let parameters = OdometerParameters {
+            noise: OdometryNoise::default(),
+            integration: Integration::Arc,
+            fastest: 5.0,
+            longest_interval,
+        };
+        let mut odometer = VehicleOdometer::new(&vehicle, &parameters);
         let sample = |step| SpeedSample { time: at(step), speed: 0.5, steering: 0.0 };
         assert_eq!(odometer.speed(&sample(0)), Err(OdometryError::First));
-        assert_eq!(odometer.speed(&sample(step)).err(), expected, "{step}");
+        assert_eq!(odometer.speed(&sample(step)).err(), expected, "{longest_interval} s, {step}");
     }
 }
