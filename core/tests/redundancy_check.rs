@@ -271,3 +271,32 @@ fn a_long_way_behind_hides_no_slip() {
     // 20 m: what lasts may be 44 mm; of 0.3 m it is below a millimetre.
     assert!(even(&mut check, 0.01, 3e-4, &errors, 30));
 }
+
+/// The localiser asks the check, and says what it finds; a pause forgets the way behind.
+#[test]
+fn a_localiser_says_that_a_wheel_slips() {
+    use agv_core::geometry::Pose;
+    use agv_core::localizer::{Event, Localizer, Parameters, PoseFix, Reason, SlamCapacities};
+    use agv_core::odometry::{Vehicle, WheelVehicle};
+    let vehicle = Vehicle::Wheels(WheelVehicle::FourOmnidirectional(omni()));
+    let mut localizer = Box::new(Localizer::<SlamCapacities>::new(Parameters::new(vehicle, Pose::default())));
+    let mut turned = [0.0; 4];
+    let mut said = Vec::new();
+    for step in 0..200_u64 {
+        let time = Time::from_micros(1_000_000 + 10_000 * step);
+        let wheels = turned.map(|way: f64| WheelReading { count: (way / TICK).round() as i64 as u32, steering: 0 });
+        let reason = localizer.handle(&Event::Wheels(WheelSample { time, wheels })).pose.reason;
+        if step == 0 {
+            let fix = PoseFix { time, pose: Pose::default(), position_deviation: 0.01, heading_deviation: 0.003 };
+            localizer.handle(&Event::SetPose(fix));
+        }
+        if reason == Reason::WheelsSlip {
+            said.push(step);
+        }
+        for (number, (turned, share)) in turned.iter_mut().zip(OMNI).enumerate() {
+            let slips = number == 1 && step >= 100;
+            *turned += share * STEP * if slips { 1.3 } else { 1.0 };
+        }
+    }
+    assert!(said.first().is_some_and(|first| (101..140).contains(first)), "{said:?}");
+}
