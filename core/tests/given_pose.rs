@@ -53,3 +53,32 @@ fn the_distance_since_a_pose_in_the_past_is_what_was_driven_since() {
     let said = stage.localizer.handle(&Event::SetPose(fix)).pose;
     assert!((said.dead_reckoning_distance - 0.174).abs() < 1e-9, "{said:?}");
 }
+
+/// The distance without landmarks after which a pose is lost: at the limit itself it is not.
+#[test]
+fn a_pose_is_lost_beyond_the_longest_way_and_not_at_it() {
+    let mut limited = parameters();
+    limited.limits.lost_after = 0.25;
+    let mut stage = Stage::told(limited);
+    for step in 1..=20 {
+        stage.sample += 1;
+        // A sixty-fourth of a metre, so that sums are exact.
+        stage.report(&agv_core::geometry::Pose::new(1.0 / 64.0, 0.0, 0.0));
+        let lost = stage.said().mode == Mode::Lost;
+        assert_eq!(lost, step > 16, "{step}: {:?}", stage.said());
+    }
+}
+
+/// A level is kept only if it is asked for.
+#[test]
+fn without_protection_the_level_stays_as_it_was() {
+    let mut parameters = parameters();
+    parameters.protection = false;
+    let mut stage = Stage::told(parameters);
+    let before = stage.said().level;
+    for _ in 0..5 {
+        let revolution = stage.revolve(0.5, 0.1);
+        stage.glimpse(&revolution);
+        assert_eq!(stage.said().level, before);
+    }
+}

@@ -655,11 +655,14 @@ fn a_given_pose_that_is_wrong_teaches_the_gyro_nothing() {
     let pose = Pose { theta: drive.truth.theta + 0.05, ..drive.truth };
     let fix = PoseFix { time: drive.now(), pose, position_deviation: 0.05, heading_deviation: 0.09 };
     drive.localizer.handle(&Event::SetPose(fix));
-    let before = drive.localizer.gyro_errors().unwrap().bias;
+    let before = drive.localizer.gyro_errors().unwrap();
     drive.revolve();
-    let after = drive.localizer.gyro_errors().unwrap().bias;
+    let after = drive.localizer.gyro_errors().unwrap();
     assert!(drive.heading_error().abs() < 0.02, "the heading is put right: {}", drive.heading_error());
-    assert!((after - before).abs() < 1e-5, "{before} {after}");
+    assert!(
+        (after.bias - before.bias).abs() < 1e-6 && (after.scale - before.scale).abs() < 1e-6,
+        "{before:?} {after:?}"
+    );
 }
 
 /// Whether a vehicle without odometry stands, nobody knows.

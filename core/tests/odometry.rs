@@ -561,3 +561,94 @@ fn the_recent_motion_is_that_of_one_to_two_tenths_of_a_second() {
     assert_eq!(recent.pose_at(recent.end().offset(1.0)), recent.pose_at(recent.end().offset(0.32)));
     assert_eq!(recent.pose_at(recent.end().offset(-1.0)), recent.pose_at(recent.end().offset(-0.32)));
 }
+
+/// What a vehicle says of its direction: one that stands keeps that of the step before, where it can.
+#[test]
+fn a_step_says_which_way_it_went() {
+    use agv_core::odometry::TricycleSpeed;
+    let believed =
+        |was_backward| Believed { noise: OdometryNoise::default(), integration: Integration::Arc, was_backward };
+    let vehicle = TricycleSpeed { wheelbase: 1.2, steering_offset: 0.0 };
+    for (speed, is_backward) in [(0.5, false), (-0.5, true), (0.0, false)] {
+        let sample = |micros: u64| SpeedSample { time: Time::from_micros(micros), speed, steering: 0.1 };
+        assert_eq!(
+            vehicle.step(&sample(0), &sample(10_000), 0.01, &believed(false)).is_backward,
+            is_backward,
+            "{speed}"
+        );
+    }
+    let tricycle = Tricycle {
+        wheelbase: 1.2,
+        drive_scale: 1e-4,
+        drive_range: CounterRange::BITS_32,
+        steering_scale: 1e-3,
+        steering_range: CounterRange::BITS_16,
+        steering_offset_forward: 0.0,
+        steering_offset_backward: 0.0,
+    };
+    let sample =
+        |micros: u64, drive: i32| EncoderSample { time: Time::from_micros(micros), drive: drive as u32, steering: 0 };
+    for (counts, was_backward, is_backward) in [
+        (50, false, false),
+        (50, true, false),
+        (-50, false, true),
+        (-50, true, true),
+        (0, false, false),
+        (0, true, true),
+    ] {
+        let step = tricycle.step(&sample(0, 0), &sample(10_000, counts), 0.01, &believed(was_backward));
+        assert_eq!(step.is_backward, is_backward, "{counts}, {was_backward} before");
+    }
+}
+
+/// A vehicle that reports its steps as they are.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    step: agv_core::odometry::Step,
+}
+
+impl Kinematics for Told {
+    type Report = Time;
+
+    fn time(report: &Time) -> Time {
+        *report
+    }
+
+    fn is_sound(&self, _: &Time) -> bool {
+        true
+    }
+
+    fn step(&self, _: &Time, _: &Time, _: f64, _: &Believed) -> agv_core::odometry::Step {
+        self.step
+    }
+
+    fn steering_lever(&self) -> Option<f64> {
+        None
+    }
+
+    fn longest_interval(&self, _: f64) -> f64 {
+        f64::INFINITY
+    }
+}
+
+#[test]
+fn a_step_of_which_a_part_is_no_number_is_implausible() {
+    let sound = agv_core::odometry::Step { distance: 0.01, ..agv_core::odometry::Step::standing(false) };
+    let mut no_place = sound;
+    no_place.displacement.y = f64::NAN;
+    let mut no_covariance = sound;
+    no_covariance.covariance.m12 = f64::INFINITY;
+    let no_distance = agv_core::odometry::Step { distance: f64::NAN, ..sound };
+    let parameters = OdometerParameters {
+        noise: OdometryNoise::default(),
+        integration: Integration::default(),
+        fastest: 5.0,
+        longest_interval: 1.0,
+    };
+    for (step, is_sound) in [(sound, true), (no_place, false), (no_covariance, false), (no_distance, false)] {
+        let mut odometer = agv_core::odometry::Odometer::new(Told { step }, &parameters);
+        assert_eq!(odometer.report(&Time::from_micros(0)), Err(OdometryError::First));
+        let found = odometer.report(&Time::from_micros(10_000));
+        assert_eq!(found.err(), (!is_sound).then_some(OdometryError::Implausible), "{step:?}");
+    }
+}

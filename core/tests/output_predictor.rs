@@ -232,3 +232,16 @@ fn speeds_and_increments_move_the_pose_from_the_first_output_on() {
     let off = base(time(0)).pose.between(&predictor.output().expect("there is one").pose);
     assert!((off.x - 8e-3).abs() < 1e-12 && off.y.abs() < 1e-12 && off.theta.abs() < 1e-12, "{off:?}");
 }
+
+#[test]
+fn at_the_limit_of_dead_reckoning_itself_the_pose_rests_on_landmarks() {
+    let mut parameters = parameters();
+    parameters.limits.dead_reckoning_from = 0.5;
+    for (distance, mode) in [(0.5, Mode::Reflectors), (0.5000001, Mode::DeadReckoning)] {
+        let mut predictor: OutputPredictor = OutputPredictor::new(&parameters);
+        predictor.encoders(&sample(0));
+        let base = PoseOutput { mode: Mode::Reflectors, dead_reckoning_distance: distance, ..base(sample(0).time) };
+        predictor.update(&base, &OdometryBias::default());
+        assert_eq!(predictor.output().map(|output| output.mode), Some(mode), "{distance}");
+    }
+}

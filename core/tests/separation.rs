@@ -754,3 +754,26 @@ fn a_free_mounting_finds_where_the_laser_is() {
     let expected = 0.15_f64.hypot(0.2);
     assert!((place - expected).abs() < 0.01 && (yaw - 0.04).abs() < 2e-3, "{place} m, {yaw} rad");
 }
+
+#[test]
+fn a_solution_says_the_covariance_that_it_was_given() {
+    let entries = [4e-4, 1e-5, 3e-4, 2e-6, 1e-6, 1e-4];
+    let solution = Solution::new(Pose::new(1.0, 2.0, 0.5), &entries, &AssumedDeviations::default());
+    for (said, given) in solution.entries().iter().zip(entries) {
+        assert!((said - given).abs() < 1e-15, "{said} {given}");
+    }
+}
+
+/// A whole pose is three numbers: with landmarks that tell the same three, all of them are left to contradict.
+#[test]
+fn a_pose_among_landmarks_has_three_degrees_of_freedom() {
+    let mut random = Random::new(9);
+    let sensor = Pose::new(2.0, 1.0, 0.7);
+    let all: Vec<Seen> = (0..4).map(|_| landmark(&mut random, &sensor, 0.01)).collect();
+    let landmarks = sum(&all, &sensor);
+    assert_eq!(landmarks.misfit().1, 5.0);
+    let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-6));
+    let pose = SensorInformation::of_pose(&sensor, &covariance, &[0.0; 3], &sensor);
+    assert_eq!(pose.misfit().1, 0.0);
+    assert_eq!(landmarks.with(&pose).misfit().1, 8.0);
+}

@@ -160,6 +160,35 @@ fn a_vehicle_that_is_carried_meanwhile_is_looked_for_anew() {
     assert_eq!(start.told_after(&all, 7), None);
 }
 
+/// Carried aside without a turn, or turned on the spot, as a lift or a turntable does: too much is seen that does not fit, or enough anew.
+#[test]
+fn a_vehicle_that_is_only_moved_or_only_turned_meanwhile_is_looked_for_anew() {
+    for carried in [Pose::new(1.0, 0.4, 0.0), Pose::new(0.0, 0.0, 0.3)] {
+        let mut start = Start::new(&reflectors());
+        let all = places(0..12);
+        assert_eq!(start.told_after(&all, 6), None);
+        start.pose = start.pose.compose(&carried);
+        assert_eq!(start.told_after(&all, 7), None, "{carried:?}");
+    }
+}
+
+/// Far reflectors may be too weak to be seen.
+#[test]
+fn a_reflector_further_off_than_fifteen_metres_is_not_missing() {
+    for (x, is_told) in [(-14.0, false), (-21.0, true)] {
+        let far = Landmark::reflector(90, Point::new(x, 0.7), 0.002);
+        let landmarks: Vec<Landmark> = reflectors().into_iter().chain([far]).collect();
+        let all = places(0..12);
+        let mut start = Start::new(&landmarks);
+        let told = (0..20).find(|_| {
+            let told = start.told_after(&all, 1);
+            start.scan(&[]);
+            told.is_some()
+        });
+        assert_eq!(told.is_some(), is_told, "{x}");
+    }
+}
+
 #[test]
 fn one_reflector_in_three_that_the_map_does_not_have_is_too_much() {
     let strangers = [Point::new(1.0, 3.0), Point::new(-4.0, -2.0), Point::new(5.5, 2.2)];

@@ -177,6 +177,11 @@ fn short_ways_are_one_part_and_long_ones_none_together() {
     // Less than 0.06 m: both corrections are of one part.
     assert!(!is_told(0.0, &shrunk, &[(0.02, 0.05, 0.0), (0.02, 0.05, 0.0)]));
     assert!(is_told(0.0, &shrunk, &[(0.07, 0.05, 0.0), (0.07, 0.05, 0.0)]));
+    // At the limit they are two.
+    assert!(is_told(0.0, &shrunk, &[(0.06, 0.05, 0.0), (0.06, 0.05, 0.0)]));
+    // After 0.3 m without a correction what was before still counts, after more it does not.
+    assert!(is_told(0.0, &shrunk, &[(0.1, 0.05, 0.0), (0.3, 0.1, 0.0)]));
+    assert!(!is_told(0.0, &shrunk, &[(0.1, 0.05, 0.0), (0.31, 0.1, 0.0)]));
     // More than 0.5 m together.
     assert!(!is_told(0.0, &shrunk, &[(0.28, 0.2, 0.0), (0.28, 0.2, 0.0)]));
     assert!(is_told(0.0, &shrunk, &[(0.22, 0.2, 0.0), (0.22, 0.2, 0.0)]));
@@ -197,4 +202,12 @@ fn what_was_put_right_while_unsure_tells_nothing() {
     assert!(!check.slips(now));
     check.correct(&before, &after, now);
     assert!(check.slips(now));
+}
+
+/// Without noise the least share of the way decides alone, and is itself no slip.
+#[test]
+fn six_hundredths_of_the_way_are_no_slip_and_more_are() {
+    let known = Matrix3::zeros();
+    assert!(!is_told(0.0, &known, &[(0.1, 0.006, 0.0), (0.1, 0.006, 0.0)]));
+    assert!(is_told(0.0, &known, &[(0.1, 0.00601, 0.0), (0.1, 0.00601, 0.0)]));
 }

@@ -121,9 +121,29 @@ fn a_gyro_is_frozen_only_if_the_wheels_move() {
 fn a_gyro_is_missing_after_a_tenth_of_a_second() {
     use agv_core::integrity::GyroFault;
     let moved = motion(30, 0.01, 0.0, 1e-9);
-    for (last, fault) in [(21, None), (19, Some(GyroFault::Missing))] {
+    for (last, fault) in [(21, None), (20, None), (19, Some(GyroFault::Missing))] {
         let mut check = TurnCheck::new();
         check.travel_alone(&moved, Some(motion(last, 0.0, 0.0, 0.0).end));
         assert_eq!(check.fault(moved.end), fault, "{last}");
+    }
+}
+
+/// The second window begins in the middle of the first one, be it of the way or of the time: of three motions of which the second ends
+/// there, it has the last two.
+#[test]
+fn the_second_window_begins_in_the_middle() {
+    let lasting = LastingErrors { steering: 0.0, turn: 0.0, bias: 0.0 };
+    for (way, micros) in [(0.075, 10_000), (0.0, 750_000)] {
+        let mut check = TurnCheck::new();
+        let at = |number: u64| Time::from_micros(1_000_000 + micros * number);
+        let ratios = [-1e-3, 1e-3, 1e-3].map(|turn| {
+            let number = 0;
+            let mut wheels = Motion { start: at(number), ..Motion::none(at(number + 1)) };
+            (wheels.displacement.theta, wheels.distance) = (turn, way);
+            let gyro = Motion { displacement: Pose::default(), ..wheels };
+            check.travel(&wheels, &gyro, 0.0, &lasting)
+        });
+        let [.., last] = ratios;
+        assert!((last - 4e-6 / 1e-8 / 36.0).abs() < 1e-6, "{way} m, {micros} us: {ratios:?}");
     }
 }
