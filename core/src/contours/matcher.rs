@@ -79,10 +79,7 @@ impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> ContourMatcher<P
         let is_kept = self.ring.wants(pose);
         if is_kept {
             self.ring.keep(pose, &self.points);
-            self.submap.begin(pose);
-            for key in self.ring.iter() {
-                self.submap.add(&key.pose, key.points.iter());
-            }
+            self.submap.surround(pose, &self.ring);
         }
         is_kept
     }

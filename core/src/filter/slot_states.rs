@@ -11,9 +11,7 @@ use crate::geometry::{Point, Pose};
 impl<S: Slots> Ekf<S> {
     /// Begins at a pose; what was known of the biases is kept, past poses and landmarks are forgotten.
     pub fn begin(&mut self, state: &Ekf) {
-        for slot in 0..self.poses.as_ref().len() {
-            self.forget_pose(slot);
-        }
+        self.forget_poses();
         for slot in 0..self.landmarks.as_ref().len() {
             self.remove_landmark(slot);
         }
@@ -58,6 +56,24 @@ impl<S: Slots> Ekf<S> {
         }
     }
 
+    /// Makes a past pose less sure by these variances, m^2 an axis and rad^2, of errors that nothing else has.
+    pub fn doubt_past_pose(&mut self, slot: usize, position: f64, heading: f64) {
+        if self.past_pose(slot).is_some() {
+            self.add_variances(pose_state(slot), [position, position, heading]);
+        }
+    }
+
+    /// Makes the present pose less sure by these variances, m^2 an axis and rad^2.
+    pub fn doubt_pose(&mut self, position: f64, heading: f64) {
+        self.add_variances(0, [position, position, heading]);
+    }
+
+    fn add_variances(&mut self, first: usize, variances: [f64; 3]) {
+        for (state, variance) in (first..).zip(variances) {
+            self.covariance.set(state, state, self.covariance.get(state, state) + variance);
+        }
+    }
+
     /// Frees a slot for past poses.
     pub fn forget_pose(&mut self, slot: usize) {
         if let Some(place) = self.poses.as_mut().get_mut(slot)
@@ -66,6 +82,13 @@ impl<S: Slots> Ekf<S> {
             for axis in 0..3 {
                 self.covariance.clear(pose_state(slot) + axis);
             }
+        }
+    }
+
+    /// Frees all of them.
+    pub fn forget_poses(&mut self) {
+        for slot in 0..self.poses.as_ref().len() {
+            self.forget_pose(slot);
         }
     }
 

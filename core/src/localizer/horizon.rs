@@ -42,8 +42,13 @@ impl<C: Capacities> Localizer<C> {
         if self.uses_contours() {
             self.fuse_contours_by_slam(mount, &place, scan.laser);
         }
-        // Key scans are those of the first laser.
-        let is_aligned = scan.laser == LaserId::FIRST && self.parameters.sources.key_scans;
+        // What lies behind is seen by the first laser.
+        let is_first = scan.laser == LaserId::FIRST;
+        let is_behind = is_first && self.uses_contours_behind();
+        if is_behind {
+            self.fuse_contours_behind(mount, &place);
+        }
+        let is_aligned = is_first && !is_behind && self.parameters.sources.key_scans;
         if is_aligned {
             let status = &mut self.outputs.sources.key_scans;
             status.begin(self.slam.time());
@@ -51,6 +56,9 @@ impl<C: Capacities> Localizer<C> {
         }
         self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
+        if is_behind {
+            self.keep_contours_behind(mount, &place);
+        }
         if is_aligned {
             self.slam.keep(self.features.points(), &place, &self.parameters);
         }

@@ -40,6 +40,10 @@ pub enum Map {
     SlamCorners,
     /// Alignment to key scans, and no features.
     SlamKeyScans,
+    /// Contours of the way behind, and no features.
+    SlamContours,
+    /// Both.
+    SlamContoursAndFeatures,
     /// Features mapped by a drive on another path, and all of [`Map::Slam`].
     StaticSlam,
     /// Surveyed reflectors and features mapped on another path.
@@ -61,7 +65,20 @@ impl Map {
     }
 
     fn is_slam(self) -> bool {
-        matches!(self, Self::Slam | Self::SlamFeatures | Self::SlamCorners | Self::SlamKeyScans | Self::StaticSlam)
+        matches!(
+            self,
+            Self::Slam
+                | Self::SlamFeatures
+                | Self::SlamCorners
+                | Self::SlamKeyScans
+                | Self::SlamContours
+                | Self::SlamContoursAndFeatures
+                | Self::StaticSlam
+        )
+    }
+
+    fn has_contours(self) -> bool {
+        matches!(self, Self::SlamContours | Self::SlamContoursAndFeatures)
     }
 
     fn has_key_scans(self) -> bool {
@@ -95,7 +112,7 @@ const SIDE_SLIP: f64 = 0.6e-3;
 
 impl Method {
     /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::mended("odometry", Map::Odometry),
         Self::mended("reflectors", Map::Reflectors),
         Self::mended("static", Map::Static),
@@ -116,6 +133,11 @@ impl Method {
             sources: Switches { corners: false, end_points: false, ..Switches::ALL },
             ..Self::mended("slam with key scans alone", Map::SlamKeyScans)
         },
+        Self {
+            sources: Switches { corners: false, end_points: false, ..Switches::ALL },
+            ..Self::mended("slam with contours alone", Map::SlamContours)
+        },
+        Self::mended("slam with contours and features", Map::SlamContoursAndFeatures),
         Self::mended("slam", Map::Slam),
         Self::mended("static and slam", Map::StaticSlam),
         Self::mended("mixed", Map::Mixed),
@@ -257,7 +279,8 @@ pub fn prepare(
         // Scale and steering offset are in the state, so the noise need not stand for them.
         recording.parameters.odometry_noise.side_slip = SIDE_SLIP;
     }
-    recording.parameters.sources = Switches { key_scans: method.map.has_key_scans(), ..method.sources };
+    recording.parameters.sources =
+        Switches { key_scans: method.map.has_key_scans(), contours: method.map.has_contours(), ..method.sources };
     if method.map.has_static_features() {
         let mut mapping = scenario(
             BlockStoragePath::Mapping,
