@@ -1,6 +1,6 @@
 //! Biases, past poses and landmarks as parts of the state.
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix3};
 
 use super::biases::{BiasDeviations, SCALE, STEERING, YAW};
 use super::slots::{PastPose, Slots, StateLandmark, pose_state};
@@ -56,20 +56,35 @@ impl<S: Slots> Ekf<S> {
         }
     }
 
-    /// Makes a past pose less sure by these variances, m^2 an axis and rad^2, of errors that nothing else has.
-    pub fn doubt_past_pose(&mut self, slot: usize, position: f64, heading: f64) {
+    /// Moves a past pose to where the present one is, as a rigid body: what its error has been is its error there, whatever that of the
+    /// present pose is.
+    pub fn carry_past_pose(&mut self, slot: usize) {
+        let present = PastPose { pose: self.pose, anchor: self.anchor() };
+        let Some(Some(past)) = self.poses.as_mut().get_mut(slot) else { return };
+        let moved = present.anchor - past.anchor;
+        *past = present;
+        let state = pose_state(slot);
+        let own = self.moved_covariance(state, &moved);
+        for other in (0..S::STATES).filter(|other| !(state..state + 3).contains(other)) {
+            let of = |axis: usize| self.covariance.get(state + axis, other);
+            let (x, y) = (of(0) - moved.y * of(2), of(1) + moved.x * of(2));
+            self.covariance.set(state, other, x);
+            self.covariance.set(state + 1, other, y);
+        }
+        self.set_covariance_from(state, &own);
+    }
+
+    /// Makes a past pose less sure by the covariance of x, y (m) and heading (rad), in W, of an error that nothing else has.
+    pub fn doubt_past_pose(&mut self, slot: usize, covariance: &Matrix3<f64>) {
         if self.past_pose(slot).is_some() {
-            self.add_variances(pose_state(slot), [position, position, heading]);
+            let state = pose_state(slot);
+            self.set_covariance_from(state, &(self.moved_covariance(state, &Point::zeros()) + covariance));
         }
     }
 
     /// Makes the present pose less sure by these variances, m^2 an axis and rad^2.
     pub fn doubt_pose(&mut self, position: f64, heading: f64) {
-        self.add_variances(0, [position, position, heading]);
-    }
-
-    fn add_variances(&mut self, first: usize, variances: [f64; 3]) {
-        for (state, variance) in (first..).zip(variances) {
+        for (state, variance) in [position, position, heading].into_iter().enumerate() {
             self.covariance.set(state, state, self.covariance.get(state, state) + variance);
         }
     }

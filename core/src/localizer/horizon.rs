@@ -31,7 +31,12 @@ impl<C: Capacities> Localizer<C> {
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
     pub(super) fn fuse_scan_by_slam(&mut self, mount: &Pose, scan: &Scan) {
-        self.find_features(mount, scan);
+        // Where contours of the way behind tell the pose, only features that were given beforehand are compared with the scan.
+        if self.parameters.maps.features || !self.uses_contours_behind() {
+            self.find_features(mount, scan);
+        } else {
+            self.workspace.sightings.clear();
+        }
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }

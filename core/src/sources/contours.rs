@@ -35,7 +35,7 @@ pub(super) const GATE: f64 = 16.3;
 pub(super) const LEAST_SHARE: f32 = 0.3;
 
 /// A place is as good as another one if its share of points on surfaces is no less than this much of the other's.
-pub(super) const AS_GOOD: f32 = 0.9;
+const AS_GOOD: f32 = 0.9;
 
 /// Places of the laser that are further apart than this, m and rad, are two.
 const APART: (f64, f64) = (0.1, 0.05);
@@ -290,7 +290,7 @@ pub(crate) fn see_contours(
 }
 
 /// Whether two poses are not the same place.
-pub(super) fn is_elsewhere(one: &Pose, other: &Pose) -> bool {
+fn is_elsewhere(one: &Pose, other: &Pose) -> bool {
     let apart = one.between(other);
     libm::hypot(apart.x, apart.y) > APART.0 || libm::fabs(apart.theta) > APART.1
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::contours::{AS_GOOD, FREE, GATE, INFLATION, LEAST_SHARE, is_elsewhere};
+use super::contours::{FREE, GATE, INFLATION, LEAST_SHARE};
 use super::{FindContours, SourceStatus};
 use crate::contours::{ContourMatch, Prediction};
 use crate::filter::{Ekf, Linearisation, RelativePose, Slots};
@@ -20,10 +20,10 @@ use crate::sensing::PointView;
 const SLOT: usize = 0;
 
 /// How far a key scan lies off those before it: standard deviation along each axis, m,
-const KEY_POSITION: f64 = 0.3e-3;
+const KEY_POSITION: f64 = 0.1e-3;
 
 /// and of the heading, rad. All later matches have that in common.
-const KEY_HEADING: f64 = 0.1e-3;
+const KEY_HEADING: f64 = 0.03e-3;
 
 /// What is not less however many points agree: standard deviation along each axis, m,
 const LEAST_POSITION: f64 = 0.5e-3;
@@ -31,11 +31,16 @@ const LEAST_POSITION: f64 = 0.5e-3;
 /// and of the heading, rad.
 const LEAST_HEADING: f64 = 0.9e-4;
 
+/// Points are not taken to be nearer their surfaces than this share of the variance that a match takes them to have.
+const LEAST_SCATTER: f64 = 0.03;
+
 /// Where the submap of the way behind is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContoursBehind {
     /// Where the first laser was in the submap at the pose that the slot holds.
     anchor: Pose,
+    /// Covariance of the match that the present scan has corrected the pose by, in W; none along a free axis of which it told nothing.
+    matched: Option<Matrix3<f64>>,
 }
 
 /// A scan as it is compared with the way behind.
@@ -65,30 +70,35 @@ impl Compared {
 
 impl ContoursBehind {
     pub(crate) const fn new() -> Self {
-        Self { anchor: Pose { x: 0.0, y: 0.0, theta: 0.0 } }
+        Self { anchor: Pose { x: 0.0, y: 0.0, theta: 0.0 }, matched: None }
     }
 
     /// Corrects the filter, which stands at `time`. Returns whether the scan has told the whole pose.
     pub(crate) fn see<S: Slots>(
-        &self,
+        &mut self,
         contours: &mut impl FindContours,
         filter: &mut Ekf<S>,
         scan: &ScanBehind,
         (time, status): (Time, &mut SourceStatus),
     ) -> bool {
         status.begin(time);
+        self.matched = None;
         contours.see(scan.points);
         let Some(predicted) = self.predict(filter, scan) else { return false };
         let Some(found) = contours.locate_behind(&predicted).filter(|found| found.share >= LEAST_SHARE) else {
             status.add(time, Verdict::Unknown, false, None);
             return false;
         };
-        let (found, is_ambiguous) = self.choose(contours, filter, scan, &predicted, found);
         let Some(compared) = self.compare(filter, scan, &found) else { return false };
-        let verdict = if is_ambiguous { Verdict::Ambiguous } else { Verdict::Accepted };
-        let is_used = !is_ambiguous && correct(filter, &compared);
+        let is_used = correct(filter, &compared);
+        let verdict = if is_used { Verdict::Accepted } else { Verdict::Unknown };
         status.add(time, verdict, is_used, Some(compared.square / GATE));
-        is_used && found.free_axis.is_none()
+        let past = filter.past_pose(SLOT).filter(|_| is_used && found.free_axis.is_none());
+        self.matched = past.map(|past| {
+            let turn = turn_back(-past.theta - scan.laser.theta);
+            turn * compared.observation.covariance * turn.transpose()
+        });
+        self.matched.is_some()
     }
 
     /// Where the frame of the scan's points should be in the submap.
@@ -105,30 +115,11 @@ impl ContoursBehind {
         ))
     }
 
-    /// Surfaces that repeat fit in two places: the one where the vehicle should be is right if it is as good. If that surprises too, it
-    /// is ambiguous.
-    fn choose<S: Slots>(
-        &self,
-        contours: &impl FindContours,
-        filter: &Ekf<S>,
-        scan: &ScanBehind,
-        predicted: &Prediction,
-        found: ContourMatch,
-    ) -> (ContourMatch, bool) {
-        let is_expected =
-            |found: &ContourMatch| self.compare(filter, scan, found).is_some_and(|compared| compared.is_expected());
-        if is_expected(&found) {
-            return (found, false);
-        }
-        let as_good = contours.locate_nearby(&predicted.pose).filter(|near| near.share >= AS_GOOD * found.share);
-        let Some(near) = as_good.filter(|near| is_elsewhere(&near.pose, &found.pose)) else { return (found, false) };
-        (near, !is_expected(&near))
-    }
-
     /// What a match says of the way since the pose in the slot.
     fn compare<S: Slots>(&self, filter: &Ekf<S>, scan: &ScanBehind, found: &ContourMatch) -> Option<Compared> {
         let free = Matrix3::from_diagonal_element(1.0 / (FREE * FREE));
-        let own = (found.information / INFLATION + free).try_inverse()?;
+        let own =
+            (found.information / (INFLATION * f64::from(found.scatter).max(LEAST_SCATTER)) + free).try_inverse()?;
         // From the frame of the points to the laser, and from the submap to where the laser was.
         let jacobian = turn_back(self.anchor.theta) * found.pose.compose_jacobian_first(&scan.place);
         let least = Vector3::new(LEAST_POSITION, LEAST_POSITION, LEAST_HEADING);
@@ -143,15 +134,26 @@ impl ContoursBehind {
     }
 
     /// Makes the scan a key scan if it is time for one; to be called when all that it tells has been used.
-    pub(crate) fn keep<S: Slots>(&mut self, contours: &mut impl FindContours, filter: &mut Ekf<S>, scan: &ScanBehind) {
+    ///
+    /// It is one of so many in the submap, and moves it by that share of its own error. If it told nothing along an axis, what it adds is as
+    /// wrong there as the pose is: then the submap is where the vehicle is.
+    pub(crate) fn keep<S: Slots, C: FindContours>(&mut self, contours: &mut C, filter: &mut Ekf<S>, scan: &ScanBehind) {
         let known = filter.expected_relative_pose(SLOT, &scan.laser);
         if known.is_none() {
             contours.forget_keys();
         }
         let laser = known.map_or(Pose::default(), |since| self.anchor.compose(&since));
         if contours.keep(&laser.compose(&scan.place.inverse())) {
-            filter.remember_pose(SLOT);
-            filter.doubt_past_pose(SLOT, KEY_POSITION * KEY_POSITION, KEY_HEADING * KEY_HEADING);
+            let key = Vector3::new(KEY_POSITION, KEY_POSITION, KEY_HEADING);
+            let mut doubt = Matrix3::from_diagonal(&key.component_mul(&key));
+            match self.matched {
+                Some(covariance) => {
+                    filter.carry_past_pose(SLOT);
+                    doubt += covariance / C::KEYS.max(1) as f64;
+                }
+                None => filter.remember_pose(SLOT),
+            }
+            filter.doubt_past_pose(SLOT, &doubt);
             self.anchor = laser;
         }
     }

@@ -73,10 +73,6 @@ fn by_vehicle(drive: &OfficeDrive) -> Result<Vec<Pose>, ReplayError> {
     let whole = (0, drive.scans.len() - 1);
     let mut recording = drive.recording(whole, drive.steps(whole), &drive.odometry_noise()?);
     recording.parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
-    if std::env::var("NOF").is_ok() {
-        recording.parameters.sources.corners = false;
-        recording.parameters.sources.end_points = false;
-    }
     // Nothing tells where it is, so it grows uncertain.
     recording.parameters.limits.largest_position_deviation = 1e3;
     recording.parameters.limits.largest_heading_deviation = 1e3;

@@ -32,18 +32,16 @@ pub enum Map {
     Static,
     /// Features found while driving, Algorithm 1 (K 5.4.1).
     Dynamic,
-    /// Features found while driving, in the state of the filter, and alignment to key scans.
+    /// Contours of the way behind, as the vehicle ships.
     Slam,
-    /// The same without alignment.
+    /// Features found while driving, in the state of the filter, and alignment to key scans.
+    SlamFeaturesAndKeyScans,
+    /// Features alone.
     SlamFeatures,
-    /// The same without ends of faces.
+    /// Corners alone.
     SlamCorners,
     /// Alignment to key scans, and no features.
     SlamKeyScans,
-    /// Contours of the way behind, and no features.
-    SlamContours,
-    /// Both.
-    SlamContoursAndFeatures,
     /// Features mapped by a drive on another path, and all of [`Map::Slam`].
     StaticSlam,
     /// Surveyed reflectors and features mapped on another path.
@@ -65,24 +63,19 @@ impl Map {
     }
 
     fn is_slam(self) -> bool {
-        matches!(
-            self,
-            Self::Slam
-                | Self::SlamFeatures
-                | Self::SlamCorners
-                | Self::SlamKeyScans
-                | Self::SlamContours
-                | Self::SlamContoursAndFeatures
-                | Self::StaticSlam
-        )
-    }
-
-    fn has_contours(self) -> bool {
-        matches!(self, Self::SlamContours | Self::SlamContoursAndFeatures)
+        self.has_contours()
+            || matches!(
+                self,
+                Self::SlamFeatures | Self::SlamCorners | Self::SlamKeyScans | Self::SlamFeaturesAndKeyScans
+            )
     }
 
     fn has_key_scans(self) -> bool {
-        matches!(self, Self::Slam | Self::SlamKeyScans | Self::StaticSlam)
+        matches!(self, Self::SlamKeyScans | Self::SlamFeaturesAndKeyScans)
+    }
+
+    fn has_contours(self) -> bool {
+        matches!(self, Self::Slam | Self::StaticSlam)
     }
 }
 
@@ -112,7 +105,7 @@ const SIDE_SLIP: f64 = 0.6e-3;
 
 impl Method {
     /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 12] = [
         Self::mended("odometry", Map::Odometry),
         Self::mended("reflectors", Map::Reflectors),
         Self::mended("static", Map::Static),
@@ -133,11 +126,7 @@ impl Method {
             sources: Switches { corners: false, end_points: false, ..Switches::ALL },
             ..Self::mended("slam with key scans alone", Map::SlamKeyScans)
         },
-        Self {
-            sources: Switches { corners: false, end_points: false, ..Switches::ALL },
-            ..Self::mended("slam with contours alone", Map::SlamContours)
-        },
-        Self::mended("slam with contours and features", Map::SlamContoursAndFeatures),
+        Self::mended("slam with features and key scans", Map::SlamFeaturesAndKeyScans),
         Self::mended("slam", Map::Slam),
         Self::mended("static and slam", Map::StaticSlam),
         Self::mended("mixed", Map::Mixed),

@@ -286,10 +286,6 @@ pub fn vehicle_drift(drive: &OfficeDrive, length: f64, worsening: &Worsening) ->
     let end = |window: (usize, usize)| {
         let mut recording = drive.recording(window, steps(drive, window, worsening), &noise);
         recording.parameters.maps = SLAM;
-        if std::env::var("NOF").is_ok() {
-            recording.parameters.sources.corners = false;
-            recording.parameters.sources.end_points = false;
-        }
         let said = replay(&recording, |_| {})?.poses.pop();
         let pose = said.as_ref().map_or(Pose::default(), |said| said.pose);
         Ok(End::of(&pose, &drive.truth[window.1], said.is_none_or(|said| said.mode == Mode::Lost)))
