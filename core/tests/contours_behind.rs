@@ -166,3 +166,11 @@ fn the_covariance_is_that_of_the_errors() {
     // Chi-square with three degrees of freedom: three.
     assert!((1.0..5.0).contains(&mean), "{mean}");
 }
+
+#[test]
+fn submap_look_up_and_key_scans_take_at_most_160_kib() {
+    assert!(size_of::<Contours>() <= 160 * 1024, "{}", size_of::<Contours>());
+    // Without key scans: for a vehicle that has no past poses in its state.
+    let without = size_of::<Contours<'static, 400, 6144, 0>>();
+    assert!(size_of::<Contours>() - without < 50 * 1024, "{without}");
+}
