@@ -185,9 +185,10 @@ impl Dense {
     /// A past pose goes on by the way between it and the present one, which is taken for exact.
     fn carry_pose(&mut self, slot: usize, doubt: &Matrix3<f64>) {
         let (state, point) = (key(slot), self.linearisation_point());
-        let way = pose(&point, state).between(&pose(&point, 0));
+        let way = sensor(&point, state).between(&sensor(&point, 0));
         let carried = |at: &Mean| {
-            let carried = pose(at, state).compose(&way);
+            let mounted = Pose { theta: LASER.theta + at[YAW], ..LASER };
+            let carried = sensor(at, state).compose(&way).compose(&mounted.inverse());
             Vector3::new(carried.x, carried.y, carried.theta)
         };
         let mut jacobian = Square::identity();
@@ -295,7 +296,7 @@ proptest! {
                 Step::Carry(slot, deviation) => {
                     if filter.past_pose(slot).is_some() {
                         let doubt = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, -0.1, 0.2, 0.5) * deviation * deviation;
-                        filter.carry_past_pose(slot);
+                        filter.carry_past_pose(slot, &LASER);
                         filter.doubt_past_pose(slot, &doubt);
                         dense.carry_pose(slot, &doubt);
                     }

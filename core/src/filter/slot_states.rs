@@ -1,6 +1,6 @@
 //! Biases, past poses and landmarks as parts of the state.
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::biases::{BiasDeviations, SCALE, STEERING, YAW};
 use super::slots::{PastPose, Slots, StateLandmark, pose_state};
@@ -56,18 +56,28 @@ impl<S: Slots> Ekf<S> {
         }
     }
 
-    /// Moves a past pose to where the present one is, as a rigid body: what its error has been is its error there, whatever that of the
-    /// present pose is.
-    pub fn carry_past_pose(&mut self, slot: usize) {
+    /// Moves a past pose to where the present one is, by the way that S, mounted at `mount` in R, has seen: what its error has been is its
+    /// error there, with that of the direction in which S is taken to look, whatever that of the present pose is.
+    pub fn carry_past_pose(&mut self, slot: usize, mount: &Pose) {
         let present = PastPose { pose: self.pose, anchor: self.anchor() };
+        let yaw = self.laser_yaw();
+        let to = Viewpoint::new(&present.pose, present.anchor, mount, Some(yaw));
         let Some(Some(past)) = self.poses.as_mut().get_mut(slot) else { return };
-        let moved = present.anchor - past.anchor;
+        let from = Viewpoint::new(&past.pose, past.anchor, mount, Some(yaw));
+        let moved = to.anchor - from.anchor;
+        let by_yaw = left(&(moved + to.arm - from.arm));
         *past = present;
         let state = pose_state(slot);
-        let own = self.moved_covariance(state, &moved);
+        let mut own = self.moved_covariance(state, &moved);
+        let of = |axis: usize| self.covariance.get(state + axis, YAW);
+        let with_yaw = Vector3::new(of(0) - moved.y * of(2), of(1) + moved.x * of(2), of(2));
+        let by_yaw = Vector3::new(by_yaw.x, by_yaw.y, 0.0);
+        let yaw_variance = self.covariance.get(YAW, YAW);
+        own += with_yaw * by_yaw.transpose() + by_yaw * (with_yaw + by_yaw * yaw_variance).transpose();
         for other in (0..S::STATES).filter(|other| !(state..state + 3).contains(other)) {
             let of = |axis: usize| self.covariance.get(state + axis, other);
-            let (x, y) = (of(0) - moved.y * of(2), of(1) + moved.x * of(2));
+            let yaw = self.covariance.get(YAW, other);
+            let (x, y) = (of(0) - moved.y * of(2) + by_yaw.x * yaw, of(1) + moved.x * of(2) + by_yaw.y * yaw);
             self.covariance.set(state, other, x);
             self.covariance.set(state + 1, other, y);
         }

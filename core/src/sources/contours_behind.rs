@@ -148,7 +148,7 @@ impl ContoursBehind {
             let mut doubt = Matrix3::from_diagonal(&key.component_mul(&key));
             match self.matched {
                 Some(covariance) => {
-                    filter.carry_past_pose(SLOT);
+                    filter.carry_past_pose(SLOT, &scan.laser);
                     doubt += covariance / C::KEYS.max(1) as f64;
                 }
                 None => filter.remember_pose(SLOT),
