@@ -5,6 +5,7 @@ mod calibration;
 mod contour_source;
 mod contour_start;
 mod contours;
+mod contours_behind;
 mod counters;
 mod covariance_repair;
 mod event;

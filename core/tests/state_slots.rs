@@ -181,6 +181,26 @@ impl Dense {
         }
         self.covariance = copy * self.covariance * copy.transpose();
     }
+
+    /// A past pose goes on by the way between it and the present one, which is taken for exact.
+    fn carry_pose(&mut self, slot: usize, doubt: &Matrix3<f64>) {
+        let (state, point) = (key(slot), self.linearisation_point());
+        let way = sensor(&point, state).between(&sensor(&point, 0));
+        let carried = |at: &Mean| {
+            let mounted = Pose { theta: LASER.theta + at[YAW], ..LASER };
+            let carried = sensor(at, state).compose(&way).compose(&mounted.inverse());
+            Vector3::new(carried.x, carried.y, carried.theta)
+        };
+        let mut jacobian = Square::identity();
+        jacobian.fixed_view_mut::<3, STATES>(state, 0).copy_from(&self.jacobian(carried));
+        self.covariance = jacobian * self.covariance * jacobian.transpose();
+        let mut own = self.covariance.fixed_view_mut::<3, 3>(state, state);
+        own += doubt;
+        for axis in 0..3 {
+            self.mean[state + axis] = self.mean[axis];
+            self.anchor[state + axis] = self.anchor[axis];
+        }
+    }
 }
 
 fn pose(at: &Mean, state: usize) -> Pose {
@@ -212,6 +232,7 @@ enum Step {
     Remove(usize),
     See(usize, f64, f64),
     Remember(usize),
+    Carry(usize, f64),
     Align(usize, f64, f64, f64),
 }
 
@@ -223,6 +244,7 @@ fn step() -> impl Strategy<Value = Step> {
         1 => (0..LANDMARKS).prop_map(Step::Remove),
         4 => (0..LANDMARKS, error.clone(), error.clone()).prop_map(|(slot, x, y)| Step::See(slot, x, y)),
         1 => (0..KEYS).prop_map(Step::Remember),
+        1 => (0..KEYS, 0.0f64..0.01).prop_map(|(slot, deviation)| Step::Carry(slot, deviation)),
         2 => (0..KEYS, error.clone(), error.clone(), error).prop_map(|(slot, x, y, t)| Step::Align(slot, x, y, 0.1 * t)),
     ]
 }
@@ -270,6 +292,14 @@ proptest! {
                 Step::Remember(slot) => {
                     filter.remember_pose(slot);
                     dense.remember_pose(slot);
+                }
+                Step::Carry(slot, deviation) => {
+                    if filter.past_pose(slot).is_some() {
+                        let doubt = Matrix3::new(2.0, 0.3, -0.1, 0.3, 1.0, 0.2, -0.1, 0.2, 0.5) * deviation * deviation;
+                        filter.carry_past_pose(slot, &LASER);
+                        filter.doubt_past_pose(slot, &doubt);
+                        dense.carry_pose(slot, &doubt);
+                    }
                 }
                 Step::Align(slot, x, y, theta) => {
                     let expected = way(&dense.mean, slot);

@@ -65,7 +65,7 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("sources.given_pose", "whether poses that are given correct the pose"),
     ("sources.aids", "whether observations of models of one's own correct the pose"),
     ("sources.gyro", "whether the gyro tells how the vehicle turns"),
-    ("sources.contours", "whether a map of contours corrects the pose, if there is one"),
+    ("sources.contours", "whether contours correct the pose: of a map if there is one, or of the way behind"),
     ("gyro.fitted", "whether the vehicle has a gyro"),
     ("gyro.factor", "true rate over the told one; negative if it counts clockwise"),
     ("gyro.latency", "from when a rate is true to when it is heard"),

@@ -1,6 +1,6 @@
 //! A map of contours that is kept: points of surfaces in square tiles, of which those around the vehicle are loaded.
 
-use super::{LARGEST_REACH, Submap, SurfacePoint};
+use super::{KeyRing, LARGEST_REACH, Submap, SurfacePoint};
 use crate::geometry::{Pose, ScanPoint};
 
 /// Side of a tile, m.
@@ -260,6 +260,12 @@ impl<const ROOM: usize> Surroundings<ROOM> {
     /// The map has been replaced.
     pub const fn forget(&mut self) {
         self.place = None;
+    }
+
+    /// The surfaces of key scans around a pose, instead of those of a map.
+    pub fn of_keys<const KEYS: usize, const POINTS: usize>(&mut self, pose: &Pose, keys: &KeyRing<KEYS, POINTS>) {
+        self.place = None;
+        self.submap.surround(pose, keys);
     }
 
     /// The surfaces that were loaded last.

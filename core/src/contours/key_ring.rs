@@ -33,10 +33,9 @@ pub struct KeyRing<const KEYS: usize, const POINTS: usize> {
 }
 
 impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
-    /// No key scans.
+    /// No key scans; never any if there is no room for one.
     #[must_use]
     pub const fn new() -> Self {
-        const { assert!(KEYS > 0) };
         Self { keys: [const { KeyScan::EMPTY }; KEYS], made: 0 }
     }
 
@@ -48,13 +47,13 @@ impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
     /// The newest one.
     #[must_use]
     pub fn newest(&self) -> Option<&KeyScan<POINTS>> {
-        self.keys.get(self.made.checked_sub(1)? % KEYS)
+        self.keys.get(self.made.checked_sub(1)?.checked_rem(KEYS)?)
     }
 
     /// All of them, the oldest first.
     pub fn iter(&self) -> impl Iterator<Item = &KeyScan<POINTS>> {
         let first = self.made.saturating_sub(KEYS);
-        (first..self.made).filter_map(|number| self.keys.get(number % KEYS))
+        (first..self.made).filter_map(|number| self.keys.get(number.checked_rem(KEYS)?))
     }
 
     /// Whether a scan at that pose is far enough from the newest key scan to be the next.
@@ -68,7 +67,7 @@ impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
 
     /// Keeps a scan in place of the oldest.
     pub fn keep(&mut self, pose: &Pose, points: &[SurfacePoint]) {
-        let Some(key) = self.keys.get_mut(self.made % KEYS) else { return };
+        let Some(key) = self.made.checked_rem(KEYS).and_then(|place| self.keys.get_mut(place)) else { return };
         key.pose = *pose;
         key.points.clear();
         key.points.extend(points.iter().filter_map(PackedPoint::of).take(POINTS));

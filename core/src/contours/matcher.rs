@@ -27,6 +27,8 @@ pub struct ContourMatch {
     pub free_axis: Option<ScanPoint>,
     /// Share of the scan's points that lie on surfaces.
     pub share: f32,
+    /// Mean square of their distances from the surfaces in that which `information` takes it to be.
+    pub scatter: f32,
 }
 
 /// Surfaces of the last `KEYS` key scans of at most `POINTS` points, and of the present one, in a submap with room for `ROOM`.
@@ -79,10 +81,7 @@ impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> ContourMatcher<P
         let is_kept = self.ring.wants(pose);
         if is_kept {
             self.ring.keep(pose, &self.points);
-            self.submap.begin(pose);
-            for key in self.ring.iter() {
-                self.submap.add(&key.pose, key.points.iter());
-            }
+            self.submap.surround(pose, &self.ring);
         }
         is_kept
     }
@@ -149,7 +148,13 @@ fn in_map<const ROOM: usize>(
         pose.y += f64::from(axis.y) * along;
         information = without(information, axis);
     }
-    ContourMatch { pose: map.origin().compose(&pose), information, free_axis, share: share(points, found) }
+    ContourMatch {
+        pose: map.origin().compose(&pose),
+        information,
+        free_axis,
+        share: share(points, found),
+        scatter: found.scatter,
+    }
 }
 
 /// The axis along which the normals say least, if that is too little.

@@ -43,6 +43,8 @@ pub struct Refinement {
     pub directions: [f32; 3],
     /// Points that lie on surfaces.
     pub inliers: u32,
+    /// Mean square of their distances from the surfaces, weighted, in that which `information` takes it to be.
+    pub scatter: f32,
 }
 
 /// Sums over points.
@@ -52,6 +54,8 @@ pub(super) struct Sums {
     gradient: [f32; 3],
     directions: [f32; 3],
     inliers: u32,
+    weights: f32,
+    squares: f32,
 }
 
 impl Sums {
@@ -69,6 +73,8 @@ impl Sums {
         for (sum, entry) in self.gradient.iter_mut().zip(weighted) {
             *sum += entry * distance;
         }
+        self.weights += weight;
+        self.squares += weight * distance * distance;
         self.directions[0] += weighted[0] * row[0];
         self.directions[1] += weighted[0] * row[1];
         self.directions[2] += weighted[1] * row[1];
@@ -95,6 +101,11 @@ impl Sums {
             let distance = surface.normal.dot(&error);
             self.add(surface.normal, lever, distance, weight(distance * distance));
         }
+    }
+
+    /// See [`Refinement::scatter`].
+    fn scatter(&self) -> f32 {
+        self.squares / (self.weights.max(f32::MIN_POSITIVE) * DEVIATION * DEVIATION)
     }
 
     fn information(&self) -> Matrix3<f64> {
@@ -162,7 +173,13 @@ impl Refining {
         let pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
         self.pose = pose;
         self.iteration += 1;
-        self.outcome = Some(Refinement { pose, information, directions: sums.directions, inliers: sums.inliers });
+        self.outcome = Some(Refinement {
+            pose,
+            information,
+            directions: sums.directions,
+            inliers: sums.inliers,
+            scatter: sums.scatter(),
+        });
         let is_settled = iteration >= FAR_ITERATIONS && step.amax() < SMALL;
         Some(!is_settled && self.iteration < ITERATIONS)
     }

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::likelihood_grid::HALF;
-use super::{LikelihoodGrid, PackedPoint, SurfacePoint};
+use super::{KeyRing, LikelihoodGrid, PackedPoint, SurfacePoint};
 use crate::geometry::{Pose, ScanPoint, Transform};
 
 /// Size of a cell, m: what is within half of it lies in four cells.
@@ -60,6 +60,14 @@ impl<const ROOM: usize> Submap<ROOM> {
         self.first = [[NONE; SIDE]; SIDE];
         self.grid.clear();
         self.has_cut = false;
+    }
+
+    /// Begins at a pose with the surfaces of key scans around it.
+    pub fn surround<const KEYS: usize, const POINTS: usize>(&mut self, place: &Pose, keys: &KeyRing<KEYS, POINTS>) {
+        self.begin(place);
+        for key in keys.iter() {
+            self.add(&key.pose, key.points.iter());
+        }
     }
 
     /// Where its frame is.

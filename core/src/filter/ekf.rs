@@ -198,6 +198,11 @@ impl<S: Slots> Ekf<S> {
     }
 
     pub(super) fn set_pose_covariance(&mut self, covariance: &Matrix3<f64>) {
+        self.set_covariance_from(0, covariance);
+    }
+
+    /// Sets the covariance of the three states that begin at `first`.
+    pub(super) fn set_covariance_from(&mut self, first: usize, covariance: &Matrix3<f64>) {
         let entries = [
             (0, 0, covariance.m11),
             (1, 0, covariance.m21),
@@ -207,7 +212,7 @@ impl<S: Slots> Ekf<S> {
             (2, 2, covariance.m33),
         ];
         for (row, column, value) in entries {
-            self.covariance.set(row, column, value);
+            self.covariance.set(first + row, first + column, value);
         }
     }
 
@@ -247,7 +252,7 @@ impl<S: Slots> Ekf<S> {
                 (state, Vector3::new(x, y, theta))
             })
         });
-        let mut own = self.moved_covariance(&moved) + turned(&motion.covariance, sine, cosine);
+        let mut own = self.moved_covariance(0, &moved) + turned(&motion.covariance, sine, cosine);
         // The heading and the biases move the pose, and with it what it has in common with the other states.
         for other in SCALE..count {
             let of = |state| self.covariance.get(state, other);
@@ -276,9 +281,9 @@ impl<S: Slots> Ekf<S> {
         self.anchor.as_mut().fill(pose.position());
     }
 
-    /// `F P F'` of the pose alone, whose heading's error moves its position sideways by `moved`, m, in W.
-    fn moved_covariance(&self, moved: &Point) -> Matrix3<f64> {
-        let of = |row, column| self.covariance.get(row, column);
+    /// `F P F'` of a pose alone whose states begin at `first`, and whose heading's error moves its position sideways by `moved`, m, in W.
+    pub(super) fn moved_covariance(&self, first: usize, moved: &Point) -> Matrix3<f64> {
+        let of = |row: usize, column: usize| self.covariance.get(first + row, first + column);
         let (hh, xh, yh) = (of(2, 2), of(0, 2), of(1, 2));
         let (x_heading, y_heading) = (xh - moved.y * hh, yh + moved.x * hh);
         let xx = of(0, 0) - moved.y * (xh + x_heading);

@@ -1,6 +1,6 @@
 //! Biases, past poses and landmarks as parts of the state.
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::biases::{BiasDeviations, SCALE, STEERING, YAW};
 use super::slots::{PastPose, Slots, StateLandmark, pose_state};
@@ -11,9 +11,7 @@ use crate::geometry::{Point, Pose};
 impl<S: Slots> Ekf<S> {
     /// Begins at a pose; what was known of the biases is kept, past poses and landmarks are forgotten.
     pub fn begin(&mut self, state: &Ekf) {
-        for slot in 0..self.poses.as_ref().len() {
-            self.forget_pose(slot);
-        }
+        self.forget_poses();
         for slot in 0..self.landmarks.as_ref().len() {
             self.remove_landmark(slot);
         }
@@ -58,6 +56,49 @@ impl<S: Slots> Ekf<S> {
         }
     }
 
+    /// Moves a past pose to where the present one is, by the way that S, mounted at `mount` in R, has seen: what its error has been is its
+    /// error there, with that of the direction in which S is taken to look, whatever that of the present pose is.
+    pub fn carry_past_pose(&mut self, slot: usize, mount: &Pose) {
+        let present = PastPose { pose: self.pose, anchor: self.anchor() };
+        let yaw = self.laser_yaw();
+        let to = Viewpoint::new(&present.pose, present.anchor, mount, Some(yaw));
+        let Some(Some(past)) = self.poses.as_mut().get_mut(slot) else { return };
+        let from = Viewpoint::new(&past.pose, past.anchor, mount, Some(yaw));
+        let moved = to.anchor - from.anchor;
+        let by_yaw = left(&(moved + to.arm - from.arm));
+        *past = present;
+        let state = pose_state(slot);
+        let mut own = self.moved_covariance(state, &moved);
+        let of = |axis: usize| self.covariance.get(state + axis, YAW);
+        let with_yaw = Vector3::new(of(0) - moved.y * of(2), of(1) + moved.x * of(2), of(2));
+        let by_yaw = Vector3::new(by_yaw.x, by_yaw.y, 0.0);
+        let yaw_variance = self.covariance.get(YAW, YAW);
+        own += with_yaw * by_yaw.transpose() + by_yaw * (with_yaw + by_yaw * yaw_variance).transpose();
+        for other in (0..S::STATES).filter(|other| !(state..state + 3).contains(other)) {
+            let of = |axis: usize| self.covariance.get(state + axis, other);
+            let yaw = self.covariance.get(YAW, other);
+            let (x, y) = (of(0) - moved.y * of(2) + by_yaw.x * yaw, of(1) + moved.x * of(2) + by_yaw.y * yaw);
+            self.covariance.set(state, other, x);
+            self.covariance.set(state + 1, other, y);
+        }
+        self.set_covariance_from(state, &own);
+    }
+
+    /// Makes a past pose less sure by the covariance of x, y (m) and heading (rad), in W, of an error that nothing else has.
+    pub fn doubt_past_pose(&mut self, slot: usize, covariance: &Matrix3<f64>) {
+        if self.past_pose(slot).is_some() {
+            let state = pose_state(slot);
+            self.set_covariance_from(state, &(self.moved_covariance(state, &Point::zeros()) + covariance));
+        }
+    }
+
+    /// Makes the present pose less sure by these variances, m^2 an axis and rad^2.
+    pub fn doubt_pose(&mut self, position: f64, heading: f64) {
+        for (state, variance) in [position, position, heading].into_iter().enumerate() {
+            self.covariance.set(state, state, self.covariance.get(state, state) + variance);
+        }
+    }
+
     /// Frees a slot for past poses.
     pub fn forget_pose(&mut self, slot: usize) {
         if let Some(place) = self.poses.as_mut().get_mut(slot)
@@ -66,6 +107,13 @@ impl<S: Slots> Ekf<S> {
             for axis in 0..3 {
                 self.covariance.clear(pose_state(slot) + axis);
             }
+        }
+    }
+
+    /// Frees all of them.
+    pub fn forget_poses(&mut self) {
+        for slot in 0..self.poses.as_ref().len() {
+            self.forget_pose(slot);
         }
     }
 

@@ -57,7 +57,7 @@ pub type SlamSlots = PoseAndSlots<4, 64, SLAM_STATES, { packed_entries(SLAM_STAT
 pub type NoSlots = PoseAndSlots<0, 0, { slot_states(0, 0) }, { packed_entries(slot_states(0, 0)) }>;
 
 /// The room for everything: 1440 beams, 1000 reflectors and 1000 features of fixed maps, 256 landmarks found while driving, the
-/// map in the state, and contours of a map that is lent for `'m`.
+/// map in the state, and contours of the way behind or of a map that is lent for `'m`.
 pub type ContourCapacities<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, Contours<'m>>;
 
 /// The same without contours.
@@ -69,8 +69,8 @@ pub type SlamWithLentMap<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, No
 /// The same without contours and without a map in the state: [`super::Parameters::maps`] must not ask for one.
 pub type VehicleCapacities = CapacitiesOf<1440, 1000, 1000, 256, NoSlots>;
 
-/// The same with contours.
-pub type VehicleWithContours<'m> = CapacitiesOf<1440, 1000, 1000, 256, NoSlots, Contours<'m>>;
+/// The same with contours of a kept map.
+pub type VehicleWithContours<'m> = CapacitiesOf<1440, 1000, 1000, 256, NoSlots, Contours<'m, 400, 6144, 0>>;
 
 /// How much a localiser has room for, as the log of its vehicle states it. One of another size may answer differently.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use crate::filter::{Ekf, PoseObservation};
 use crate::geometry::Pose;
 use crate::maps::Verdict;
 use crate::measurement::{LaserId, Scan, Time};
-use crate::sources::{ContourOutcome, FindContours, FindFeatures, see_contours};
+use crate::sources::{ContourOutcome, FindContours, FindFeatures, ScanBehind, see_contours};
 
 /// While reflectors have the position as well as this, m, contours do not correct it.
 const BY_REFLECTORS: f64 = 0.02;
@@ -21,6 +21,7 @@ impl<C: Capacities> Localizer<C> {
     /// Takes another map of contours, or none; also while the vehicle drives.
     pub fn set_contours(&mut self, map: Option<<C::Contours as FindContours>::Map>) {
         self.contours.set_map(map);
+        self.slam.forget_way_behind();
     }
 
     /// The map of contours, if scans are compared with one.
@@ -62,10 +63,42 @@ impl<C: Capacities> Localizer<C> {
     fn see_contours(&mut self, time: Time, frame: &Pose, state: &Ekf) -> ContourOutcome {
         let is_led = self.distance.reflector <= self.parameters.limits.dead_reckoning_from
             && state.position_deviation() <= BY_REFLECTORS;
+        let step = self.step_until(time);
+        see_contours(&mut self.contours, self.features.points(), frame, (state, &step), is_led)
+    }
+
+    /// The motion since the scan that was compared with contours before.
+    fn step_until(&self, time: Time) -> Pose {
         let from = self.outputs.sources.contours.told.unwrap_or(time);
         let motions = self.timeline.motions(from, time);
-        let step = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
-        see_contours(&mut self.contours, self.features.points(), frame, (state, &step), is_led)
+        motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement))
+    }
+
+    /// Whether scans of the first laser are compared with the contours of the way behind: without a kept map, and with past poses in
+    /// the state.
+    pub(super) fn uses_contours_behind(&self) -> bool {
+        let parameters = &self.parameters;
+        parameters.maps.slam && parameters.sources.contours && C::Contours::KEYS > 0 && !self.contours.has_map()
+    }
+
+    /// Corrects the pose by the contours of the way behind, where the filter stands; `place` is where the laser was then in the frame
+    /// of the points.
+    pub(super) fn fuse_contours_behind(&mut self, mount: &Pose, place: &Pose) {
+        let step = self.step_until(self.slam.time());
+        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
+        let status = &mut self.outputs.sources.contours;
+        self.corrected_by_contours = true;
+        if self.slam.see_behind(&mut self.contours, &scan, status) {
+            self.distance.feature = 0.0;
+        }
+        self.outputs.has_cut |= self.contours.has_cut();
+    }
+
+    /// Makes the scan one of the way behind if it is time for one.
+    pub(super) fn keep_contours_behind(&mut self, mount: &Pose, place: &Pose) {
+        let step = Pose::default();
+        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
+        self.slam.keep_behind(&mut self.contours, &scan);
     }
 
     fn tell_contours(&mut self, time: Time, laser: LaserId, outcome: &ContourOutcome, is_used: bool) {
@@ -76,6 +109,7 @@ impl<C: Capacities> Localizer<C> {
         status.add(time, verdict, is_used, outcome.test_ratio);
         if let Some(seen) = outcome.seen.filter(|_| is_used) {
             self.distance.feature = 0.0;
+            self.corrected_by_contours = true;
             self.told_by_contours = Some(ToldByContours { time, seen }).filter(|_| laser == LaserId::FIRST);
         }
     }

@@ -72,8 +72,10 @@ impl<C: Capacities> Localizer<C> {
 
     /// Takes what fits no landmark as new ones of the state, once all that was seen has corrected the pose.
     fn discover(&mut self, start: Time, are_reflectors_given: bool) {
+        let are_features_wanted = !self.uses_contours_behind();
         for sighting in &self.workspace.sightings {
-            let may_be_new = sighting.kind != LandmarkKind::Reflector || !are_reflectors_given;
+            let is_reflector = sighting.kind == LandmarkKind::Reflector;
+            let may_be_new = if is_reflector { !are_reflectors_given } else { are_features_wanted };
             if may_be_new && matches!(sighting.verdict, Verdict::Unknown | Verdict::Gated) {
                 let moved = sighting.moved(&self.workspace.path, start, self.slam.time());
                 self.slam.discover(&moved, self.parameters.believed());

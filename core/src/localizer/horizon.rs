@@ -31,7 +31,12 @@ impl<C: Capacities> Localizer<C> {
 
     /// Fuses the natural features of a scan, and the scan itself, at the time of its middle.
     pub(super) fn fuse_scan_by_slam(&mut self, mount: &Pose, scan: &Scan) {
-        self.find_features(mount, scan);
+        // Where contours of the way behind tell the pose, only features that were given beforehand are compared with the scan.
+        if self.parameters.maps.features || !self.uses_contours_behind() {
+            self.find_features(mount, scan);
+        } else {
+            self.workspace.sightings.clear();
+        }
         if !self.begin_slam(scan.beam_time(scan.ranges.len() / 2), scan.end()) {
             return;
         }
@@ -42,8 +47,13 @@ impl<C: Capacities> Localizer<C> {
         if self.uses_contours() {
             self.fuse_contours_by_slam(mount, &place, scan.laser);
         }
-        // Key scans are those of the first laser.
-        let is_aligned = scan.laser == LaserId::FIRST && self.parameters.sources.key_scans;
+        // What lies behind is seen by the first laser.
+        let is_first = scan.laser == LaserId::FIRST;
+        let is_behind = is_first && self.uses_contours_behind();
+        if is_behind {
+            self.fuse_contours_behind(mount, &place);
+        }
+        let is_aligned = is_first && !is_behind && self.parameters.sources.key_scans;
         if is_aligned {
             let status = &mut self.outputs.sources.key_scans;
             status.begin(self.slam.time());
@@ -51,6 +61,9 @@ impl<C: Capacities> Localizer<C> {
         }
         self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
+        if is_behind {
+            self.keep_contours_behind(mount, &place);
+        }
         if is_aligned {
             self.slam.keep(self.features.points(), &place, &self.parameters);
         }

@@ -49,6 +49,8 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) features: C::Features,
     pub(super) contours: C::Contours,
     pub(super) told_by_contours: Option<ToldByContours>,
+    /// Whether contours may have moved the pose in the present event.
+    pub(super) corrected_by_contours: bool,
     pub(super) workspace: Workspace,
     pub(super) outputs: Outputs,
 }
@@ -140,6 +142,7 @@ impl<C: Capacities> Localizer<C> {
             features: C::Features::new(parameters.features.detector),
             contours: C::Contours::new(),
             told_by_contours: None,
+            corrected_by_contours: false,
             workspace: Workspace::default(),
             outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
@@ -283,6 +286,7 @@ impl<C: Capacities> Localizer<C> {
         self.outputs.has_cut = false;
         self.outputs.misuse = None;
         self.told_by_contours = None;
+        self.corrected_by_contours = false;
     }
 
     /// The pose for now, and that by odometry alone.
@@ -309,7 +313,7 @@ impl<C: Capacities> Localizer<C> {
             }
         }
         // What contours have moved is no correction by landmarks.
-        if self.told_by_contours.is_none() {
+        if !self.corrected_by_contours {
             let is_right = self.lost.is_none() && self.outage.is_none();
             self.integrity.correct(before, &after, uses, is_right);
             if is_right && !self.parameters.maps.slam {

@@ -1,4 +1,6 @@
 //! Contours: the pose under which the surfaces of a scan lie on those of a kept map.
+//!
+//! The same memory serves those of the way behind: `contours_behind.rs`.
 
 use core::fmt::Debug;
 
@@ -7,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::places::{FindPlaces, NoPlaces, Places};
 use crate::contours::{
-    ContourMatch, KeptMap, Prediction, SurfacePoint, Surroundings, align, align_nearby, find_surface_points,
+    ContourMatch, KeptMap, KeyRing, Prediction, SurfacePoint, Surroundings, align, align_nearby, find_surface_points,
 };
 use crate::filter::{Ekf, PoseObservation};
 use crate::geometry::Pose;
@@ -15,7 +17,7 @@ use crate::maps::Verdict;
 use crate::sensing::PointView;
 
 /// By what the covariance of a match is multiplied that takes points as independent.
-const INFLATION: f64 = 3.0;
+pub(super) const INFLATION: f64 = 3.0;
 
 /// Standard deviation along each axis of what all scans of a map have in common, m.
 const SHARED_POSITION: f64 = 0.005;
@@ -24,13 +26,13 @@ const SHARED_POSITION: f64 = 0.005;
 const SHARED_HEADING: f64 = 1e-3;
 
 /// Standard deviation along a free axis, m: as good as nothing.
-const FREE: f64 = 100.0;
+pub(super) const FREE: f64 = 100.0;
 
 /// Chi-square with three degrees of freedom, 99.9 per cent: what is further from the pose surprises.
-const GATE: f64 = 16.3;
+pub(super) const GATE: f64 = 16.3;
 
 /// If fewer of a scan's points lie on surfaces, the map does not say where it was taken.
-const LEAST_SHARE: f32 = 0.3;
+pub(super) const LEAST_SHARE: f32 = 0.3;
 
 /// A place is as good as another one if its share of points on surfaces is no less than this much of the other's.
 const AS_GOOD: f32 = 0.9;
@@ -38,13 +40,14 @@ const AS_GOOD: f32 = 0.9;
 /// Places of the laser that are further apart than this, m and rad, are two.
 const APART: (f64, f64) = (0.1, 0.05);
 
-/// What finds a scan in a kept map, with room for `ROOM` points of the surroundings and `POINTS` of a scan; the map is lent for
-/// `'m`.
+/// What finds a scan in a kept map, or among the last `KEYS` key scans, with room for `ROOM` points of the surroundings and `POINTS` of a
+/// scan; the map is lent for `'m`.
 #[derive(Clone, Debug)]
-pub struct Contours<'m, const POINTS: usize = 400, const ROOM: usize = 6144> {
+pub struct Contours<'m, const POINTS: usize = 400, const ROOM: usize = 6144, const KEYS: usize = 20> {
     map: Option<KeptMap<'m>>,
     points: Vec<SurfacePoint, POINTS>,
     surroundings: Surroundings<ROOM>,
+    keys: KeyRing<KEYS, POINTS>,
 }
 
 /// A vehicle that has no room for contours.
@@ -61,6 +64,9 @@ pub trait FindContours: Clone + Debug {
 
     /// Points of the surroundings, at the most.
     const POINTS: usize;
+
+    /// Key scans of the way behind, at the most.
+    const KEYS: usize;
 
     /// One without a map.
     fn new() -> Self;
@@ -82,24 +88,39 @@ pub trait FindContours: Clone + Debug {
     /// Where the scan taken last fits nearest to a pose, without a search.
     fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch>;
 
+    /// Takes the points of a scan.
+    fn see(&mut self, scan: PointView<'_>);
+
+    /// Where the scan taken last was taken by the key scans of the way behind, which are there instead of a map. None if they say
+    /// nothing of it.
+    fn locate_behind(&self, predicted: &Prediction) -> Option<ContourMatch>;
+
+    /// Forgets the key scans.
+    fn forget_keys(&mut self);
+
+    /// Makes the scan taken last a key scan if its laser, at `pose`, is far enough from that of the newest one. Returns whether it was.
+    fn keep(&mut self, pose: &Pose) -> bool;
+
     /// Whether there was no room for all of the surroundings.
     fn has_cut(&self) -> bool;
 }
 
-impl<'m, const POINTS: usize, const ROOM: usize> FindContours for Contours<'m, POINTS, ROOM> {
+impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours for Contours<'m, POINTS, ROOM, KEYS> {
     type Map = KeptMap<'m>;
     type Places = Places<'m, POINTS, ROOM>;
 
     const POINTS: usize = ROOM;
+    const KEYS: usize = KEYS;
 
     #[inline(always)]
     fn new() -> Self {
-        Self { map: None, points: Vec::new(), surroundings: Surroundings::new() }
+        Self { map: None, points: Vec::new(), surroundings: Surroundings::new(), keys: KeyRing::new() }
     }
 
     fn set_map(&mut self, map: Option<KeptMap<'m>>) {
         self.map = map;
         self.surroundings.forget();
+        self.keys.clear();
     }
 
     fn map(&self) -> Option<KeptMap<'m>> {
@@ -108,12 +129,35 @@ impl<'m, const POINTS: usize, const ROOM: usize> FindContours for Contours<'m, P
 
     #[inline(never)]
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch> {
-        find_surface_points(scan, &mut self.points);
+        self.see(scan);
         align(&self.points, self.surroundings.around(&self.map?, &predicted.pose), predicted)
     }
 
     fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch> {
         align_nearby(&self.points, self.surroundings.loaded(), predicted)
+    }
+
+    fn see(&mut self, scan: PointView<'_>) {
+        find_surface_points(scan, &mut self.points);
+    }
+
+    #[inline(never)]
+    fn locate_behind(&self, predicted: &Prediction) -> Option<ContourMatch> {
+        align(&self.points, self.surroundings.loaded(), predicted)
+    }
+
+    fn forget_keys(&mut self) {
+        self.keys.clear();
+    }
+
+    #[inline(never)]
+    fn keep(&mut self, pose: &Pose) -> bool {
+        let is_kept = self.keys.wants(pose);
+        if is_kept {
+            self.keys.keep(pose, &self.points);
+            self.surroundings.of_keys(pose, &self.keys);
+        }
+        is_kept
     }
 
     fn has_cut(&self) -> bool {
@@ -126,6 +170,7 @@ impl FindContours for NoContours {
     type Places = NoPlaces;
 
     const POINTS: usize = 0;
+    const KEYS: usize = 0;
 
     fn new() -> Self {
         Self
@@ -143,6 +188,18 @@ impl FindContours for NoContours {
 
     fn locate_nearby(&self, _: &Pose) -> Option<ContourMatch> {
         None
+    }
+
+    fn see(&mut self, _: PointView<'_>) {}
+
+    fn locate_behind(&self, _: &Prediction) -> Option<ContourMatch> {
+        None
+    }
+
+    fn forget_keys(&mut self) {}
+
+    fn keep(&mut self, _: &Pose) -> bool {
+        false
     }
 
     fn has_cut(&self) -> bool {

@@ -7,6 +7,7 @@
 mod aid;
 mod association;
 mod contours;
+mod contours_behind;
 mod correction;
 mod features;
 mod gyro;
@@ -33,6 +34,7 @@ pub use status::SourceStatus;
 pub(crate) use aid::correct as correct_by_aid;
 pub(crate) use association::{Believed, Comparison};
 pub(crate) use contours::{ContourOutcome, see_contours};
+pub(crate) use contours_behind::{ContoursBehind, ScanBehind};
 pub(crate) use correction::{Outcome, correct};
 pub(crate) use features::{FeatureFinder, FindFeatures};
 pub(crate) use key_scans::KeyScans;
@@ -128,7 +130,7 @@ sources! {
     EndPoints end_points;
     /// Scans of the distance behind: `key_scans.rs`.
     KeyScans key_scans;
-    /// Surfaces of a kept map: `contours.rs`.
+    /// Surfaces of a kept map, `contours.rs`, or without one of the way behind: `contours_behind.rs`.
     Contours contours;
     /// Poses from outside: the pose begins anew at each.
     GivenPose given_pose;

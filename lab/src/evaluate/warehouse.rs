@@ -32,11 +32,13 @@ pub enum Map {
     Static,
     /// Features found while driving, Algorithm 1 (K 5.4.1).
     Dynamic,
-    /// Features found while driving, in the state of the filter, and alignment to key scans.
+    /// Contours of the way behind, as the vehicle ships.
     Slam,
-    /// The same without alignment.
+    /// Features found while driving, in the state of the filter, and alignment to key scans.
+    SlamFeaturesAndKeyScans,
+    /// Features alone.
     SlamFeatures,
-    /// The same without ends of faces.
+    /// Corners alone.
     SlamCorners,
     /// Alignment to key scans, and no features.
     SlamKeyScans,
@@ -61,11 +63,19 @@ impl Map {
     }
 
     fn is_slam(self) -> bool {
-        matches!(self, Self::Slam | Self::SlamFeatures | Self::SlamCorners | Self::SlamKeyScans | Self::StaticSlam)
+        self.has_contours()
+            || matches!(
+                self,
+                Self::SlamFeatures | Self::SlamCorners | Self::SlamKeyScans | Self::SlamFeaturesAndKeyScans
+            )
     }
 
     fn has_key_scans(self) -> bool {
-        matches!(self, Self::Slam | Self::SlamKeyScans | Self::StaticSlam)
+        matches!(self, Self::SlamKeyScans | Self::SlamFeaturesAndKeyScans)
+    }
+
+    fn has_contours(self) -> bool {
+        matches!(self, Self::Slam | Self::StaticSlam)
     }
 }
 
@@ -95,7 +105,7 @@ const SIDE_SLIP: f64 = 0.6e-3;
 
 impl Method {
     /// All methods: every map with the default detector, and Algorithm 1 with FALKO as printed too.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::mended("odometry", Map::Odometry),
         Self::mended("reflectors", Map::Reflectors),
         Self::mended("static", Map::Static),
@@ -116,6 +126,7 @@ impl Method {
             sources: Switches { corners: false, end_points: false, ..Switches::ALL },
             ..Self::mended("slam with key scans alone", Map::SlamKeyScans)
         },
+        Self::mended("slam with features and key scans", Map::SlamFeaturesAndKeyScans),
         Self::mended("slam", Map::Slam),
         Self::mended("static and slam", Map::StaticSlam),
         Self::mended("mixed", Map::Mixed),
@@ -257,7 +268,8 @@ pub fn prepare(
         // Scale and steering offset are in the state, so the noise need not stand for them.
         recording.parameters.odometry_noise.side_slip = SIDE_SLIP;
     }
-    recording.parameters.sources = Switches { key_scans: method.map.has_key_scans(), ..method.sources };
+    recording.parameters.sources =
+        Switches { key_scans: method.map.has_key_scans(), contours: method.map.has_contours(), ..method.sources };
     if method.map.has_static_features() {
         let mut mapping = scenario(
             BlockStoragePath::Mapping,

@@ -37,7 +37,7 @@ const NO_MAP: MapUse = MapUse { reflectors: false, features: false, dynamic: fal
 const SLAM: MapUse = MapUse { slam: true, ..NO_MAP };
 const DYNAMIC: MapUse = MapUse { dynamic: true, ..NO_MAP };
 
-const WITHOUT_KEY_SCANS: Switches = Switches { key_scans: false, ..Switches::ALL };
+const WITHOUT_KEY_SCANS: Switches = Switches { key_scans: false, contours: false, ..Switches::ALL };
 
 impl Candidate {
     /// All candidates; the first is odometry alone.
@@ -60,9 +60,14 @@ impl Candidate {
             name: "slam with key scans alone",
             maps: SLAM,
             detector: falko::Parameters::mended(),
-            sources: Switches { corners: false, end_points: false, ..Switches::ALL },
+            sources: Switches { corners: false, end_points: false, contours: false, ..Switches::ALL },
         },
-        Self { name: "slam", maps: SLAM, detector: falko::Parameters::mended(), sources: Switches::ALL },
+        Self {
+            name: "slam with features and key scans",
+            maps: SLAM,
+            detector: falko::Parameters::mended(),
+            sources: Switches { contours: false, ..Switches::ALL },
+        },
     ];
 
     fn parameters(&self) -> Parameters {
@@ -267,6 +272,26 @@ pub fn contour_drift(drive: &OfficeDrive, length: f64, worsening: &Worsening) ->
         ends.extend(followed.poses.last().map(|found| End::of(found, &drive.truth[*last], followed.is_lost)));
     }
     (Drift::of(CONTOURS, worsening, &ends), poses)
+}
+
+/// Name of the candidate that is the vehicle's own filter as it ships.
+pub const VEHICLE: &str = "vehicle, slam";
+
+/// Drift of the vehicle's own filter without a map: the default parameters, and the noise of the odometry that the scans of the drive tell.
+///
+/// # Errors
+/// If a window cannot be replayed.
+pub fn vehicle_drift(drive: &OfficeDrive, length: f64, worsening: &Worsening) -> Result<Drift, ReplayError> {
+    let noise = drive.odometry_noise()?;
+    let end = |window: (usize, usize)| {
+        let mut recording = drive.recording(window, steps(drive, window, worsening), &noise);
+        recording.parameters.maps = SLAM;
+        let said = replay(&recording, |_| {})?.poses.pop();
+        let pose = said.as_ref().map_or(Pose::default(), |said| said.pose);
+        Ok(End::of(&pose, &drive.truth[window.1], said.is_none_or(|said| said.mode == Mode::Lost)))
+    };
+    let ends: Vec<End> = windows(drive, length).into_par_iter().map(end).collect::<Result<_, ReplayError>>()?;
+    Ok(Drift::of(VEHICLE, worsening, &ends))
 }
 
 impl Drift {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use agv_lab::evaluate::windows::{Candidate, Worsening, contour_drift, drift};
+use agv_lab::evaluate::windows::{Candidate, Worsening, contour_drift, drift, vehicle_drift};
 
 use super::office_drive::DriveChoice;
 use super::trajectory;
@@ -39,13 +39,15 @@ impl Windows {
     pub fn run(self) -> anyhow::Result<()> {
         anyhow::ensure!(self.length > 0.0, "--length must be more than 0 m");
         let drive = self.drive.read()?;
-        let bar = progress::bar("driving", ((Candidate::ALL.len() + 1) * Worsening::ALL.len()) as u64);
+        let bar = progress::bar("driving", ((Candidate::ALL.len() + 2) * Worsening::ALL.len()) as u64);
         let mut drifts = Vec::new();
         for worsening in &Worsening::ALL {
             for candidate in &Candidate::ALL {
                 drifts.push(drift(&drive, self.length, candidate, worsening)?);
                 bar.inc(1);
             }
+            drifts.push(vehicle_drift(&drive, self.length, worsening)?);
+            bar.inc(1);
             let (by_contours, poses) = contour_drift(&drive, self.length, worsening);
             drifts.push(by_contours);
             bar.inc(1);
