@@ -143,7 +143,7 @@ fn drawn(hall: Hall, number: usize, random: &mut Random) -> Option<Cuboid> {
         }
         Hall::Open => {
             // Blocks of goods along both sides.
-            let side = if number % 2 == 0 { 1.0 } else { -1.0 };
+            let side = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
             let middle = [random.between(-28.0, 28.0), side * random.between(17.0, 23.0)];
             let size = [random.between(1.2, 4.0), random.between(0.8, 2.4)];
             let height = random.between(0.8, 2.6);
@@ -255,7 +255,7 @@ fn surveyed(hall: Hall, scene: &Scene, lidar: &Lidar, random: &mut Random) -> Ve
 /// Where a question is asked.
 fn asked_at(hall: Hall, number: usize, random: &mut Random) -> Pose {
     let lane = lanes(hall)[number % lanes(hall).len()];
-    let heading = if number % 2 == 0 { 0.0 } else { PI } + random.between(-0.1, 0.1);
+    let heading = if number.is_multiple_of(2) { 0.0 } else { PI } + random.between(-0.1, 0.1);
     Pose { place: [random.between(-18.0, 18.0), lane + random.between(-0.4, 0.4)], heading }
 }
 
