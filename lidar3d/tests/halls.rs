@@ -1,7 +1,8 @@
-//! Places in halls that are cast ray by ray: racks with goods, and machines. Objects change between map and question, people
-//! walk about, half of the headings are reversed, and some questions come from where the map does not reach.
+//! Places in halls that are cast ray by ray: racks with goods and aisles of 3 m, machines, and an open hall whose middle is free
+//! over 30 m. Objects change between map and question, people walk about, half of the headings are reversed, and some questions
+//! come from where the map does not reach.
 //!
-//! `AGV_HALL_QUERIES=500` makes the whole table, with 64 rings as well.
+//! `AGV_HALL_QUERIES=500` makes the whole table, with 64 rings as well; `AGV_HALL_SEEDS=100000,100001` states other halls.
 
 mod support;
 
@@ -68,6 +69,7 @@ impl Cuboid {
 enum Hall {
     Racks,
     Machines,
+    Open,
 }
 
 /// What always stands there, and what may change: for each thing, how to draw it.
@@ -92,6 +94,13 @@ fn scene(hall: Hall, random: &mut Random) -> Scene {
             fixed.push(Cuboid::at([bay, row], [0.12, 0.12], [0.0, 8.0]));
         }
     }
+    if hall == Hall::Open {
+        // Pillars, an office, and a gate that stands open.
+        let pillars = (0..5).flat_map(|column| [-15.5, 15.5].map(|row| [-24.0 + 12.0 * column as f32, row]));
+        fixed.extend(pillars.map(|middle| Cuboid::at(middle, [0.4, 0.4], [0.0, 9.0])));
+        fixed.push(Cuboid::at([-25.0, 21.0], [8.0, 6.0], [0.0, 3.0]));
+        fixed.push(Cuboid::at([12.0, -24.0], [0.5, 1.5], [0.0, 4.0]));
+    }
     let count = slots(hall);
     let changing = (0..count).map(|number| drawn(hall, number, random)).collect();
     Scene { fixed, changing }
@@ -106,6 +115,7 @@ fn slots(hall: Hall) -> usize {
     match hall {
         Hall::Racks => 9 * 14 * 4,
         Hall::Machines => 140,
+        Hall::Open => 40,
     }
 }
 
@@ -131,14 +141,23 @@ fn drawn(hall: Hall, number: usize, random: &mut Random) -> Option<Cuboid> {
             let is_free = lanes(hall).iter().all(|lane| (middle[1] - lane).abs() > 1.3 + width / 2.0);
             is_free.then(|| Cuboid::at(middle, [length, width], [0.0, height]))
         }
+        Hall::Open => {
+            // Blocks of goods along both sides.
+            let side = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let middle = [random.between(-28.0, 28.0), side * random.between(17.0, 23.0)];
+            let size = [random.between(1.2, 4.0), random.between(0.8, 2.4)];
+            let height = random.between(0.8, 2.6);
+            random.happens(0.8).then(|| Cuboid::at(middle, size, [0.0, height]))
+        }
     }
 }
 
-/// Where vehicles drive: along x, at these y. The last two are not in the map.
+/// Where vehicles drive: along x, at these y. The last ones are not in the map.
 fn lanes(hall: Hall) -> &'static [f32] {
     match hall {
         Hall::Racks => &[-17.5, -12.5, -7.5, 2.5, 7.5, 12.5, -2.5, 17.5],
         Hall::Machines => &[-20.0, -10.0, 0.0, 20.0, 10.0],
+        Hall::Open => &[-12.0, -6.0, 0.0, 12.0, 6.0],
     }
 }
 
@@ -225,19 +244,26 @@ fn best_f1(answers: &[(f32, bool)], answerable: usize) -> f32 {
     best
 }
 
+/// Places along the lanes of the map, 2 m apart.
+fn surveyed(hall: Hall, scene: &Scene, lidar: &Lidar, random: &mut Random) -> Vec<(Pose, Seen)> {
+    let cuboids: Vec<Cuboid> = scene.fixed.iter().copied().chain(scene.changing.iter().copied().flatten()).collect();
+    let along = |lane: &f32| (0..20).map(|step| [-19.0 + 2.0 * step as f32, *lane]).collect::<Vec<_>>();
+    let poses = mapped(hall).iter().flat_map(along).map(|place| Pose { place, heading: 0.0 });
+    poses.map(|pose| (pose, seen(&scan(&cuboids, &pose, lidar, random), lidar))).collect()
+}
+
+/// Where a question is asked.
+fn asked_at(hall: Hall, number: usize, random: &mut Random) -> Pose {
+    let lane = lanes(hall)[number % lanes(hall).len()];
+    let heading = if number.is_multiple_of(2) { 0.0 } else { PI } + random.between(-0.1, 0.1);
+    Pose { place: [random.between(-18.0, 18.0), lane + random.between(-0.4, 0.4)], heading }
+}
+
 fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
     let mut random = Random(ChaCha8Rng::seed_from_u64(seed));
     let lidar = lidar(rings);
     let scene = scene(hall, &mut random);
-    let cuboids: Vec<Cuboid> = scene.fixed.iter().copied().chain(scene.changing.iter().copied().flatten()).collect();
-    let mut stored = Vec::new();
-    for lane in mapped(hall) {
-        for step in 0..20 {
-            let pose = Pose { place: [-19.0 + 2.0 * step as f32, *lane], heading: 0.0 };
-            let found = seen(&scan(&cuboids, &pose, &lidar, &mut random), &lidar);
-            stored.push((pose, found));
-        }
-    }
+    let stored = surveyed(hall, &scene, &lidar, &mut random);
     let places: Vec<Place> =
         stored.iter().map(|(pose, seen)| Place { pose: *pose, image: &seen.image, panorama: &seen.panorama }).collect();
     let index = PlaceIndex::new(places.clone(), RIGHT);
@@ -253,10 +279,7 @@ fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
         errors: Vec::new(),
     };
     for number in 0..queries {
-        let lane = lanes(hall)[number % lanes(hall).len()];
-        let heading = if number % 2 == 0 { 0.0 } else { PI } + random.between(-0.1, 0.1);
-        let place = [random.between(-18.0, 18.0), lane + random.between(-0.4, 0.4)];
-        let pose = Pose { place, heading };
+        let pose = asked_at(hall, number, &mut random);
         let now = changed(hall, &scene, &pose, &mut random);
         let points = scan(&now, &pose, &lidar, &mut random);
         let asked = seen(&points, &lidar);
@@ -302,25 +325,34 @@ fn changed(hall: Hall, scene: &Scene, pose: &Pose, random: &mut Random) -> Vec<C
 #[test]
 fn places_in_halls_are_told_apart_by_alignment() {
     let asked = std::env::var("AGV_HALL_QUERIES").ok().map(|queries| queries.parse().unwrap());
-    let queries = asked.unwrap_or(40);
+    let seeds = std::env::var("AGV_HALL_SEEDS").unwrap_or(SEED.to_string());
+    let seeds: Vec<u64> = seeds.split(',').map(|seed| seed.parse().unwrap()).collect();
+    let queries = asked.unwrap_or(24);
     // With 64 rings it takes minutes.
     let all_rings: &[usize] = if asked.is_some() { &[16, 64] } else { &[16] };
-    for (hall, rings) in
-        [Hall::Racks, Hall::Machines].into_iter().flat_map(|hall| all_rings.iter().map(move |r| (hall, *r)))
+    let mut short = Vec::new();
+    let halls = [Hall::Racks, Hall::Machines, Hall::Open].into_iter();
+    for ((hall, rings), seed) in halls
+        .flat_map(|hall| all_rings.iter().map(move |r| (hall, *r)))
+        .flat_map(|of| seeds.iter().map(move |s| (of, *s)))
     {
-        let mut outcome = run(hall, rings, SEED, queries);
+        let mut outcome = run(hall, rings, seed, queries);
         outcome.errors.sort_by(f32::total_cmp);
         let [right, wrong] = outcome.believed;
         let verified = best_f1(&outcome.verified, outcome.answerable);
         let context = best_f1(&outcome.context, outcome.answerable);
+        let recall = right as f32 / outcome.answerable as f32;
         println!(
-            "{hall:?} {rings}: F1 verified {verified:.3}, Scan Context {context:.3}; limit {:.2}: recall {:.3}, {wrong} \
-             wrong of {queries}; {} ambiguous; {:.0} mm",
+            "{hall:?} {rings}, seed {seed}: F1 verified {verified:.3}, Scan Context {context:.3}; limit {:.2}: recall \
+             {recall:.3}, {wrong} wrong of {queries}; {} ambiguous; {:.0} mm",
             outcome.limit,
-            right as f32 / outcome.answerable as f32,
             outcome.ambiguous,
             1e3 * outcome.errors.get(outcome.errors.len() / 2).copied().unwrap_or(f32::NAN)
         );
-        assert!(verified >= 0.95 && verified > context - 0.02 && wrong <= 1, "{hall:?} {rings}: {verified} {context}");
+        // Of the recall .85 is wanted, which not every hall of racks reaches.
+        if !(verified >= 0.97 && verified > context && recall >= 0.6 && wrong * 1000 <= queries) {
+            short.push(format!("{hall:?} {rings}, seed {seed}"));
+        }
     }
+    assert!(short.is_empty(), "short of what they must show: {short:?}");
 }

@@ -120,73 +120,83 @@ impl Source {
     /// # Errors
     /// See [`SourceError`].
     pub fn open(self, options: &SetupOptions, stop: &AtomicBool) -> Result<OpenSource, SourceError> {
-        match self {
-            Self::Capture(path) => {
-                let survey = Survey::of_capture(&path, options).map_err(|error| match error {
-                    SurveyError::Capture(error) => SourceError::Capture(error),
-                    SurveyError::Setup(error) => SourceError::Setup(error),
-                })?;
-                let ouster = options.ouster()?;
-                let packets = Packets::Capture { port: survey.port, path, ouster: ouster.map(Box::new) };
-                Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
-            }
-            Self::Images(path) => {
-                let images = RangeImages::open(&path)?;
-                let survey = Survey {
-                    kind: Some(Kind::Velodyne(Sensor::Hdl64e)),
-                    calibration: Some(images.calibration()),
-                    ..Survey::default()
-                };
-                Ok(OpenSource { options: options.clone(), setup: None, survey, packets: Packets::Images(images) })
-            }
-            Self::Clouds(path, files) => {
-                let first = files.first().ok_or_else(|| SourceError::Cloud(format!("{}: no cloud", path.display())))?;
-                let (_, lasers) = clouds::read(first).map_err(SourceError::Cloud)?;
-                let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, ..Survey::default() };
-                let setup = Some(Setup::of_clouds(options, lasers));
-                Ok(OpenSource { options: options.clone(), setup, survey, packets: Packets::Clouds(files) })
-            }
-            Self::Bag(path, topic) => {
-                let (topic, count) = bag_clouds::topic(&path, topic.as_deref()).map_err(SourceError::Cloud)?;
-                let mut first = None;
-                let take = |_, lasers| {
-                    first = Some(lasers);
-                    ControlFlow::Break(())
-                };
-                bag_clouds::for_each(&path, &topic, take).map_err(SourceError::Cloud)?;
-                let survey = Survey { kind: Some(Kind::Cloud), turns: count as f64, ..Survey::default() };
-                let setup = Some(Setup::of_clouds(options, first.unwrap_or_default()));
-                Ok(OpenSource { options: options.clone(), setup, survey, packets: Packets::Bag(path, topic, count) })
-            }
-            Self::Live(port) => {
-                let network = |problem| SourceError::Network { port, problem };
-                let ouster = options.ouster()?;
-                let mut listener = Listener::new(port, ouster.clone()).map_err(network)?;
-                let mut surveyor = Surveyor::default();
-                let mut waiting = Vec::new();
-                while !stop.load(Ordering::Relaxed) {
-                    listener
-                        .receive(|time, datagram, bytes| {
-                            surveyor.datagram(time, datagram);
-                            waiting.push((time, bytes.to_vec()));
-                        })
-                        .map_err(network)?;
-                    let needs_calibration =
-                        options.calibration.is_none() && surveyor.kind() == Some(Kind::Velodyne(Sensor::Hdl64e));
-                    if waiting.len() >= (if needs_calibration { LONG_LOOK } else { LOOK }) {
-                        break;
-                    }
-                }
-                if waiting.is_empty() {
-                    return Err(SourceError::Silent { port });
-                }
-                let survey = surveyor.finish();
-                let packets =
-                    Packets::Live { port, listener: Box::new(listener), waiting, ouster: ouster.map(Box::new) };
-                Ok(OpenSource { options: options.clone(), setup: None, survey, packets })
-            }
+        let (survey, setup, packets) = match self {
+            Self::Capture(path) => opened_capture(path, options)?,
+            Self::Images(path) => opened_images(&path)?,
+            Self::Clouds(path, files) => opened_clouds(&path, files, options)?,
+            Self::Bag(path, topic) => opened_bag(path, topic.as_deref(), options)?,
+            Self::Live(port) => opened_port(port, options, stop)?,
+        };
+        Ok(OpenSource { options: options.clone(), setup, survey, packets })
+    }
+}
+
+/// What a source says about itself, the sensor and its parameters if it states them, and where its packets come from.
+type Opened = Result<(Survey, Option<Setup>, Packets), SourceError>;
+
+fn opened_capture(path: PathBuf, options: &SetupOptions) -> Opened {
+    let survey = Survey::of_capture(&path, options).map_err(|error| match error {
+        SurveyError::Capture(error) => SourceError::Capture(error),
+        SurveyError::Setup(error) => SourceError::Setup(error),
+    })?;
+    let packets = Packets::Capture { port: survey.port, path, ouster: options.ouster()?.map(Box::new) };
+    Ok((survey, None, packets))
+}
+
+fn opened_images(path: &Path) -> Opened {
+    let images = RangeImages::open(path)?;
+    let survey = Survey {
+        kind: Some(Kind::Velodyne(Sensor::Hdl64e)),
+        calibration: Some(images.calibration()),
+        ..Survey::default()
+    };
+    Ok((survey, None, Packets::Images(images)))
+}
+
+fn opened_clouds(path: &Path, files: Vec<PathBuf>, options: &SetupOptions) -> Opened {
+    let first = files.first().ok_or_else(|| SourceError::Cloud(format!("{}: no cloud", path.display())))?;
+    let (_, lasers) = clouds::read(first).map_err(SourceError::Cloud)?;
+    let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, ..Survey::default() };
+    Ok((survey, Some(Setup::of_clouds(options, lasers)), Packets::Clouds(files)))
+}
+
+fn opened_bag(path: PathBuf, topic: Option<&str>, options: &SetupOptions) -> Opened {
+    let (topic, count) = bag_clouds::topic(&path, topic).map_err(SourceError::Cloud)?;
+    let mut first = None;
+    let take = |_, lasers| {
+        first = Some(lasers);
+        ControlFlow::Break(())
+    };
+    bag_clouds::for_each(&path, &topic, take).map_err(SourceError::Cloud)?;
+    let survey = Survey { kind: Some(Kind::Cloud), turns: count as f64, ..Survey::default() };
+    let setup = Setup::of_clouds(options, first.unwrap_or_default());
+    Ok((survey, Some(setup), Packets::Bag(path, topic, count)))
+}
+
+fn opened_port(port: u16, options: &SetupOptions, stop: &AtomicBool) -> Opened {
+    let network = |problem| SourceError::Network { port, problem };
+    let ouster = options.ouster()?;
+    let mut listener = Listener::new(port, ouster.clone()).map_err(network)?;
+    let mut surveyor = Surveyor::default();
+    let mut waiting = Vec::new();
+    while !stop.load(Ordering::Relaxed) {
+        listener
+            .receive(|time, datagram, bytes| {
+                surveyor.datagram(time, datagram);
+                waiting.push((time, bytes.to_vec()));
+            })
+            .map_err(network)?;
+        let needs_calibration =
+            options.calibration.is_none() && surveyor.kind() == Some(Kind::Velodyne(Sensor::Hdl64e));
+        if waiting.len() >= (if needs_calibration { LONG_LOOK } else { LOOK }) {
+            break;
         }
     }
+    if waiting.is_empty() {
+        return Err(SourceError::Silent { port });
+    }
+    let packets = Packets::Live { port, listener: Box::new(listener), waiting, ouster: ouster.map(Box::new) };
+    Ok((surveyor.finish(), None, packets))
 }
 
 enum Packets {
@@ -255,22 +265,17 @@ impl OpenSource {
         mut take: impl FnMut(Revolution) -> ControlFlow<()>,
     ) -> Result<Tally, SourceError> {
         let setup = self.setup()?;
-        if let Packets::Clouds(files) = &self.packets {
-            return cloud_revolutions(files, &setup, stop, take);
-        }
-        if let Packets::Bag(path, topic, _) = &self.packets {
-            let mut tally = Tally::default();
-            let each = |mut revolution: Revolution, _| {
-                filtered(&mut revolution, &setup, &mut tally);
-                let flow = take(revolution);
-                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { flow }
-            };
-            bag_clouds::for_each(path, topic, each).map_err(SourceError::Cloud)?;
-            return Ok(tally);
+        match &self.packets {
+            Packets::Clouds(files) => return cloud_revolutions(files, &setup, stop, take),
+            Packets::Bag(path, topic, _) => return bag_revolutions(path, topic, &setup, stop, take),
+            _ => {}
         }
         let mut revolutions = Revolutions::new(&setup);
+        if let Packets::Images(images) = &self.packets {
+            revolutions.begin_at(images.first_azimuth());
+        }
         let mut flow = ControlFlow::Continue(());
-        let mut push = |time: Time, datagram: &Datagram<'_>, revolutions: &mut Revolutions| {
+        let push = |time: Time, datagram: &Datagram<'_>| {
             revolutions.datagram(time, datagram, |revolution| {
                 if flow.is_continue() {
                     flow = take(revolution);
@@ -278,45 +283,7 @@ impl OpenSource {
             });
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { flow }
         };
-        let name = match &mut self.packets {
-            Packets::Capture { path, port, ouster } => {
-                capture::for_each_until(path, *port, ouster.as_deref(), |time, datagram| {
-                    push(time, datagram, &mut revolutions)
-                })?;
-                path.display().to_string()
-            }
-            Packets::Images(images) => {
-                revolutions.begin_at(images.first_azimuth());
-                for index in 0..images.files.len() {
-                    let time = Time::from_micros(index as u64 * IMAGE_INTERVAL);
-                    let counts = images.counts(index)?;
-                    let flows = images.packets(&counts).iter().try_for_each(|bytes| match Packet::new(bytes) {
-                        Ok(packet) => push(time, &Datagram::Velodyne(packet), &mut revolutions),
-                        Err(_) => ControlFlow::Continue(()),
-                    });
-                    if flows.is_break() {
-                        break;
-                    }
-                }
-                "the range images".to_owned()
-            }
-            Packets::Clouds(_) | Packets::Bag(..) => String::new(),
-            Packets::Live { port, listener, waiting, ouster } => {
-                let port_now = listener.port();
-                let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
-                    match Datagram::recognise(&bytes, port_now, ouster.as_deref()) {
-                        Ok(Some(datagram)) => push(time, &datagram, &mut revolutions),
-                        Ok(None) | Err(_) => ControlFlow::Continue(()),
-                    }
-                });
-                while is_going.is_continue() && !stop.load(Ordering::Relaxed) {
-                    listener
-                        .receive(|time, datagram, _| is_going = push(time, datagram, &mut revolutions))
-                        .map_err(|problem| SourceError::Network { port: *port, problem })?;
-                }
-                format!("UDP port {port}")
-            }
-        };
+        let name = self.packets.for_each(stop, push)?;
         let (last, tally) = revolutions.finish();
         if let (Some(mut last), ControlFlow::Continue(())) = (last, flow) {
             last.is_whole = matches!(self.packets, Packets::Images(_));
@@ -331,6 +298,79 @@ impl OpenSource {
         }
         Ok(tally)
     }
+}
+
+impl Packets {
+    /// Hands over each datagram until `push` breaks off, the source ends or `stop` is set. Returns what people call the source.
+    fn for_each(
+        &mut self,
+        stop: &AtomicBool,
+        mut push: impl FnMut(Time, &Datagram<'_>) -> ControlFlow<()>,
+    ) -> Result<String, SourceError> {
+        match self {
+            Self::Capture { path, port, ouster } => {
+                capture::for_each_until(path, *port, ouster.as_deref(), push)?;
+                Ok(path.display().to_string())
+            }
+            Self::Images(images) => {
+                image_packets(images, push)?;
+                Ok("the range images".to_owned())
+            }
+            Self::Clouds(_) | Self::Bag(..) => Ok(String::new()),
+            Self::Live { port, listener, waiting, ouster } => {
+                let port_now = listener.port();
+                let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
+                    match Datagram::recognise(&bytes, port_now, ouster.as_deref()) {
+                        Ok(Some(datagram)) => push(time, &datagram),
+                        Ok(None) | Err(_) => ControlFlow::Continue(()),
+                    }
+                });
+                while is_going.is_continue() && !stop.load(Ordering::Relaxed) {
+                    listener
+                        .receive(|time, datagram, _| is_going = push(time, datagram))
+                        .map_err(|problem| SourceError::Network { port: *port, problem })?;
+                }
+                Ok(format!("UDP port {port}"))
+            }
+        }
+    }
+}
+
+/// The packets that a sensor would have sent for each image.
+fn image_packets(
+    images: &RangeImages,
+    mut push: impl FnMut(Time, &Datagram<'_>) -> ControlFlow<()>,
+) -> Result<(), SourceError> {
+    for index in 0..images.files.len() {
+        let time = Time::from_micros(index as u64 * IMAGE_INTERVAL);
+        let counts = images.counts(index)?;
+        let flow = images.packets(&counts).iter().try_for_each(|bytes| match Packet::new(bytes) {
+            Ok(packet) => push(time, &Datagram::Velodyne(packet)),
+            Err(_) => ControlFlow::Continue(()),
+        });
+        if flow.is_break() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Each cloud of a topic as a revolution.
+fn bag_revolutions(
+    path: &Path,
+    topic: &str,
+    setup: &Setup,
+    stop: &AtomicBool,
+    mut take: impl FnMut(Revolution) -> ControlFlow<()>,
+) -> Result<Tally, SourceError> {
+    let mut tally = Tally::default();
+    let each = |mut revolution: Revolution, _| {
+        filtered(&mut revolution, setup, &mut tally);
+        let flow = take(revolution);
+        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { flow }
+    };
+    bag_clouds::for_each(path, topic, each).map_err(SourceError::Cloud)?;
+    Ok(tally)
 }
 
 /// Each file as a revolution.

@@ -4,10 +4,18 @@
 //! hidden; in directions that the other scan does not know it does not count. Cells of the floor plan vote, not points: walls have most points, but machines and shelves tell places apart.
 
 use std::vec;
+use std::vec::Vec;
 
 use super::panorama::{COLUMNS, Panorama};
+use super::pose::Pose;
 
-/// Points beyond this do not vote, m.
+/// What stands on the floor votes, m above it.
+const STANDING: [f32; 2] = [0.3, 8.0];
+/// Farthest points that count, m.
+const FARTHEST: f32 = 60.0;
+/// Points that vote, at the most.
+const VOTERS: usize = 2500;
+/// Points beyond this are outside of the plan, m.
 const REACH: f32 = 70.0;
 /// Edge of a cell that votes, m, and how many there are along an edge of the plan.
 const CELL: f32 = 0.5;
@@ -25,31 +33,84 @@ struct Cell {
     hidden: u16,
 }
 
-/// Part of the cells of the floor plan that agree, 0 to 1. Of each point: where it is for the panorama, and where it is for the plan.
-pub(super) fn agreement(panorama: &Panorama, points: impl Iterator<Item = ([f32; 3], [f32; 3])>) -> f32 {
-    let knows = panorama.known_directions();
+impl Cell {
+    fn is_empty(self) -> bool {
+        self.there == 0 && self.through == 0 && self.hidden == 0
+    }
+}
+
+/// A scan, as it agrees with others: what it has seen, and the points that vote.
+pub(super) struct Voters<'a> {
+    pub panorama: &'a Panorama,
+    pub knows: [bool; COLUMNS],
+    points: Vec<[f32; 3]>,
+}
+
+impl<'a> Voters<'a> {
+    /// Of a panorama, and points that stand on the floor.
+    pub fn new(panorama: &'a Panorama, standing: &[[f32; 3]]) -> Self {
+        Self { panorama, knows: panorama.known_directions(), points: thinned(standing, VOTERS) }
+    }
+
+    /// Of a panorama and its own points.
+    pub fn of(panorama: &'a Panorama) -> Self {
+        let points: Vec<[f32; 3]> = panorama.points().filter(is_standing).collect();
+        Self::new(panorama, &points)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Part of the cells that agree where another scan lies at a pose in this one, 0 to 1: the mean of both ways.
+    pub fn agreement(&self, other: &Self, pose: &Pose) -> f32 {
+        let (out, back) = (pose.out(), pose.back());
+        let there = other.points.iter().map(|point| out(*point));
+        let here = self.points.iter().map(|point| (back(*point), *point));
+        let from_here = agreement(self.panorama, &self.knows, there.map(|point| (point, point)));
+        let from_there = agreement(other.panorama, &other.knows, here);
+        0.5 * (from_here + from_there)
+    }
+}
+
+/// Whether a point stands on the floor, near enough to count.
+pub(super) fn is_standing([x, y, up]: &[f32; 3]) -> bool {
+    (STANDING[0]..STANDING[1]).contains(up) && x * x + y * y < FARTHEST * FARTHEST
+}
+
+/// Every so many points that there are at most `count`.
+pub(super) fn thinned(points: &[[f32; 3]], count: usize) -> Vec<[f32; 3]> {
+    points.iter().step_by(points.len().div_ceil(count).max(1)).copied().collect()
+}
+
+/// Part of the cells of the floor plan that agree, 0 to 1, where the panorama knows these directions. Of each point: where it is
+/// for the panorama, and where it is for the plan.
+fn agreement(panorama: &Panorama, knows: &[bool; COLUMNS], points: impl Iterator<Item = ([f32; 3], [f32; 3])>) -> f32 {
     let mut cells = vec![Cell::default(); CELLS * CELLS];
+    let mut voting = Vec::new();
     for (seen, [x, y, _]) in points {
         let at = |x: f32| ((x + REACH) / CELL) as usize;
-        let Some(cell) = cells.get_mut(at(y) * CELLS + at(x)).filter(|_| at(x) < CELLS) else { continue };
-        let count = match verdict(panorama, &knows, seen) {
+        let number = at(y) * CELLS + at(x);
+        let Some(cell) = cells.get_mut(number).filter(|_| at(x) < CELLS) else { continue };
+        let is_first = cell.is_empty();
+        let count = match verdict(panorama, knows, seen) {
             Some(Verdict::There) => &mut cell.there,
             Some(Verdict::Through) => &mut cell.through,
             Some(Verdict::Hidden) => &mut cell.hidden,
             None => continue,
         };
         *count = count.saturating_add(1);
+        if is_first {
+            voting.push(number);
+        }
     }
     let (mut agreed, mut all) = (0.0, 0.0);
-    for Cell { there, through, hidden } in cells {
+    for Cell { there, through, hidden } in voting.into_iter().filter_map(|number| cells.get(number).copied()) {
         let [there, through, hidden] = [there, through, hidden].map(f32::from);
-        let count = there + through + hidden;
-        if count > 0.0 {
-            // Shares of the points, of the weight of the root of their number.
-            let weight = 1.0 / libm::sqrtf(count);
-            agreed += weight * there;
-            all += weight * (there + through + 0.5 * hidden);
-        }
+        // Shares of the points, of the weight of the root of their number.
+        let weight = 1.0 / libm::sqrtf(there + through + hidden);
+        agreed += weight * there;
+        all += weight * (there + through + 0.5 * hidden);
     }
     if all > 0.0 { agreed / all } else { 0.0 }
 }

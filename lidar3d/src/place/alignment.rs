@@ -4,16 +4,12 @@
 
 use std::vec::Vec;
 
-use super::agreement::agreement;
+use super::agreement::{Voters, is_standing, thinned};
 use super::floor_plan::{CELL, FloorPlan, occupied};
 use super::panorama::Panorama;
 use super::pose::Pose;
 use super::refinement::refined;
 
-/// What stands on the floor, m above it.
-const STANDING: [f32; 2] = [0.3, 8.0];
-/// Farthest points that count, m.
-const REACH: f32 = 60.0;
 /// Deviations of the plan that is searched coarsely and finely, m.
 const BLUR: [f32; 2] = [0.45, 0.2];
 /// Points that are laid over the plan, coarsely and finely.
@@ -30,9 +26,6 @@ const HALVINGS: usize = 5;
 const STEPS: usize = 20;
 /// A refined pose whose score is less by no more than this is the better one: scores do not show centimetres.
 const EQUAL: f32 = 0.02;
-/// Points that vote, at the most.
-const VOTERS: usize = 2500;
-
 /// What an alignment found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
@@ -44,18 +37,16 @@ pub struct Alignment {
 
 /// A stored place, ready for alignments.
 pub struct Stored<'a> {
-    panorama: &'a Panorama,
+    voters: Voters<'a>,
     plans: [FloorPlan; 2],
-    voters: Vec<[f32; 3]>,
 }
 
 /// A scan that is asked for: its panorama, and its points with their heights above the floor, m.
 pub struct Asked<'a> {
-    panorama: &'a Panorama,
-    /// The points that are laid over a plan coarsely and finely, and those that vote.
+    pub(super) voters: Voters<'a>,
+    /// The points that are laid over a plan coarsely and finely.
     few: Vec<[f32; 3]>,
     many: Vec<[f32; 3]>,
-    voters: Vec<[f32; 3]>,
 }
 
 impl<'a> Asked<'a> {
@@ -64,17 +55,8 @@ impl<'a> Asked<'a> {
     pub fn new(panorama: &'a Panorama, points: impl Iterator<Item = [f32; 3]>) -> Self {
         let standing: Vec<[f32; 3]> = points.filter(is_standing).collect();
         let [few, many] = POINTS.map(|count| thinned(&standing, count));
-        Self { panorama, few, many, voters: thinned(&standing, VOTERS) }
+        Self { voters: Voters::new(panorama, &standing), few, many }
     }
-}
-
-fn is_standing([x, y, up]: &[f32; 3]) -> bool {
-    (STANDING[0]..STANDING[1]).contains(up) && x * x + y * y < REACH * REACH
-}
-
-/// Every so many points that there are at most `count`.
-fn thinned(points: &[[f32; 3]], count: usize) -> Vec<[f32; 3]> {
-    points.iter().step_by(points.len().div_ceil(count).max(1)).copied().collect()
 }
 
 impl<'a> Stored<'a> {
@@ -82,10 +64,10 @@ impl<'a> Stored<'a> {
     #[must_use]
     pub fn new(panorama: &'a Panorama) -> Self {
         let points: Vec<[f32; 3]> = panorama.points().filter(is_standing).collect();
+        let voters = Voters::new(panorama, &points);
         let occupied = occupied(&points);
-        let knows = panorama.known_directions();
-        let plans = BLUR.map(|blur| FloorPlan::new(&occupied, blur, &knows));
-        Self { panorama, plans, voters: thinned(&points, VOTERS) }
+        let plans = BLUR.map(|blur| FloorPlan::new(&occupied, blur, &voters.knows));
+        Self { voters, plans }
     }
 
     /// Aligns a scan that is turned about as one of some headings, rad, counter-clockwise, and at most `reach` away in each
@@ -109,20 +91,10 @@ impl<'a> Stored<'a> {
             let pose = climb(coarse, &asked.few, *pose);
             climb(fine, &asked.many, pose)
         });
-        let scored = |pose: Pose| Alignment { pose, score: self.score(asked, &pose) };
+        let scored = |pose: Pose| Alignment { pose, score: self.voters.agreement(&asked.voters, &pose) };
         let found = climbed.map(scored).max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let refined = scored(refined(self.panorama, &asked.many, found.pose));
+        let refined = scored(refined(self.voters.panorama, &asked.many, found.pose));
         Some(if refined.score > found.score - EQUAL { refined } else { found })
-    }
-
-    /// Part of the cells that agree, the mean of both ways.
-    fn score(&self, asked: &Asked<'_>, pose: &Pose) -> f32 {
-        let (out, back) = (pose.out(), pose.back());
-        let there = asked.voters.iter().map(|point| out(*point));
-        let here = self.voters.iter().map(|point| (back(*point), *point));
-        let from_stored = agreement(self.panorama, there.map(|point| (point, point)));
-        let from_asked = agreement(asked.panorama, here);
-        0.5 * (from_stored + from_asked)
     }
 }
 

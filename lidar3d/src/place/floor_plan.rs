@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 use std::vec;
 use std::vec::Vec;
 
+use super::arctangent::sector;
 use super::panorama::COLUMNS;
 use super::pose::Pose;
 
@@ -132,11 +133,7 @@ fn add_steps(values: &[u8], outside: u32, cells: &[[isize; 2]], stride: usize, w
 fn directions() -> &'static [u16] {
     static OF_CELLS: OnceLock<Vec<u16>> = OnceLock::new();
     let middle = |at: usize| at as f32 + 0.5 - CELLS as f32 / 2.0;
-    let direction = |at: usize| {
-        let turn = libm::atan2f(middle(at / CELLS), middle(at % CELLS)) / core::f32::consts::TAU;
-        let turn = if turn < 0.0 { turn + 1.0 } else { turn };
-        ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1) as u16
-    };
+    let direction = |at: usize| sector(middle(at / CELLS), middle(at % CELLS), COLUMNS) as u16;
     OF_CELLS.get_or_init(|| (0..CELLS * CELLS).map(direction).collect())
 }
 

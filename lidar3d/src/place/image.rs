@@ -4,6 +4,7 @@
 //! a beam comes back is not known, and no distance counts it.
 
 use super::Floor;
+use super::arctangent::sector;
 use crate::cloud::Cloud;
 
 /// Sectors of an image.
@@ -48,7 +49,7 @@ impl PlaceImage {
         let mut returned = [0_u32; SECTORS];
         for point in cloud.seen() {
             let [x, y, height] = floor.levelled(point);
-            let sector = sector(x, y);
+            let sector = sector(y, x, SECTORS);
             let Some(count) = returned.get_mut(sector) else { continue };
             *count += 1;
             let ring = (libm::sqrtf(x * x + y * y) / RING) as usize;
@@ -180,10 +181,4 @@ impl AskedImage {
 fn apart(one: usize, other: usize) -> usize {
     let apart = one.abs_diff(other);
     apart.min(SECTORS - apart)
-}
-
-fn sector(x: f32, y: f32) -> usize {
-    let share = libm::atan2f(y, x) / core::f32::consts::TAU;
-    let share = if share < 0.0 { share + 1.0 } else { share };
-    ((share * SECTORS as f32) as usize).min(SECTORS - 1)
 }

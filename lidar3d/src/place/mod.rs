@@ -4,6 +4,7 @@
 mod agreement;
 #[cfg(feature = "std")]
 mod alignment;
+mod arctangent;
 mod enriched;
 mod facing;
 mod floor;
@@ -12,6 +13,8 @@ mod floor_plan;
 mod histogram;
 mod image;
 mod key_signatures;
+#[cfg(feature = "std")]
+mod look_alikes;
 mod loop_closure;
 mod normals;
 mod orientation;

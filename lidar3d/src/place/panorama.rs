@@ -1,6 +1,7 @@
 //! What a place looks like from where the sensor stood: the least range in each direction.
 
 use super::Floor;
+use super::arctangent::{arctangent, sector};
 use crate::cloud::Cloud;
 
 /// Directions of a panorama.
@@ -133,16 +134,14 @@ impl Panorama {
 
     /// Column of a point, and how far it lies away on the level, m.
     pub(super) fn column(&self, [x, y, _]: [f32; 3]) -> (usize, f32) {
-        let turn = libm::atan2f(y, x) / TAU;
-        let turn = if turn < 0.0 { turn + 1.0 } else { turn };
-        (((turn * self.columns as f32) as usize).min(self.columns - 1), libm::sqrtf(x * x + y * y))
+        (sector(y, x, self.columns), libm::sqrtf(x * x + y * y))
     }
 
     /// Row and range, m, of a point that lies so far away on the level, with its height above the floor; None if it is not
     /// between the elevations.
     pub(super) fn row(&self, [_, _, up]: [f32; 3], level: f32) -> Option<(usize, f32)> {
         let z = up - self.height;
-        let share = (self.span.most - libm::atan2f(z, level)) / (self.span.most - self.span.least);
+        let share = (self.span.most - arctangent(z, level)) / (self.span.most - self.span.least);
         (0.0..1.0).contains(&share).then(|| ((share * self.rows() as f32) as usize, libm::sqrtf(level * level + z * z)))
     }
 

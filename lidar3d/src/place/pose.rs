@@ -29,6 +29,13 @@ impl Pose {
         Self { place: [x, y], heading: frame.heading + self.heading }
     }
 
+    /// This pose in the frame of another one that is given in the same frame: undoes [`Self::within`].
+    #[must_use]
+    pub fn seen_from(&self, frame: &Self) -> Self {
+        let [x, y, _] = frame.back()([self.place[0], self.place[1], 0.0]);
+        Self { place: [x, y], heading: self.heading - frame.heading }
+    }
+
     /// Distance between two poses, m.
     #[must_use]
     pub fn apart(&self, other: &Self) -> f32 {

@@ -6,17 +6,20 @@
 
 use std::vec::Vec;
 
+use super::agreement::Voters;
 use super::image::Likeness;
+use super::look_alikes;
 use super::{Alignment, Asked, AskedImage, Panorama, PlaceImage, Pose, RingKey, SECTORS, Stored};
 
 /// Places that are aligned.
 const CANDIDATES: usize = 10;
 /// Places whose images are compared at the most: those whose keys are nearest.
 const COMPARED: usize = 4000;
-/// Places from which the limit is learnt at the most, and the share of them that may look more alike to others than it: these
-/// have limits of their own.
+/// Places from which the limit is learnt at the most.
 const LEARNING: usize = 512;
-const ALIKE: f32 = 0.03;
+/// Other places next to a pose that are heard about it, and how far away they may be, in parts of the reach of a place.
+const NEIGHBOURS: usize = 2;
+const NEIGHBOURHOOD: f32 = 2.0;
 /// Places this far apart are different ones, m; aligned poses of one spot are nearer than the second, m.
 const APART: f32 = 6.0;
 const SAME_SPOT: f32 = 1.5;
@@ -41,12 +44,20 @@ pub struct Answer {
     pub place: usize,
     /// The sensor's pose in the map.
     pub pose: Pose,
-    /// Part of the floor plan that agrees, 0 to 1.
+    /// Part of the floor plan that agrees, 0 to 1: the mean of the place and of those next to the pose.
     pub score: f32,
     /// Whether the score is above the limit that the map teaches, and above all that the place has with others of the map.
     pub is_believed: bool,
     /// Whether another pose agrees nearly as well.
     pub is_ambiguous: bool,
+}
+
+/// Where a scan may have been made.
+struct Found {
+    place: usize,
+    /// In the map.
+    pose: Pose,
+    score: f32,
 }
 
 /// Stored places, ready to be asked.
@@ -80,8 +91,8 @@ impl<'a> PlaceIndex<'a> {
         Self { limit, ..self }
     }
 
-    /// Learns from which score on answers are believed, but for places that look more alike to others: from 512 places at the most, as long as ten alignments take for each. `progress` is called after each with
-    /// how many there are.
+    /// Learns from which score on answers are believed, from 512 places at the most, as long as ten alignments take for each.
+    /// `progress` is called before each with how many there are.
     #[must_use]
     pub fn learnt_limit(&self, mut progress: impl FnMut(usize)) -> f32 {
         let step = self.places.len().div_ceil(LEARNING).max(1);
@@ -90,22 +101,16 @@ impl<'a> PlaceIndex<'a> {
             progress(count);
             self.look_alike(place)
         });
-        let mut scores: Vec<f32> = learnt.collect();
-        scores.sort_by(|a, b| b.total_cmp(a));
-        scores.get((ALIKE * scores.len() as f32) as usize).copied().unwrap_or(0.0)
+        look_alikes::limit(learnt.collect())
     }
 
     /// The greatest score of a place with another one of the map that lies apart. Pairs that are aligned to the very spot where
     /// both lie see the same things rightly, and teach nothing.
     fn look_alike(&self, place: &Place<'_>) -> f32 {
         let scan = Asked::new(place.panorama, place.panorama.points());
-        let others = self.alike(place.image, |other| other.pose.apart(&place.pose) > APART);
-        let score = |(likeness, number): (Likeness, usize)| {
-            let found = self.aligned(number, &likeness, &scan)?;
-            let pose = found.pose.within(&self.places.get(number)?.pose);
-            (pose.apart(&place.pose) > SAME_SPOT).then_some(found.score)
-        };
-        others.into_iter().filter_map(score).fold(0.0, f32::max)
+        let found = self.found(place.image, &scan, Some(place));
+        let others = found.into_iter().filter(|found| found.pose.apart(&place.pose) > SAME_SPOT);
+        others.map(|found| found.score).fold(0.0, f32::max)
     }
 
     /// The places whose images are most alike to one, best first: those that are aligned.
@@ -117,24 +122,51 @@ impl<'a> PlaceIndex<'a> {
     /// The place that a scan is of; None if no place is like it.
     #[must_use]
     pub fn find(&self, query: &Query<'_>) -> Option<Answer> {
-        let mut found: Vec<(Alignment, usize)> = self
-            .alike(query.image, |_| true)
-            .into_iter()
-            .filter_map(|(likeness, number)| Some((self.aligned(number, &likeness, &query.scan)?, number)))
-            .collect();
-        found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));
-        let in_map = |(found, number): &(Alignment, usize)| found.pose.within(&self.places[*number].pose);
-        let best = found.first()?;
-        let pose = in_map(best);
-        let is_rival =
-            |other: &&(Alignment, usize)| in_map(other).apart(&pose) > SAME_SPOT && other.0.score > best.0.score - GAP;
+        let found = self.found(query.image, &query.scan, None);
+        let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let is_rival = |other: &Found| other.pose.apart(&best.pose) > SAME_SPOT && other.score > best.score - GAP;
         Some(Answer {
-            place: best.1,
-            pose,
-            score: best.0.score,
-            is_believed: best.0.score > self.limit && best.0.score > self.look_alike(self.places.get(best.1)?),
-            is_ambiguous: found.iter().skip(1).any(|other| is_rival(&other)),
+            place: best.place,
+            pose: best.pose,
+            score: best.score,
+            is_believed: best.score > self.limit && best.score > self.look_alike(self.places.get(best.place)?),
+            is_ambiguous: found.iter().any(is_rival),
         })
+    }
+
+    /// Where a scan may have been made: aligned to the places most alike. If it is that of a place of the map, only those count
+    /// that lie apart from it.
+    fn found(&self, image: &PlaceImage, scan: &Asked<'_>, own: Option<&Place<'_>>) -> Vec<Found> {
+        let is_apart = |other: &Place<'_>| own.is_none_or(|own| other.pose.apart(&own.pose) > APART);
+        let found = |(likeness, number): (Likeness, usize)| {
+            let aligned = self.aligned(number, &likeness, scan)?;
+            let pose = aligned.pose.within(&self.places.get(number)?.pose);
+            let neighbours = self.neighbours(&pose, number, own);
+            let score =
+                |place: &&Place<'_>| Voters::of(place.panorama).agreement(&scan.voters, &pose.seen_from(&place.pose));
+            let all = aligned.score + neighbours.iter().map(score).sum::<f32>();
+            Some(Found { place: number, pose, score: all / (1 + neighbours.len()) as f32 })
+        };
+        self.alike(image, is_apart).into_iter().filter_map(found).collect()
+    }
+
+    /// The places next to a pose, but for the one that is aligned and the asked one. They see the same things from elsewhere: where
+    /// a scan is of another place that looks the same, they agree less.
+    fn neighbours(&self, pose: &Pose, aligned: usize, own: Option<&Place<'_>>) -> Vec<&Place<'a>> {
+        let is_other = |number: usize, place: &Place<'_>| {
+            number != aligned && own.is_none_or(|own| !core::ptr::eq(own.panorama, place.panorama))
+        };
+        let mut next: Vec<(f32, &Place<'a>)> = Vec::with_capacity(NEIGHBOURS + 1);
+        for (number, place) in self.places.iter().enumerate() {
+            let apart = place.pose.apart(pose);
+            let is_nearer = next.len() < NEIGHBOURS || next.last().is_some_and(|(last, _)| apart < *last);
+            if apart <= NEIGHBOURHOOD * self.reach && is_nearer && is_other(number, place) {
+                let at = next.partition_point(|(other, _)| *other <= apart);
+                next.insert(at, (apart, place));
+                next.truncate(NEIGHBOURS);
+            }
+        }
+        next.into_iter().map(|(_, place)| place).collect()
     }
 
     /// The places whose images are most alike, of those that are wanted, best first.
