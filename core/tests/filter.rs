@@ -438,3 +438,14 @@ fn states_are_equal_if_pose_and_covariance_are() {
     assert_ne!(state(0.5, 1e-4), state(0.5, 2e-4));
     assert_ne!(state(0.5, 1e-4), state(0.6, 1e-4));
 }
+
+#[test]
+fn what_is_known_of_nothing_corrects_nothing() {
+    let pose = Pose::new(1.0, 2.0, 0.3);
+    let mut state = Ekf::with_covariance(pose, &(Matrix3::identity() * 1e-4));
+    let before = state;
+    let seen =
+        linearise(&cartesian(Point::new(3.0, 1.0)), &pose, &Pose::default(), &Point::new(4.0, 3.0), f64::INFINITY);
+    assert!(!seen.is_some_and(|linearisation| state.correct(&linearisation)));
+    assert_eq!(state, before);
+}

@@ -307,3 +307,16 @@ fn what_was_seen_through_from_a_wrong_place_is_forgotten() {
     });
     assert!(told.is_some());
 }
+
+/// What was seen is carried for ten metres, and not further.
+#[test]
+fn what_was_seen_ten_metres_ago_counts_and_what_is_further_off_does_not() {
+    for (samples, told) in [(160, Some(2)), (161, None)] {
+        let mut start = Start::new(&reflectors());
+        let all = places(0..12);
+        assert_eq!(start.told_after(&all, 6), None);
+        // A sixteenth of a metre a sample, so that the sum is exact.
+        start.drive(3.125, samples);
+        assert_eq!(start.told_after(&all, 2), told, "{samples} samples");
+    }
+}

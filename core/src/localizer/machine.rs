@@ -363,10 +363,9 @@ impl<C: Capacities> Localizer<C> {
         let Some(timeline) = self.timeline.begun() else {
             return;
         };
-        let workspace = &mut self.workspace;
         let maps = self.parameters.maps;
-        let is_whole =
-            maps.features || maps.dynamic || maps.slam || (self.parameters.sources.contours && self.contours.has_map());
+        let is_whole = maps.features || maps.dynamic || maps.slam || self.uses_contours();
+        let workspace = &mut self.workspace;
         if is_whole {
             workspace.path.set(scan.start, &mount, timeline.relative_path(scan.start, scan.end()));
         }
