@@ -394,3 +394,20 @@ fn any_localiser_tells_its_map_if_it_is_used() {
         assert_eq!(has_map(&&mut *drive.localizer), expected);
     }
 }
+
+/// The map of contours lies 20 cm beside that of the reflectors: what it says is compared, told to be further off than it should be, and not
+/// used.
+#[test]
+fn contours_that_contradict_reflectors_are_told_and_not_used() {
+    let map = kept_map(&room(), &Pose::new(0.15, 0.13, 0.0));
+    let mut drive = Drive::told(parameters(), room(), Some(map), 8);
+    assert_eq!(drive.localizer.add_landmarks(&reflectors()), Ok(()));
+    drive.reflectors = reflectors();
+    for revolution in 0..20 {
+        drive.revolve((0.4, 0.1), 1.0);
+        let status = drive.status();
+        if revolution > 2 {
+            assert_eq!((status.observations, status.gated, status.accepted), (1, 1, 0), "{revolution}: {status:?}");
+        }
+    }
+}
