@@ -86,9 +86,9 @@ impl<C: Capacities> Localizer<C> {
     pub(super) fn fuse_contours_behind(&mut self, mount: &Pose, place: &Pose) {
         let step = self.step_until(self.slam.time());
         let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
-        let status = &mut self.outputs.sources.contours;
+        let told = (self.slam.time(), &mut self.outputs.sources.contours);
         self.corrected_by_contours = true;
-        if self.slam.see_behind(&mut self.contours, &scan, status) {
+        if self.behind.see(&mut self.contours, self.slam.parts().0, &scan, told) {
             self.distance.feature = 0.0;
         }
         self.outputs.has_cut |= self.contours.has_cut();
@@ -98,7 +98,7 @@ impl<C: Capacities> Localizer<C> {
     pub(super) fn keep_contours_behind(&mut self, mount: &Pose, place: &Pose) {
         let step = Pose::default();
         let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
-        self.slam.keep_behind(&mut self.contours, &scan);
+        self.behind.keep(&mut self.contours, self.slam.parts().0, &scan);
     }
 
     fn tell_contours(&mut self, time: Time, laser: LaserId, outcome: &ContourOutcome, is_used: bool) {

@@ -20,8 +20,8 @@ use crate::measurement::{LaserId, Reflectors, Scan, Time};
 use crate::odometry::{GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::sensing::detect_reflectors;
 use crate::sources::{
-    AddLandmarks, Aid, AidOutcome, FindContours, FindFeatures, GyroSource, LandmarkMaps, LendLandmarks, Source,
-    Statuses, Workspace, correct_by_aid, see_reflectors,
+    AddLandmarks, Aid, AidOutcome, ContoursBehind, FindContours, FindFeatures, GyroSource, LandmarkMaps, LendLandmarks,
+    Source, Statuses, Workspace, correct_by_aid, see_reflectors,
 };
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
@@ -48,6 +48,7 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) distance: DistanceSince,
     pub(super) features: C::Features,
     pub(super) contours: C::Contours,
+    pub(super) behind: ContoursBehind,
     pub(super) told_by_contours: Option<ToldByContours>,
     /// Whether contours may have moved the pose in the present event.
     pub(super) corrected_by_contours: bool,
@@ -141,6 +142,7 @@ impl<C: Capacities> Localizer<C> {
             distance: DistanceSince::NEVER,
             features: C::Features::new(parameters.features.detector),
             contours: C::Contours::new(),
+            behind: ContoursBehind::new(),
             told_by_contours: None,
             corrected_by_contours: false,
             workspace: Workspace::default(),

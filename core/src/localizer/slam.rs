@@ -11,10 +11,7 @@ use crate::maps::LandmarkKind;
 use crate::measurement::Time;
 use crate::odometry::OdometryBias;
 use crate::sensing::PointView;
-use crate::sources::{
-    Believed, Comparison, ContoursBehind, FindContours, KeyScans, LandmarkSlots, ScanBehind, Sighting, SlamParameters,
-    SourceStatus,
-};
+use crate::sources::{Believed, Comparison, KeyScans, LandmarkSlots, Sighting, SlamParameters, SourceStatus};
 
 /// The map in the state.
 #[derive(Clone, Debug)]
@@ -22,7 +19,6 @@ pub(super) struct Slam<S: Slots> {
     filter: Ekf<S>,
     slots: LandmarkSlots<S>,
     key_scans: KeyScans<S>,
-    behind: ContoursBehind,
     /// Time at which the filter stands.
     time: Time,
     /// Where the vehicle was when it came to the present place, and how many scans have been used there.
@@ -36,7 +32,6 @@ impl<S: Slots> Slam<S> {
             filter: Ekf::empty(),
             slots: LandmarkSlots::new(),
             key_scans: KeyScans::new(),
-            behind: ContoursBehind::new(),
             time: Time::default(),
             place: (Pose::default(), 0),
         }
@@ -162,21 +157,6 @@ impl<S: Slots> Slam<S> {
     ) {
         let (mount, told) = (*parameters.lasers.first(), (self.time, status));
         self.key_scans.align(&mut self.filter, points, place, &mount, &parameters.slam.key_scans, told);
-    }
-
-    /// Compares a scan of the first laser with the contours of the way behind. Returns whether it has told the whole pose.
-    pub(super) fn see_behind(
-        &mut self,
-        contours: &mut impl FindContours,
-        scan: &ScanBehind,
-        status: &mut SourceStatus,
-    ) -> bool {
-        self.behind.see(contours, &mut self.filter, scan, (self.time, status))
-    }
-
-    /// Makes a scan one of the way behind if it is time for one; to be called when all that it tells has been used.
-    pub(super) fn keep_behind(&mut self, contours: &mut impl FindContours, scan: &ScanBehind) {
-        self.behind.keep(contours, &mut self.filter, scan);
     }
 
     /// Makes a scan a key scan if it is time for one; to be called when all that it tells has been used.
