@@ -14,7 +14,7 @@ use agv_lab::evaluate::carpark::{self, Knowledge, Noise};
 use agv_lab::evaluate::slam::OfficeDrive;
 use agv_lab::evaluate::warehouse::{Map, Method, PATHS, experiment};
 use agv_lab::evaluate::warehouse_disturbance::Disturbance;
-use agv_lab::evaluate::windows::{Candidate, Worsening, drift};
+use agv_lab::evaluate::windows::{Candidate, Worsening, drift, vehicle_drift};
 use agv_tests::recordings;
 
 #[test]
@@ -123,17 +123,21 @@ fn moved_pallets_are_no_reason_to_be_five_centimetres_off() {
 #[test]
 fn scans_alone_bring_robots_further_than_their_odometry_in_offices_that_were_not_tuned_on() {
     let test = "scans_alone_bring_robots_further_than_their_odometry_in_offices_that_were_not_tuned_on";
-    for (log, share) in [("aces", 0.8), ("fhw", 0.5)] {
+    for (log, share, by_contours) in [("aces", 0.8, 0.25), ("fhw", 0.5, 0.2)] {
         let Some(log) = recordings(test, &format!("scans2d/{log}-corrected.log.gz")) else { return };
         let drive = OfficeDrive::of_carmen(&log).unwrap();
         let drift = |name: &str| {
             let candidate = Candidate::ALL.iter().find(|candidate| candidate.name == name).unwrap();
             drift(&drive, 12.0, candidate, &Worsening::ALL[0]).unwrap()
         };
-        let (odometry, slam) = (drift("odometry"), drift("slam"));
-        println!("{odometry:?}\n{slam:?}");
+        let (odometry, slam) = (drift("odometry"), drift("slam with features and key scans"));
+        let vehicle = vehicle_drift(&drive, 12.0, &Worsening::ALL[0]).unwrap();
+        println!("{odometry:?}\n{slam:?}\n{vehicle:?}");
         assert!(slam.windows > 40 && slam.lost_share < 0.05);
         assert!(slam.position_m.median < share * odometry.position_m.median);
+        // With contours of the way behind.
+        assert!(vehicle.windows == slam.windows && vehicle.lost_share == 0.0);
+        assert!(vehicle.position_m.median < by_contours * odometry.position_m.median);
     }
 }
 
