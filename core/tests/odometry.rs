@@ -577,15 +577,7 @@ fn a_step_says_which_way_it_went() {
             "{speed}"
         );
     }
-    let tricycle = Tricycle {
-        wheelbase: 1.2,
-        drive_scale: 1e-4,
-        drive_range: CounterRange::BITS_32,
-        steering_scale: 1e-3,
-        steering_range: CounterRange::BITS_16,
-        steering_offset_forward: 0.0,
-        steering_offset_backward: 0.0,
-    };
+    let tricycle = tricycle();
     let sample =
         |micros: u64, drive: i32| EncoderSample { time: Time::from_micros(micros), drive: drive as u32, steering: 0 };
     for (counts, was_backward, is_backward) in [

@@ -10,7 +10,7 @@ use core::fmt::Write;
 use core::panic::PanicInfo;
 
 use agv_core::geometry::Point;
-use agv_core::localizer::{Event, Localizer, MapUse};
+use agv_core::localizer::{Event, Localize, Localizer, MapUse, SlamCapacities};
 use agv_core::maps::{DynamicMap, FixedMap, Landmark, LandmarkKind, NearestNeighbour};
 use agv_core::measurement::{Reflectors, Scan, Time};
 use agv_core::record::Record;
@@ -60,6 +60,7 @@ struct Counts {
     reflector: Count,
     scan: Count,
     slam: Count,
+    behind: Count,
     falko: Count,
     association: Count,
     map_update: Count,
@@ -72,6 +73,7 @@ impl Counts {
             reflector: Count::new("one reflector update"),
             scan: Count::new("scan cycle"),
             slam: Count::new("scan cycle with landmarks and key scans in the state"),
+            behind: Count::new("scan cycle with contours of the way behind"),
             falko: Count::new("falko on 1440 beams"),
             association: Count::new("association among 1000 reflectors"),
             map_update: Count::new("dynamic map update of 20 keypoints"),
@@ -80,8 +82,9 @@ impl Counts {
 }
 
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
-static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
-static SLAM: StaticCell<Localizer> = StaticCell::new();
+static LOCALIZER: StaticCell<Localizer<SlamCapacities>> = StaticCell::new();
+static SLAM: StaticCell<Localizer<SlamCapacities>> = StaticCell::new();
+static BEHIND: StaticCell<Localizer> = StaticCell::new();
 static POINTS: ConstStaticCell<PointScan<1440>> = ConstStaticCell::new(PointScan::new());
 static DETECTOR: StaticCell<falko::Detector<1440>> = StaticCell::new();
 static MAP: StaticCell<FixedMap<1000>> = StaticCell::new();
@@ -92,8 +95,9 @@ fn main() -> ! {
     let mut input = HostFile::open(c"drive.agvlog").expect("drive.agvlog is in the folder");
     let stopwatch = Stopwatch::new();
     let mut counts = Counts::new();
-    let mut localizer: Option<&mut Localizer> = None;
-    let mut slam: Option<&mut Localizer> = None;
+    let mut localizer: Option<&mut Localizer<SlamCapacities>> = None;
+    let mut slam: Option<&mut Localizer<SlamCapacities>> = None;
+    let mut behind: Option<&mut Localizer> = None;
     let mut detector: Option<&mut falko::Detector<1440>> = None;
     let points = POINTS.take();
     let map = MAP.init_with(FixedMap::new);
@@ -109,6 +113,7 @@ fn main() -> ! {
                 localizer = Some(LOCALIZER.init_with(|| Localizer::new(parameters)));
                 parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
                 slam = Some(SLAM.init_with(|| Localizer::new(parameters)));
+                behind = Some(BEHIND.init_with(|| Localizer::new(parameters)));
                 detector = Some(DETECTOR.init_with(|| falko::Detector::new(header.parameters.features.detector)));
             }
             (Record::Landmarks(landmarks), Some(localizer)) => {
@@ -119,13 +124,9 @@ fn main() -> ! {
                     features(&stopwatch, &mut counts, scan, points, detector, dynamic);
                 }
                 handle(&stopwatch, &mut counts, localizer, event);
-                if let Some(slam) = &mut slam {
-                    let count = stopwatch.count(|| {
-                        slam.handle(&event);
-                    });
-                    if matches!(event, Event::Scan(_)) {
-                        counts.slam.add(count);
-                    }
+                if let (Some(slam), Some(behind)) = (&mut slam, &mut behind) {
+                    count_scan(&stopwatch, &mut counts.slam, *slam, event);
+                    count_scan(&stopwatch, &mut counts.behind, *behind, event);
                 }
             }
             _ => {}
@@ -144,12 +145,24 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, map: &mut FixedMap<1000>) 
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
-    let Counts { prediction, reflector, scan, slam, falko, association, map_update } = counts;
+    let Counts { prediction, reflector, scan, slam, behind, falko, association, map_update } = counts;
     let [few, many] = search::count(stopwatch, map);
     let [six, twenty] = separation::count(stopwatch);
-    for count in
-        [prediction, reflector, association, falko, map_update, scan, slam, decode(stopwatch), few, many, six, twenty]
-    {
+    for count in [
+        prediction,
+        reflector,
+        association,
+        falko,
+        map_update,
+        scan,
+        slam,
+        behind,
+        decode(stopwatch),
+        few,
+        many,
+        six,
+        twenty,
+    ] {
         let mean = count.total / count.runs.max(1);
         writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");
     }
@@ -157,8 +170,18 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, map: &mut FixedMap<1000>) 
     output.write(text.as_bytes()).expect("the folder can be written");
 }
 
+/// Lets a localiser take an event, and counts it if it is a scan.
+fn count_scan(stopwatch: &Stopwatch, scans: &mut Count, localizer: &mut impl Localize, event: &Event) {
+    let count = stopwatch.count(|| {
+        localizer.handle(event);
+    });
+    if matches!(event, Event::Scan(_)) {
+        scans.add(count);
+    }
+}
+
 /// Counts one event; reflectors one by one, as each is an update of its own.
-fn handle(stopwatch: &Stopwatch, counts: &mut Counts, localizer: &mut Localizer, event: &Event) {
+fn handle(stopwatch: &Stopwatch, counts: &mut Counts, localizer: &mut Localizer<SlamCapacities>, event: &Event) {
     let mut count = |event: &Event| {
         stopwatch.count(|| {
             localizer.handle(event);
