@@ -170,8 +170,7 @@ fn correct<S: Slots>(filter: &mut Ekf<S>, compared: &Compared) -> bool {
     filter.correct(&compared.observation)
 }
 
-/// Turns a covariance of x, y and heading into a frame that is turned by `angle`, rad.
+/// Turns x, y and heading into a frame that is turned by `angle`, rad.
 fn turn_back(angle: f64) -> Matrix3<f64> {
-    let (sine, cosine) = libm::sincos(angle);
-    Matrix3::new(cosine, sine, 0.0, -sine, cosine, 0.0, 0.0, 0.0, 1.0)
+    Pose { x: 0.0, y: 0.0, theta: -angle }.compose_jacobian_second()
 }
