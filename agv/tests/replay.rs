@@ -493,7 +493,7 @@ fn bad_logs_are_refused_in_one_line() {
 }
 
 #[test]
-fn the_default_run_compares_four_ways_and_leaves_a_log() {
+fn the_default_run_compares_six_ways_and_leaves_a_log() {
     let files = Files::new();
     let folder = files.path("report");
     let run = agv(&["--report", &folder, "--json"]);

@@ -74,7 +74,7 @@ fn a_static_map_holds_five_millimetres() {
 }
 
 #[test]
-fn features_found_on_the_way_bring_the_vehicle_twelve_metres_within_the_requirement() {
+fn contours_of_the_way_behind_bring_the_vehicle_twelve_metres_within_the_requirement() {
     let (position, heading, ok) = worst("slam", 6);
     assert!(position <= 20.0 && heading <= 0.1 && ok >= 0.8, "{position} mm, {heading} deg, {ok}");
 }

@@ -13,7 +13,7 @@ use super::progress;
 /// Names of the options below.
 pub const OPTIONS: [&str; 2] = ["report", "json"];
 
-/// One drive, localised in five ways.
+/// One drive, localised in six ways.
 #[derive(clap::Args)]
 pub struct Demonstration {
     /// Folder for the report and the log of the drive.
@@ -54,7 +54,10 @@ impl Demonstration {
             return Ok(());
         }
         let mut lines = vec![
-            format!("A simulated drive, 12 m into a block storage, localised in {} ways:", demonstration::WAYS),
+            format!(
+                "A simulated drive, 12 m into a block storage, localised in {} ways:",
+                demonstration::NUMBER_OF_WAYS
+            ),
             String::new(),
         ];
         lines.extend(table(&drives));

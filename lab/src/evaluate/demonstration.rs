@@ -18,19 +18,30 @@ use agv_host_sim::simulate::scenario::{Scenario, ScenarioError};
 use agv_host_sim::simulate::standard::{BLOCK_STORAGE, MAPPING};
 use agv_host_sim::simulate::{SimulateError, simulate};
 
-/// What the localiser may use in each replay of the drive; the last one uses everything.
-const METHODS: [(&str, MapUse); 5] = [
-    ("odometry alone", MapUse { reflectors: false, features: false, dynamic: false, slam: false }),
-    ("reflectors", MapUse { reflectors: true, features: false, dynamic: false, slam: false }),
-    ("static features", MapUse { reflectors: false, features: true, dynamic: false, slam: false }),
-    ("features found on the way", MapUse { reflectors: false, features: false, dynamic: false, slam: true }),
-    ("mixed", MapUse { reflectors: true, features: true, dynamic: false, slam: false }),
+/// What the localiser may use in a replay of the drive.
+struct Way {
+    name: &'static str,
+    maps: MapUse,
+    /// Whether contours correct the pose. The boards' usual images have no room for those of the way behind.
+    contours: bool,
+}
+
+const NO_MAP: MapUse = MapUse { reflectors: false, features: false, dynamic: false, slam: false };
+
+/// Each way to localise the drive; the last one uses everything.
+const WAYS: [Way; 6] = [
+    Way { name: "odometry alone", maps: NO_MAP, contours: true },
+    Way { name: "reflectors", maps: MapUse { reflectors: true, ..NO_MAP }, contours: true },
+    Way { name: "static features", maps: MapUse { features: true, ..NO_MAP }, contours: true },
+    Way { name: "features found on the way", maps: MapUse { slam: true, ..NO_MAP }, contours: false },
+    Way { name: "contours of the way behind", maps: MapUse { slam: true, ..NO_MAP }, contours: true },
+    Way { name: "mixed", maps: MapUse { reflectors: true, features: true, ..NO_MAP }, contours: true },
 ];
 
 /// How many ways there are to localise the drive, in a word.
-pub const WAYS: &str = "five";
+pub const NUMBER_OF_WAYS: &str = "six";
 
-const _: () = assert!(METHODS.len() == 5);
+const _: () = assert!(WAYS.len() == 6);
 
 /// The drive, localised in one way.
 #[derive(Clone, Debug)]
@@ -76,15 +87,16 @@ pub fn run(mut begin: impl FnMut(&'static str)) -> Result<Vec<LocalisedDrive>, D
     mapping.landmarks.splice(..recording.landmarks.len(), recording.landmarks.iter().copied());
     recording.landmarks.extend(map_features(&mapping, &Clustering::default())?);
     begin("replaying");
-    let localise = |(name, maps): (&'static str, MapUse)| {
+    let localise = |way: Way| {
         let mut recording = recording.clone();
-        recording.parameters.maps = maps;
+        recording.parameters.maps = way.maps;
+        recording.parameters.sources.contours = way.contours;
         let replay = replay(&recording, |_| {})?;
         let track = Track::new(&recording, &replay);
         let figures = Figures::new(&recording, &replay, &track);
-        Ok(LocalisedDrive { name, recording, replay, track, figures })
+        Ok(LocalisedDrive { name: way.name, recording, replay, track, figures })
     };
-    METHODS.into_iter().map(localise).collect()
+    WAYS.into_iter().map(localise).collect()
 }
 
 /// Figures of each drive: a heading and rows.
@@ -133,7 +145,7 @@ pub fn page(drives: &[LocalisedDrive]) -> Result<Page, FigureError> {
          are slightly miscalibrated, the laser has noise. Natural features were mapped by another \
          drive, for which some reflectors stood in the lane.",
     );
-    page.section(&format!("Localised in {WAYS} ways")).table(&table(drives));
+    page.section(&format!("Localised in {NUMBER_OF_WAYS} ways")).table(&table(drives));
     page.paragraph(
         "Distance from the true position and difference from the true heading over the whole way, and at its end. NEES is \
          the mean normalised error squared: 3 is expected, less is cautious. Ok is the share of the poses within 2 cm and 0.1 deg.",
