@@ -78,5 +78,5 @@ fn hour(time: Duration) -> f64 {
     time.as_secs_f64() * 3600.0 / f64::from(SECONDS)
 }
 
-criterion_group!(benches, demonstration_drive, controller);
+criterion_group! { name = benches; config = agv_benches::briefly(); targets = demonstration_drive, controller }
 criterion_main!(benches);

@@ -63,5 +63,5 @@ fn storage(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, fr079, storage);
+criterion_group! { name = benches; config = agv_benches::briefly(); targets = fr079, storage }
 criterion_main!(benches);

@@ -157,5 +157,5 @@ fn places(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, decode, signatures, places);
+criterion_group! { name = benches; config = agv_benches::briefly(); targets = decode, signatures, places }
 criterion_main!(benches);

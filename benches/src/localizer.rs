@@ -106,5 +106,5 @@ fn scan_cycle(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, steps, scan_cycle);
+criterion_group! { name = benches; config = agv_benches::briefly(); targets = steps, scan_cycle }
 criterion_main!(benches);

@@ -95,5 +95,5 @@ fn decode(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, decode);
+criterion_group! { name = benches; config = agv_benches::briefly(); targets = decode }
 criterion_main!(benches);
