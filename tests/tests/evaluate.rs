@@ -80,6 +80,12 @@ fn contours_of_the_way_behind_bring_the_vehicle_twelve_metres_within_the_require
 }
 
 #[test]
+fn features_found_on_the_way_do_so_where_there_is_no_room_for_contours() {
+    let (position, heading, ok) = worst("slam with features and key scans", 6);
+    assert!(position <= 20.0 && heading <= 0.1 && ok >= 0.8, "{position} mm, {heading} deg, {ok}");
+}
+
+#[test]
 fn it_goes_into_the_storage_and_out_again_without_a_jump() {
     let scenario = |name: &str| Scenario::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name).as_path()).unwrap();
     // 4 m of aisle with reflectors, 8 m of lane without any, and back.
