@@ -113,14 +113,13 @@ pub(super) fn farthest(
     disc: &Disc,
 ) -> Option<[(usize, ScanPoint); 2]> {
     let (before, after) = (usize::from(before), usize::from(after));
-    // Absent returns are at the place of the sensor, which is inside only if motion was corrected.
-    if disc.centre.norm_squared() > disc.radius * disc.radius
+    if !disc.holds_sensor()
         && let Some(start) = index.checked_sub(before)
         && let Some(points) = scan.points.get(start..index + 1 + after)
     {
         // The centre itself is inside: the ways from both ends to it end there at the latest.
-        let first = points.iter().position(|point| disc.holds(point).is_some())?;
-        let last = points.iter().rposition(|point| disc.holds(point).is_some())?;
+        let first = disc.first(points)?;
+        let last = disc.last(points)?;
         let sides = (first < before && last > before).then_some((before - first, last - before))?;
         Some([(sides.0, points.get(first)? - disc.centre), (sides.1, points.get(last)? - disc.centre)])
     } else {
@@ -142,6 +141,9 @@ fn farthest_of_any(
     Some([before, after])
 }
 
+/// Points that are compared with a disc at once.
+const BLOCK: usize = 4;
+
 /// The disc around a candidate that its neighbours lie in.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
@@ -158,6 +160,53 @@ impl Disc {
     fn holds(&self, point: &ScanPoint) -> Option<ScanPoint> {
         let relative = point - self.centre;
         (relative.norm_squared() <= self.radius * self.radius).then_some(relative)
+    }
+
+    /// Whether the sensor is inside, where absent returns are. It is only if motion was corrected.
+    #[inline(always)]
+    fn holds_sensor(&self) -> bool {
+        self.centre.norm_squared() <= self.radius * self.radius
+    }
+
+    /// Which of some points are inside, a bit each.
+    #[inline(always)]
+    fn holds_any(&self, points: &[ScanPoint; BLOCK]) -> u32 {
+        let squared = points.map(|point| (point - self.centre).norm_squared());
+        let mut bits = 0;
+        for (index, squared) in squared.iter().enumerate() {
+            bits |= u32::from(*squared <= self.radius * self.radius) << index;
+        }
+        bits
+    }
+
+    /// Index of the first point inside.
+    #[inline(always)]
+    fn first(&self, points: &[ScanPoint]) -> Option<usize> {
+        let (blocks, rest) = points.as_chunks::<BLOCK>();
+        let mut passed = 0;
+        for block in blocks {
+            let inside = self.holds_any(block);
+            if inside != 0 {
+                return Some(passed + inside.trailing_zeros() as usize);
+            }
+            passed += BLOCK;
+        }
+        rest.iter().position(|point| self.holds(point).is_some()).map(|index| passed + index)
+    }
+
+    /// Index of the last point inside.
+    #[inline(always)]
+    fn last(&self, points: &[ScanPoint]) -> Option<usize> {
+        let (rest, blocks) = points.as_rchunks::<BLOCK>();
+        let mut left = points.len();
+        for block in blocks.iter().rev() {
+            left -= BLOCK;
+            let inside = self.holds_any(block);
+            if inside != 0 {
+                return Some(left + (u32::BITS - 1 - inside.leading_zeros()) as usize);
+            }
+        }
+        rest.iter().rposition(|point| self.holds(point).is_some())
     }
 }
 

@@ -59,8 +59,10 @@ impl Candidates<'_> {
         let (least, farthest) = (self.least(), self.parameters.farthest);
         let mut worst = 0.0_f32;
         let mut windows = Vec::<Window, AHEAD>::new();
-        let surfaces = self.runs.before.iter().zip(self.runs.after);
-        for (index, (&range, (&before, &after))) in self.scan.ranges.iter().zip(surfaces).enumerate() {
+        let count = self.scan.ranges.len().min(self.runs.before.len()).min(self.runs.after.len());
+        for index in 0..count {
+            let Some(&range) = self.scan.ranges.get(index) else { break };
+            let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else { break };
             if range > 0.0 && range <= farthest && before.min(after) >= least {
                 // There is room whenever it comes here.
                 let _ = windows.push(Window { index, range, before, after, radius: 0.0, shortest: 0.0 });

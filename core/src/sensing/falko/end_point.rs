@@ -43,15 +43,19 @@ impl Faces<'_> {
     /// Finds the ends of the faces and gives each to `keep`.
     pub(super) fn find_ends(&self, mut keep: impl FnMut(Keypoint)) {
         let least = self.wanted.points.saturating_sub(1);
-        // Most beams are inside a face.
-        let at_ends = self.runs.before.iter().zip(self.runs.after).enumerate();
-        for (index, (&before, &after)) in at_ends.filter(|(_, (before, after))| **before == 0 || **after == 0) {
+        let count = self.runs.before.len();
+        let mut index = 0;
+        // Each turn moves on by at least one beam.
+        for _ in 0..count {
+            let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else { break };
             if after == 0 && before >= least {
                 self.end(index, Ends::After, usize::from(before)).into_iter().for_each(&mut keep);
             }
             if before == 0 && after >= least {
                 self.end(index, Ends::Before, usize::from(after)).into_iter().for_each(&mut keep);
             }
+            // All beams up to the last of a surface are inside it.
+            index += usize::from(after.max(1));
         }
     }
 
