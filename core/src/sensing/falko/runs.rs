@@ -90,22 +90,17 @@ fn set(
     (first, last): (usize, usize),
     (lead, trail): (usize, usize),
 ) {
-    let most = ranges.len().saturating_sub(1);
+    let most = ranges.len().saturating_sub(1) as u32;
     let beams = first..last + 1;
     let (Some(before), Some(after)) = (before.get_mut(beams.clone()), after.get_mut(beams.clone())) else { return };
     let ranges = ranges.get(beams).unwrap_or_default();
-    count_up(before.iter_mut().zip(ranges), lead, most);
-    count_up(after.iter_mut().zip(ranges).rev(), trail, most);
-}
-
-/// Numbers the returns, absent ones between them included, from a number on and up to `most`.
-#[inline]
-fn count_up<'a>(beams: impl Iterator<Item = (&'a mut u16, &'a f32)>, from: usize, most: usize) {
-    // No scan has more beams than that.
-    let (mut number, most) = (from as u32, most as u32);
-    for (slot, range) in beams {
-        *slot = if *range > 0.0 { number.min(most) as u16 } else { 0 };
-        number = number.wrapping_add(1);
+    // No scan has more beams than these numbers count.
+    let (mut passed, mut left) = (lead as u32, (trail + last - first) as u32);
+    for ((before, after), range) in before.iter_mut().zip(after).zip(ranges) {
+        let is_return = *range > 0.0;
+        *before = if is_return { passed.min(most) as u16 } else { 0 };
+        *after = if is_return { left.min(most) as u16 } else { 0 };
+        (passed, left) = (passed.wrapping_add(1), left.wrapping_sub(1));
     }
 }
 
