@@ -141,8 +141,8 @@ fn farthest_of_any(
     Some([before, after])
 }
 
-/// Points that are compared with a disc at once.
-const BLOCK: usize = 4;
+/// Points that are compared with a disc at once. Where a processor does one at a time, more are wasted effort.
+const BLOCK: usize = if cfg!(target_os = "none") { 1 } else { 4 };
 
 /// The disc around a candidate that its neighbours lie in.
 #[derive(Clone, Copy, Debug)]

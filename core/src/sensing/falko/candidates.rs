@@ -62,7 +62,9 @@ impl Candidates<'_> {
         let count = self.scan.ranges.len().min(self.runs.before.len()).min(self.runs.after.len());
         for index in 0..count {
             let Some(&range) = self.scan.ranges.get(index) else { break };
-            let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else { break };
+            let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else {
+                break;
+            };
             if range > 0.0 && range <= farthest && before.min(after) >= least {
                 // There is room whenever it comes here.
                 let _ = windows.push(Window { index, range, before, after, radius: 0.0, shortest: 0.0 });

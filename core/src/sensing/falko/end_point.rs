@@ -47,7 +47,9 @@ impl Faces<'_> {
         let mut index = 0;
         // Each turn moves on by at least one beam.
         for _ in 0..count {
-            let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else { break };
+            let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else {
+                break;
+            };
             if after == 0 && before >= least {
                 self.end(index, Ends::After, usize::from(before)).into_iter().for_each(&mut keep);
             }
