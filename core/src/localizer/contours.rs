@@ -10,11 +10,15 @@ use crate::sources::{ContourOutcome, FindContours, FindFeatures, ScanBehind, see
 /// While reflectors have the position as well as this, m, contours do not correct it.
 const BY_REFLECTORS: f64 = 0.02;
 
-/// A pose that contours have told in the present event, and when it was true.
+/// What contours have done to the pose in the present event.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ToldByContours {
-    pub time: Time,
-    pub seen: PoseObservation,
+pub(super) enum ContourCorrection {
+    /// Nothing.
+    None,
+    /// They may have moved it.
+    Applied,
+    /// They may have moved it, and the solutions behind the protection level are told what was seen, and when.
+    Told { time: Time, seen: PoseObservation },
 }
 
 impl<C: Capacities> Localizer<C> {
@@ -87,7 +91,7 @@ impl<C: Capacities> Localizer<C> {
         let step = self.step_until(self.slam.time());
         let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
         let told = (self.slam.time(), &mut self.outputs.sources.contours);
-        self.corrected_by_contours = true;
+        self.contour_correction = ContourCorrection::Applied;
         if self.behind.see(&mut self.contours, self.slam.parts().0, &scan, told) {
             self.distance.feature = 0.0;
         }
@@ -109,8 +113,11 @@ impl<C: Capacities> Localizer<C> {
         status.add(time, verdict, is_used, outcome.test_ratio);
         if let Some(seen) = outcome.seen.filter(|_| is_used) {
             self.distance.feature = 0.0;
-            self.corrected_by_contours = true;
-            self.told_by_contours = Some(ToldByContours { time, seen }).filter(|_| laser == LaserId::FIRST);
+            self.contour_correction = if laser == LaserId::FIRST {
+                ContourCorrection::Told { time, seen }
+            } else {
+                ContourCorrection::Applied
+            };
         }
     }
 }

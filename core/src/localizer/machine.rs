@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::contours::ToldByContours;
+use super::contours::ContourCorrection;
 use super::evidence::DistanceSince;
 use super::slam::Slam;
 use super::supervisor::{Support, remark_on_motion, supervise};
@@ -49,9 +49,7 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) features: C::Features,
     pub(super) contours: C::Contours,
     pub(super) behind: ContoursBehind,
-    pub(super) told_by_contours: Option<ToldByContours>,
-    /// Whether contours may have moved the pose in the present event.
-    pub(super) corrected_by_contours: bool,
+    pub(super) contour_correction: ContourCorrection,
     pub(super) workspace: Workspace,
     pub(super) outputs: Outputs,
 }
@@ -143,8 +141,7 @@ impl<C: Capacities> Localizer<C> {
             features: C::Features::new(parameters.features.detector),
             contours: C::Contours::new(),
             behind: ContoursBehind::new(),
-            told_by_contours: None,
-            corrected_by_contours: false,
+            contour_correction: ContourCorrection::None,
             workspace: Workspace::default(),
             outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
@@ -208,7 +205,7 @@ impl<C: Capacities> Localizer<C> {
         let sees = matches!(event, Event::Reflectors(_) | Event::Scan(_));
         let before = if sees { self.estimate() } else { None };
         let known = if sees && self.gyro.is_some() { self.known_pose() } else { None };
-        let revolution_of = event.laser().filter(|_| self.tells_reflectors(event));
+        let revolution_of = if sees && self.tells_reflectors(event) { event.laser() } else { None };
         // Samples of the odometry come ten times as often as all else: what they do not need is never inlined here.
         match event {
             Event::Encoders(sample) => {
@@ -287,8 +284,7 @@ impl<C: Capacities> Localizer<C> {
         self.outputs.uses.clear();
         self.outputs.has_cut = false;
         self.outputs.misuse = None;
-        self.told_by_contours = None;
-        self.corrected_by_contours = false;
+        self.contour_correction = ContourCorrection::None;
     }
 
     /// The pose for now, and that by odometry alone.
@@ -315,7 +311,7 @@ impl<C: Capacities> Localizer<C> {
             }
         }
         // What contours have moved is no correction by landmarks.
-        if !self.corrected_by_contours {
+        if matches!(self.contour_correction, ContourCorrection::None) {
             let is_right = self.lost.is_none() && self.outage.is_none();
             self.integrity.correct(before, &after, uses, is_right);
             if is_right && !self.parameters.maps.slam {

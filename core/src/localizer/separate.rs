@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix2;
 
-use super::contours::ToldByContours;
+use super::contours::ContourCorrection;
 use super::{Capacities, Localizer};
 use crate::filter::RangeBearing;
 use crate::geometry::{Point, Pose};
@@ -43,8 +43,11 @@ impl<C: Capacities> Localizer<C> {
 
     /// Tells where contours have the laser, moved to now by the odometry.
     fn tell_contours_pose(&mut self, mount: &Pose, from: &Laser) {
-        let Some(ToldByContours { time, seen }) = self.told_by_contours.filter(|_| self.lost.is_none()) else { return };
-        let motions = self.timeline.motions(time, self.timeline.now());
+        let ContourCorrection::Told { time, seen } = &self.contour_correction else { return };
+        if self.lost.is_some() {
+            return;
+        }
+        let motions = self.timeline.motions(*time, self.timeline.now());
         let since = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement)).compose(mount);
         let jacobian = seen.pose.compose_jacobian_first(&since);
         let covariance = jacobian * seen.covariance_matrix() * jacobian.transpose();

@@ -36,11 +36,13 @@ impl<C: Capacities> Localizer<C> {
     }
 
     pub(super) fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
-        self.outputs.misuse = match &motion {
-            Err(OdometryError::WrongVehicle) => Some(Misuse::WrongVehicle),
-            Err(OdometryError::OutOfOrder) => Some(Misuse::OutOfOrder),
-            _ => None,
-        };
+        if let Err(error) = &motion {
+            self.outputs.misuse = match error {
+                OdometryError::WrongVehicle => Some(Misuse::WrongVehicle),
+                OdometryError::OutOfOrder => Some(Misuse::OutOfOrder),
+                _ => None,
+            };
+        }
         let Some(start) = self.timeline.begun().map(Timeline::start) else {
             return;
         };
