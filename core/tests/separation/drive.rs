@@ -1,0 +1,143 @@
+//! A drive whose truth is known, and what the level says in it.
+
+use agv_core::geometry::{Point, Pose};
+use agv_core::integrity::separation::{AssumedDeviations, LandmarkKey, Seen, SolutionSeparation};
+use agv_core::measurement::Time;
+use agv_core::odometry::Motion;
+use nalgebra::{Matrix2, Matrix3, Vector3};
+
+use super::sensor_information::normal_equations;
+use crate::falko::scene::Random;
+
+/// A vehicle among reflectors, whose monitor is told what is seen from a laser that may be elsewhere.
+pub struct Drive {
+    pub monitor: SolutionSeparation,
+    pub reflectors: Vec<Point>,
+    pub truth: Pose,
+    pub odometry: Pose,
+    pub time: Time,
+    pub random: Random,
+    pub mount: Pose,
+    pub true_mount: Pose,
+    /// The pose that is published, here that of the laser as it is believed to be mounted.
+    pub published: Pose,
+    /// By which share the map is sheared.
+    pub shear: f64,
+}
+
+impl Drive {
+    pub fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let reflectors =
+            (0..14).map(|_| Point::new(random.uniform(-12.0, 12.0), random.uniform(-12.0, 12.0))).collect();
+        let truth = Pose::new(-4.0, 0.0, 0.0);
+        let mount = Pose::new(0.8, 0.0, 0.0);
+        let mut monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
+        monitor.begin(Time::from_seconds(1.0), &truth, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &truth);
+        let time = Time::from_seconds(1.0);
+        Self {
+            monitor,
+            reflectors,
+            truth,
+            odometry: truth,
+            time,
+            random,
+            mount,
+            true_mount: mount,
+            published: truth,
+            shear: 0.0,
+        }
+    }
+
+    /// The pose of least squares in the map, with the weights of the monitor, near the published one.
+    pub fn fit(&self, seen: &[Seen]) -> Pose {
+        let mut sensor = self.published.compose(&self.mount);
+        for _ in 0..3 {
+            let (matrix, vector) = normal_equations(seen, &sensor);
+            let beside = matrix.try_inverse().unwrap() * vector;
+            sensor = Pose::new(sensor.x + beside[0], sensor.y + beside[1], sensor.theta + beside[2]);
+        }
+        sensor.compose(&self.mount.inverse())
+    }
+
+    /// One revolution later.
+    pub fn revolve(&mut self, step: &Pose) {
+        self.go(step);
+        self.look();
+    }
+
+    /// One revolution later, of which nothing was used.
+    pub fn go(&mut self, step: &Pose) {
+        let end = self.time.offset(0.125);
+        let slip = 1e-3 * self.random.normal();
+        let told = Pose::new(step.x + slip, step.y, step.theta + 1e-4 * self.random.normal());
+        let motion = Motion {
+            start: self.time,
+            end,
+            displacement: told,
+            covariance: Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-8, 4e-8)),
+            distance: told.x.abs(),
+        };
+        self.time = end;
+        self.truth = self.truth.compose(step);
+        self.odometry = self.odometry.compose(&told);
+        self.monitor.travel(&motion, &self.odometry);
+        self.monitor.step(end, &self.odometry);
+    }
+
+    pub fn look(&mut self) {
+        let sensor = self.truth.compose(&self.true_mount);
+        self.published = sensor.compose(&self.mount.inverse());
+        let mut all = Vec::new();
+        for standing in self.reflectors.iter().take(6) {
+            let seen = sensor.inverse_transform(standing);
+            let mut noise = || 0.008 * self.random.normal();
+            let position = Point::new(seen.x + noise(), seen.y + noise());
+            let covariance = Matrix2::identity() * 1e-4;
+            let landmark = Point::new(standing.x + self.shear * standing.y, standing.y);
+            all.push(Seen { position, covariance, landmark, landmark_variance: 4e-6 });
+        }
+        if self.shear != 0.0 {
+            self.published = self.fit(&all);
+        }
+        let laser = self.monitor.laser(&self.mount, &self.published);
+        self.monitor.begin_event();
+        for (id, seen) in (0..).zip(&all) {
+            self.monitor.see(LandmarkKey::Reflector(id), seen, &laser);
+        }
+        self.monitor.end_event(&self.published, &laser, 1.0);
+    }
+
+    /// The same vehicle, whose laser was moved while it was off: it has found itself by that laser.
+    pub fn with_mounting_off(seed: u64, off: &Pose) -> Self {
+        let mut drive = Self::new(seed);
+        drive.true_mount = drive.mount.compose(off);
+        let found = drive.truth.compose(&drive.true_mount).compose(&drive.mount.inverse());
+        let (now, covariance) = (drive.time, [1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5]);
+        drive.monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
+        drive.monitor.begin(now, &found, &covariance, &drive.odometry);
+        drive
+    }
+
+    /// Finds itself by the laser where it stands now, after landmarks have contradicted the pose.
+    pub fn begin_doubting(&mut self) {
+        self.published = self.truth.compose(&self.true_mount).compose(&self.mount.inverse());
+        self.monitor.begin(self.time, &self.published, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &self.odometry);
+        self.monitor.doubt_mounting();
+    }
+
+    pub fn error(&self) -> (f64, f64) {
+        let off = self.truth.between(&self.published);
+        (off.x.hypot(off.y), off.theta.abs())
+    }
+
+    pub fn is_held(&self) -> bool {
+        let ((position, heading), level) = (self.error(), self.monitor.level());
+        position <= level.position && heading <= level.heading
+    }
+
+    #[track_caller]
+    pub fn assert_held(&self, case: std::fmt::Arguments) {
+        assert!(self.is_held(), "{case}: {:?}, {:?} at {:?}", self.error(), self.monitor.level(), self.time);
+    }
+}

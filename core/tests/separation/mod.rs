@@ -1,0 +1,8 @@
+//! The solutions that bound the error of a pose, against dense algebra with numerical derivatives, and the level in drives whose
+//! truth is known.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
+
+mod drive;
+mod level;
+mod sensor_information;
+mod solution;
