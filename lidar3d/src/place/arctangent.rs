@@ -14,7 +14,11 @@ const COEFFICIENTS: [f32; 8] = [
     0.002_866_225_7,
 ];
 
+/// The bit that says that a number is negative.
+const SIGN: u32 = 1 << 31;
+
 /// The angle of a direction against the x axis, rad, -pi to pi, right to 5e-7; 0 of none.
+#[inline(always)]
 pub(super) fn arctangent(y: f32, x: f32) -> f32 {
     let (across, along) = (libm::fabsf(y), libm::fabsf(x));
     let (less, more) = if across < along { (across, along) } else { (along, across) };
@@ -24,14 +28,26 @@ pub(super) fn arctangent(y: f32, x: f32) -> f32 {
     let angle = ratio + ratio * series;
     let angle = if across < along { angle } else { FRAC_PI_2 - angle };
     let angle = if x < 0.0 { PI - angle } else { angle };
-    if more == 0.0 { 0.0 } else { libm::copysignf(angle, y) }
+    // It is not negative yet: it takes the sign. A library's function for that would be called for each point.
+    if more == 0.0 { 0.0 } else { f32::from_bits(angle.to_bits() | y.to_bits() & SIGN) }
+}
+
+/// Which part of a turn a direction is counter-clockwise from straight ahead, 0 to 1.
+#[inline(always)]
+pub(super) fn turn(y: f32, x: f32) -> f32 {
+    let turn = arctangent(y, x) / TAU;
+    if turn < 0.0 { turn + 1.0 } else { turn }
+}
+
+/// In which of so many sectors a part of a turn lies.
+#[inline(always)]
+pub(super) fn sector_of(turn: f32, sectors: usize) -> usize {
+    ((turn * sectors as f32) as usize).min(sectors.saturating_sub(1))
 }
 
 /// In which of so many sectors a direction lies, counter-clockwise from straight ahead.
 pub(super) fn sector(y: f32, x: f32, sectors: usize) -> usize {
-    let share = arctangent(y, x) / TAU;
-    let share = if share < 0.0 { share + 1.0 } else { share };
-    ((share * sectors as f32) as usize).min(sectors.saturating_sub(1))
+    sector_of(turn(y, x), sectors)
 }
 
 #[cfg(test)]

@@ -61,6 +61,7 @@ impl Floor {
 
     /// A point as it is above this floor: turned so that the floor is level, with its height above it, m.
     #[must_use]
+    #[inline]
     pub fn levelled(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let [a, b] = self.slope;
         // The normal of the floor is (-a, -b, 1); a small turn about a level axis brings it upright.

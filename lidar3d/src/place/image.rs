@@ -4,7 +4,8 @@
 //! a beam comes back is not known, and no distance counts it.
 
 use super::Floor;
-use super::arctangent::sector;
+use super::arctangent::sector_of;
+use super::levelled::Block;
 use crate::cloud::Cloud;
 
 /// Sectors of an image.
@@ -47,15 +48,16 @@ impl PlaceImage {
     pub fn new(cloud: &Cloud<'_>, floor: &Floor) -> Self {
         let mut bins = [[0_u8; RINGS]; SECTORS];
         let mut returned = [0_u32; SECTORS];
-        for point in cloud.seen() {
-            let [x, y, height] = floor.levelled(point);
-            let sector = sector(y, x, SECTORS);
-            let Some(count) = returned.get_mut(sector) else { continue };
-            *count += 1;
-            let ring = (libm::sqrtf(x * x + y * y) / RING) as usize;
-            let value = (SCALE * libm::sqrtf(height.max(0.0))).min(255.0) as u8;
-            if let Some(bin) = bins.get_mut(sector).and_then(|rings| rings.get_mut(ring)) {
-                *bin = (*bin).max(value);
+        for block in Block::all(cloud, floor) {
+            let rings = block.levels().map(|level| level / RING);
+            let values = block.up.map(|up| (SCALE * libm::sqrtf(up.max(0.0))).min(255.0));
+            for ((turn, ring), value) in block.turns().iter().zip(rings).zip(values).take(block.count) {
+                let sector = sector_of(*turn, SECTORS);
+                let Some(count) = returned.get_mut(sector) else { continue };
+                *count += 1;
+                if let Some(bin) = bins.get_mut(sector).and_then(|rings| rings.get_mut(ring as usize)) {
+                    *bin = (*bin).max(value as u8);
+                }
             }
         }
         let beams = (cloud.rings() * cloud.columns()) as f32 / SECTORS as f32;

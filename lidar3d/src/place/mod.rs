@@ -13,6 +13,7 @@ mod floor_plan;
 mod histogram;
 mod image;
 mod key_signatures;
+mod levelled;
 #[cfg(feature = "std")]
 mod look_alikes;
 mod loop_closure;

@@ -1,7 +1,8 @@
 //! What a place looks like from where the sensor stood: the least range in each direction.
 
 use super::Floor;
-use super::arctangent::{arctangent, sector};
+use super::arctangent::{arctangent, sector, sector_of};
+use super::levelled::{Block, both};
 use crate::cloud::Cloud;
 
 /// Directions of a panorama.
@@ -68,15 +69,19 @@ impl Panorama {
     pub fn new(cloud: &Cloud<'_>, floor: &Floor, span: Span) -> Self {
         let columns = Self::columns_of(cloud.rings());
         let mut panorama = Self { counts: [0; DIRECTIONS], columns, span, height: floor.height };
-        for point in cloud.seen() {
-            let point = floor.levelled(point);
-            let (column, level) = panorama.column(point);
-            let Some((row, range)) = panorama.row(point, level) else { continue };
-            let count = (range / COUNT + 0.5).min(MOST) as u16;
-            if let Some(place) = panorama.counts.get_mut(row * columns + column)
-                && (*place == 0 || count < *place)
-            {
-                *place = count;
+        for block in Block::all(cloud, floor) {
+            let levels = block.levels();
+            let above = block.up.map(|up| up - floor.height);
+            let shares = both(&above, &levels, |z, level| panorama.share(z, level));
+            let counts = both(&above, &levels, |z, level| (range(z, level) / COUNT + 0.5).min(MOST));
+            for ((turn, share), count) in block.turns().iter().zip(shares).zip(counts).take(block.count) {
+                let Some(row) = panorama.row_of(share) else { continue };
+                let count = count as u16;
+                if let Some(place) = panorama.counts.get_mut(row * columns + sector_of(*turn, columns))
+                    && (*place == 0 || count < *place)
+                {
+                    *place = count;
+                }
             }
         }
         panorama
@@ -141,8 +146,20 @@ impl Panorama {
     /// between the elevations.
     pub(super) fn row(&self, [_, _, up]: [f32; 3], level: f32) -> Option<(usize, f32)> {
         let z = up - self.height;
-        let share = (self.span.most - arctangent(z, level)) / (self.span.most - self.span.least);
-        (0.0..1.0).contains(&share).then(|| ((share * self.rows() as f32) as usize, libm::sqrtf(level * level + z * z)))
+        Some((self.row_of(self.share(z, level))?, range(z, level)))
+    }
+
+    /// How far below the highest elevation a point lies that is so far away on the level and so much above the sensor, m, as a part
+    /// of the span.
+    #[inline(always)]
+    fn share(&self, z: f32, level: f32) -> f32 {
+        (self.span.most - arctangent(z, level)) / (self.span.most - self.span.least)
+    }
+
+    /// Row of such a part; None if it is not between the elevations.
+    #[inline(always)]
+    fn row_of(&self, share: f32) -> Option<usize> {
+        (0.0..1.0).contains(&share).then(|| (share * self.rows() as f32) as usize)
     }
 
     /// The point in the middle of a column, so far away on the level, m; columns go on round.
@@ -183,6 +200,12 @@ impl Panorama {
             })
         })
     }
+}
+
+/// Range of a point that lies so far away on the level and so much above the sensor, m.
+#[inline(always)]
+fn range(z: f32, level: f32) -> f32 {
+    libm::sqrtf(level * level + z * z)
 }
 
 #[cfg(test)]
