@@ -213,6 +213,31 @@ mod tests {
     use super::*;
 
     #[test]
+    fn it_has_the_least_range_of_the_points_in_each_direction() {
+        // Not whole blocks, with gaps, and some beside the span and at the seam.
+        let ring = |number: usize| {
+            let (turn, lift) = (number as f32 * 0.37, ((number + 15) % 29) as f32 * 0.03 - 0.5);
+            let range = 2.0 + (number * 7 % 45) as f32;
+            (number % 11 != 3).then(|| [range * libm::cosf(turn), range * libm::sinf(turn), range * lift])
+        };
+        let points: [_; 1001] = core::array::from_fn(ring);
+        for count in [1, 15, 16, 17, 1001] {
+            let (cloud, floor) =
+                (Cloud::new(&points[..count], 1).unwrap(), Floor { height: 1.7, slope: [0.03, -0.05] });
+            let panorama = Panorama::new(&cloud, &floor, Span::VLP16);
+            let mut counts = [0; DIRECTIONS];
+            for point in cloud.seen().map(|point| floor.levelled(point)) {
+                let (column, level) = panorama.column(point);
+                let Some((row, range)) = panorama.row(point, level) else { continue };
+                let (count, place) = ((range / COUNT + 0.5).min(MOST) as u16, &mut counts[row * COLUMNS + column]);
+                *place = if *place == 0 { count } else { count.min(*place) };
+            }
+            assert!(counts.iter().any(|count| *count > 0));
+            assert!(panorama.counts == counts, "{count} points");
+        }
+    }
+
+    #[test]
     fn a_stored_panorama_is_the_same() {
         let counts = core::array::from_fn(|number| (number as u16).wrapping_mul(2741) % 4096);
         for (rings, columns) in [(16, 480), (64, 240)] {

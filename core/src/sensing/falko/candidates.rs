@@ -60,6 +60,7 @@ impl Candidates<'_> {
         let mut worst = 0.0_f32;
         let mut windows = Vec::<Window, AHEAD>::new();
         let count = self.scan.ranges.len().min(self.runs.before.len()).min(self.runs.after.len());
+        // Three slices that go on together take half as many instructions again.
         for index in 0..count {
             let Some(&range) = self.scan.ranges.get(index) else { break };
             let (Some(&before), Some(&after)) = (self.runs.before.get(index), self.runs.after.get(index)) else {
