@@ -3,8 +3,11 @@
 use heapless::Vec;
 
 use super::PointScan;
-use crate::geometry::{Point, Pose, Transform};
+use crate::geometry::{Point, Pose, ScanPoint, Transform};
 use crate::measurement::{Scan, Time};
+
+/// Beams that are corrected at once.
+const BLOCK: usize = 8;
 
 /// Nodes of a path. If there are more, every second one is left out.
 const NODES: usize = 48;
@@ -88,25 +91,52 @@ impl SensorPath {
 
     /// Moves all points of a scan into the frame of its first beam.
     pub fn correct<const BEAMS: usize>(&self, scan: &Scan, points: &mut PointScan<BEAMS>) {
-        let mut segment = self.segment(0);
         let interval = scan.beam_interval * PointScan::<BEAMS>::stride(scan) as f64;
-        for (beam, (point, range)) in points.points.iter_mut().zip(&points.ranges).enumerate() {
+        let mut segment = self.segment(0);
+        let (blocks, last_beams) = points.points.as_chunks_mut::<BLOCK>();
+        let (ranges, last_ranges) = points.ranges.as_chunks::<BLOCK>();
+        let mut beam = 0;
+        for (block, ranges) in blocks.iter_mut().zip(ranges) {
+            self.go_on(&mut segment, beam as f64 * interval);
+            if segment.end >= (beam + BLOCK - 1) as f64 * interval {
+                segment.correct(beam, interval, block, ranges);
+            } else {
+                self.correct_each(&mut segment, (beam, interval), block, ranges);
+            }
+            beam += BLOCK;
+        }
+        self.correct_each(&mut segment, (beam, interval), last_beams, last_ranges);
+    }
+
+    /// Moves points one by one, from that of beam `first` on, which is not before the segment; the segment goes on with them.
+    fn correct_each(
+        &self,
+        segment: &mut Segment,
+        (first, interval): (usize, f64),
+        points: &mut [ScanPoint],
+        ranges: &[f32],
+    ) {
+        for (beam, (point, range)) in (first..).zip(points.iter_mut().zip(ranges)) {
             if *range > 0.0 {
                 let time = beam as f64 * interval;
-                while segment.end < time {
-                    segment = self.segment(segment.index + 1);
-                }
+                self.go_on(segment, time);
                 *point = segment.transform(time).single().apply(point);
             }
+        }
+    }
+
+    /// Goes on from a segment to that of a time which is not before it.
+    #[inline]
+    fn go_on(&self, segment: &mut Segment, time: f64) {
+        while segment.end < time {
+            *segment = self.segment(segment.index + 1);
         }
     }
 
     /// The sensor's pose `time` seconds after the first beam.
     fn transform(&self, time: f64) -> Transform<f64> {
         let mut segment = self.segment(0);
-        while segment.end < time {
-            segment = self.segment(segment.index + 1);
-        }
+        self.go_on(&mut segment, time);
         segment.transform(time)
     }
 
@@ -140,6 +170,21 @@ struct Segment {
 }
 
 impl Segment {
+    /// Moves points all of whose beams are of this segment.
+    #[inline]
+    fn correct(&self, first: usize, interval: f64, points: &mut [ScanPoint; BLOCK], ranges: &[f32; BLOCK]) {
+        let mut beam = first as f64;
+        let transforms = [(); BLOCK].map(|()| {
+            let transform = self.transform(beam * interval).single();
+            beam += 1.0;
+            transform
+        });
+        for ((point, range), transform) in points.iter_mut().zip(ranges).zip(&transforms) {
+            let moved = transform.apply(point);
+            *point = if *range > 0.0 { moved } else { *point };
+        }
+    }
+
     #[inline]
     fn transform(&self, time: f64) -> Transform<f64> {
         let share = ((time - self.start) / self.duration).clamp(0.0, 1.0);

@@ -1,5 +1,8 @@
 //! The points around a candidate (K 3.1.1), organised by beam.
 
+#[cfg(not(target_os = "none"))]
+use wide::{CmpLe, f32x8};
+
 use super::{PointScan, PointView};
 use crate::geometry::ScanPoint;
 
@@ -142,7 +145,7 @@ fn farthest_of_any(
 }
 
 /// Points that are compared with a disc at once. Where a processor does one at a time, more are wasted effort.
-const BLOCK: usize = if cfg!(target_os = "none") { 1 } else { 4 };
+const BLOCK: usize = if cfg!(target_os = "none") { 1 } else { 8 };
 
 /// The disc around a candidate that its neighbours lie in.
 #[derive(Clone, Copy, Debug)]
@@ -169,14 +172,22 @@ impl Disc {
     }
 
     /// Which of some points are inside, a bit each.
+    #[cfg(not(target_os = "none"))]
     #[inline(always)]
     fn holds_any(&self, points: &[ScanPoint; BLOCK]) -> u32 {
-        let squared = points.map(|point| (point - self.centre).norm_squared());
-        let mut bits = 0;
-        for (index, squared) in squared.iter().enumerate() {
-            bits |= u32::from(*squared <= self.radius * self.radius) << index;
-        }
-        bits
+        let x = f32x8::from(points.map(|point| point.x)) - f32x8::splat(self.centre.x);
+        let y = f32x8::from(points.map(|point| point.y)) - f32x8::splat(self.centre.y);
+        let inside = (x * x + y * y).cmp_le(f32x8::splat(self.radius * self.radius));
+        // One of the lowest bits for each point.
+        inside.move_mask() as u32
+    }
+
+    /// Which of some points are inside, a bit each.
+    #[cfg(target_os = "none")]
+    #[inline(always)]
+    fn holds_any(&self, points: &[ScanPoint; BLOCK]) -> u32 {
+        let [point] = points;
+        u32::from(self.holds(point).is_some())
     }
 
     /// Index of the first point inside.

@@ -7,8 +7,8 @@ mod drive;
 use self::drive::{Drive, KINDS, Kind, Path, parameters};
 use agv_core::geometry::{Pose, Twist};
 use agv_core::localizer::{Event, Mode, OutputPredictor, Reason};
-use agv_core::measurement::{EncoderSample, Reflectors, SpeedSample, Time};
-use agv_core::sensing::SensorPath;
+use agv_core::measurement::{EncoderSample, LaserId, Reflectors, Scan, SpeedSample, Time};
+use agv_core::sensing::{PointScan, SensorPath};
 
 /// Time after which the pose is as good as it gets, s.
 const SETTLED: f64 = 3.0;
@@ -278,6 +278,51 @@ fn a_scan_is_corrected_up_to_its_last_beam_at_every_rate() {
             let allowed = if interval < 10_000 { 2e-4 } else { 8e-4 } + 1.5 * 2e-3 * f64::from(u8::from(beam > 1230));
             let error = off.x.hypot(off.y);
             assert!(error < allowed, "{error} m at {seconds} s, a node each {interval} us");
+        }
+    }
+}
+
+#[test]
+fn each_return_of_a_scan_is_moved_from_where_it_was_seen() {
+    // A wall 6 m ahead, seen from a sensor that goes round a bend.
+    let at = |seconds: f64| Pose::exp(&Twist { x: 1.5 * seconds, y: 0.0, theta: 0.8 * seconds });
+    let laser = Pose::new(0.9, 0.1, 0.3);
+    let mut path = SensorPath::default();
+    let times = (0..=13).map(|step| f64::from(step) * 0.01);
+    path.set(Time::default(), &laser, times.map(|seconds| (Time::default().offset(seconds), at(seconds))));
+    for (count, span) in [(1440, 0.125), (1437, 0.125), (7, 0.05), (100, 0.0)] {
+        let beam_interval = span / f64::from(count);
+        let bearing = |beam: u16| -0.6 + 1.2 * f64::from(beam) / f64::from(count);
+        let place = |beam: u16| laser.inverse().compose(&at(f64::from(beam) * beam_interval).compose(&laser));
+        let range = |beam: u16| {
+            let sensor = place(beam);
+            (6.0 - sensor.x) / (sensor.theta + bearing(beam)).cos()
+        };
+        let is_absent = |beam: u16| beam % 5 == 3 || (200..230).contains(&beam);
+        let ranges: Vec<f32> = (0..count).map(|beam| if is_absent(beam) { 0.0 } else { range(beam) as f32 }).collect();
+        let scan = Scan {
+            laser: LaserId::FIRST,
+            start: Time::default(),
+            beam_interval,
+            first_bearing: bearing(0),
+            bearing_step: 1.2 / f64::from(count),
+            ranges: &ranges,
+            intensities: &[],
+        };
+        let mut points = Box::new(PointScan::<1440>::new());
+        points.set(&scan, 0.1, 50.0);
+        path.correct(&scan, &mut points);
+        assert_eq!(points.points.len(), usize::from(count));
+        for (beam, point) in (0..count).zip(&points.points) {
+            if is_absent(beam) {
+                assert_eq!((point.x, point.y), (0.0, 0.0), "beam {beam} of {count} has no return");
+            } else {
+                let sensor = place(beam);
+                let y = sensor.y + range(beam) * (sensor.theta + bearing(beam)).sin();
+                let error = f64::from(point.x - 6.0).hypot(f64::from(point.y) - y);
+                // Between nodes the path is straight.
+                assert!(error < 2e-4, "{error} m at beam {beam} of {count}");
+            }
         }
     }
 }
