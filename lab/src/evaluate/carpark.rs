@@ -154,7 +154,7 @@ pub fn run(folder: &Path, noise: Noise, knowledge: Knowledge) -> Result<(Outcome
 /// Reflectors in the state, and nothing else: there are no walls to align to, and no pallets.
 fn for_slam(parameters: &mut Parameters) {
     parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: true };
-    parameters.sources = Switches { corners: false, end_points: false, key_scans: false, ..Switches::ALL };
+    parameters.sources = Switches { corners: false, end_points: false, key_scans: false, contours: false, ..Switches::ALL };
     // A car whose wheel slips and whose steering angle is that of a wheel which does not exist.
     parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 3e-3 };
     // Without a map the uncertainty of the start remains, and grows with the distance from it.
