@@ -52,6 +52,19 @@ fn a_localiser_too_sure_of_itself_says_that_it_is_lost() {
     }
 }
 
+#[test]
+fn the_car_park_is_mapped_with_contours_and_without() {
+    let Some(folder) = recordings("the_car_park_is_mapped_with_contours_and_without", "carpark") else { return };
+    for (knowledge, most, most_elsewhere) in [(Knowledge::Slam, 0.20, 0), (Knowledge::SlamAndContours, 0.52, 3)] {
+        let (outcome, _, _) = carpark::run(&folder, Noise::Nominal, knowledge).unwrap();
+        println!("{knowledge:?}: {outcome:?}");
+        assert!(outcome.rmse_m < most, "{knowledge:?}: {outcome:?}");
+        assert_eq!(outcome.lost_at_s, None, "{knowledge:?}");
+        assert!(outcome.map_error_m.is_some_and(|error| error < 0.4), "{knowledge:?}: {outcome:?}");
+        assert!(outcome.landmarks_elsewhere <= most_elsewhere, "{knowledge:?}: {outcome:?}");
+    }
+}
+
 /// Worst of four paths at the 95 % mark: mm and degrees.
 fn worst(name: &str, runs: u64) -> (f64, f64, f64) {
     let method = Method::ALL.iter().find(|method| method.name == name).unwrap();

@@ -10,6 +10,10 @@ use crate::sources::{ContourOutcome, FindContours, FindFeatures, ScanBehind, see
 /// While reflectors have the position as well as this, m, contours do not correct it.
 const BY_REFLECTORS: f64 = 0.02;
 
+/// As far behind a reflector that has corrected the pose, m, as those seen since agree with it, contours of the way behind correct no
+/// odometry by a match that surprises.
+const LED_BEHIND: f64 = 2.0;
+
 /// What contours have done to the pose in the present event.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum ContourCorrection {
@@ -89,7 +93,8 @@ impl<C: Capacities> Localizer<C> {
     /// of the points.
     pub(super) fn fuse_contours_behind(&mut self, mount: &Pose, place: &Pose) {
         let step = self.step_until(self.slam.time());
-        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
+        let is_led = self.distance.reflector <= LED_BEHIND && self.outputs.sources.reflectors.gated == 0;
+        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step, is_led };
         let told = (self.slam.time(), &mut self.outputs.sources.contours);
         self.contour_correction = ContourCorrection::Applied;
         if self.behind.see(&mut self.contours, self.slam.parts().0, &scan, told) {
@@ -101,7 +106,7 @@ impl<C: Capacities> Localizer<C> {
     /// Makes the scan one of the way behind if it is time for one.
     pub(super) fn keep_contours_behind(&mut self, mount: &Pose, place: &Pose) {
         let step = Pose::default();
-        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step };
+        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step, is_led: false };
         self.behind.keep(&mut self.contours, self.slam.parts().0, &scan);
     }
 

@@ -41,6 +41,8 @@ pub(crate) struct ContoursBehind {
     anchor: Pose,
     /// Covariance of the match that the present scan has corrected the pose by, in W; none along a free axis of which it told nothing.
     matched: Option<Matrix3<f64>>,
+    /// Whether the present scan contradicts what lies behind.
+    is_contradicted: bool,
 }
 
 /// A scan as it is compared with the way behind.
@@ -53,6 +55,8 @@ pub(crate) struct ScanBehind<'a> {
     pub laser: Pose,
     /// The motion since the scan before.
     pub step: Pose,
+    /// Whether reflectors lead the vehicle.
+    pub is_led: bool,
 }
 
 /// A match beside what the filter expects.
@@ -70,7 +74,7 @@ impl Compared {
 
 impl ContoursBehind {
     pub(crate) const fn new() -> Self {
-        Self { anchor: Pose { x: 0.0, y: 0.0, theta: 0.0 }, matched: None }
+        Self { anchor: Pose { x: 0.0, y: 0.0, theta: 0.0 }, matched: None, is_contradicted: false }
     }
 
     /// Corrects the filter, which stands at `time`. Returns whether the scan has told the whole pose.
@@ -82,7 +86,7 @@ impl ContoursBehind {
         (time, status): (Time, &mut SourceStatus),
     ) -> bool {
         status.begin(time);
-        self.matched = None;
+        (self.matched, self.is_contradicted) = (None, false);
         contours.see(scan.points);
         let Some(predicted) = self.predict(filter, scan) else { return false };
         let Some(found) = contours.locate_behind(&predicted).filter(|found| found.share >= LEAST_SHARE) else {
@@ -90,8 +94,16 @@ impl ContoursBehind {
             return false;
         };
         let Some(compared) = self.compare(filter, scan, &found) else { return false };
-        let is_used = correct(filter, &compared);
-        let verdict = if is_used { Verdict::Accepted } else { Verdict::Unknown };
+        // Reflectors would have shown what is wrong with the odometry. A line alone, such as where a leaning laser meets the floor, may turn by
+        // itself.
+        let is_doubtful = scan.is_led || found.free_axis.is_some();
+        self.is_contradicted = is_doubtful && !compared.is_expected();
+        let is_used = !self.is_contradicted && correct(filter, &compared);
+        let verdict = match (is_used, self.is_contradicted) {
+            (true, _) => Verdict::Accepted,
+            (false, true) => Verdict::Gated,
+            (false, false) => Verdict::Unknown,
+        };
         status.add(time, verdict, is_used, Some(compared.square / GATE));
         let past = filter.past_pose(SLOT).filter(|_| is_used && found.free_axis.is_none());
         self.matched = past.map(|past| {
@@ -138,6 +150,10 @@ impl ContoursBehind {
     /// It is one of so many in the submap, and moves it by that share of its own error. If it told nothing along an axis, what it adds is as
     /// wrong there as the pose is: then the submap is where the vehicle is.
     pub(crate) fn keep<S: Slots, C: FindContours>(&mut self, contours: &mut C, filter: &mut Ekf<S>, scan: &ScanBehind) {
+        // It would lie askew among those before it.
+        if self.is_contradicted {
+            return;
+        }
         let known = filter.expected_relative_pose(SLOT, &scan.laser);
         if known.is_none() {
             contours.forget_keys();

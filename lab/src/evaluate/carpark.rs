@@ -39,6 +39,8 @@ pub enum Knowledge {
     Map,
     /// Nothing: it finds them on its way and keeps them in the state of its filter.
     Slam,
+    /// The same, and contours of the way behind correct the pose as they do in the boards' images.
+    SlamAndContours,
 }
 
 /// What came out.
@@ -124,17 +126,17 @@ pub fn run(folder: &Path, noise: Noise, knowledge: Knowledge) -> Result<(Outcome
     let mut recording = carpark::read(folder, &carpark::WINDOW)?;
     recording.parameters = parameters(&recording.parameters, noise);
     let survey = recording.landmarks.clone();
-    if knowledge == Knowledge::Slam {
+    let is_mapping = knowledge != Knowledge::Map;
+    if is_mapping {
         recording.landmarks.clear();
         for_slam(&mut recording.parameters);
+        recording.parameters.sources.contours = knowledge == Knowledge::SlamAndContours;
     }
     let headings = carpark::read_batch_solution(folder)?;
     let first = recording.references.first().ok_or(CarparkError::NoReference)?;
-    let given = match knowledge {
-        Knowledge::Map => None,
-        // Nothing on the way tells the angle of a map that begins here, so the start must.
-        Knowledge::Slam => headings.first().map(|first| first.pose.theta + recording.parameters.lasers.first().theta),
-    };
+    // Nothing on the way tells the angle of a map that begins here, so the start must.
+    let given = headings.first().filter(|_| is_mapping);
+    let given = given.map(|first| first.pose.theta + recording.parameters.lasers.first().theta);
     let laser = Pose::new(first.x, first.y, given.unwrap_or(FIRST_HEADING));
     let fix = PoseFix {
         time: first.time,
@@ -145,16 +147,16 @@ pub fn run(folder: &Path, noise: Noise, knowledge: Knowledge) -> Result<(Outcome
     recording.events.insert(0, RecordedEvent::SetPose(fix));
     let replay = replay(&recording, |_| {})?;
     let mut outcome = judge(&recording, &replay, &headings);
-    if knowledge == Knowledge::Slam {
+    if is_mapping {
         judge_map(&mut outcome, &replay, &survey);
     }
     Ok((outcome, recording, replay))
 }
 
-/// Reflectors in the state, and nothing else: there are no walls to align to, and no pallets.
+/// Reflectors in the state: there are no walls to align to, and no pallets.
 fn for_slam(parameters: &mut Parameters) {
     parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: true };
-    parameters.sources = Switches { corners: false, end_points: false, key_scans: false, contours: false, ..Switches::ALL };
+    parameters.sources = Switches { corners: false, end_points: false, key_scans: false, ..Switches::ALL };
     // A car whose wheel slips and whose steering angle is that of a wheel which does not exist.
     parameters.slam.biases = BiasDeviations { scale: 0.03, steering: 0.02, laser_yaw: 3e-3 };
     // Without a map the uncertainty of the start remains, and grows with the distance from it.

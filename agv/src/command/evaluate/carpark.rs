@@ -32,6 +32,8 @@ enum Mode {
     Map,
     /// Nothing: they are found on the way.
     Slam,
+    /// Nothing, and contours of the way behind correct the pose, too, as in the boards' images.
+    SlamAndContours,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -57,6 +59,7 @@ impl Carpark {
         let knowledge = match self.mode {
             Mode::Map => carpark::Knowledge::Map,
             Mode::Slam => carpark::Knowledge::Slam,
+            Mode::SlamAndContours => carpark::Knowledge::SlamAndContours,
         };
         let (outcome, _, _) = carpark::run(&folder, noise, knowledge)?;
         if self.json {
