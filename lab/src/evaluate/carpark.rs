@@ -39,7 +39,7 @@ pub enum Knowledge {
     Map,
     /// Nothing: it finds them on its way and keeps them in the state of its filter.
     Slam,
-    /// The same, and contours of the way behind correct the pose as they do in the boards' images.
+    /// The same, and contours of the way behind correct the pose, as where there is room for them.
     SlamAndContours,
 }
 

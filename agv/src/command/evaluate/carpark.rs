@@ -32,7 +32,7 @@ enum Mode {
     Map,
     /// Nothing: they are found on the way.
     Slam,
-    /// Nothing, and contours of the way behind correct the pose, too, as in the boards' images.
+    /// Nothing, and contours of the way behind correct the pose, too, as where there is room for them.
     SlamAndContours,
 }
 
