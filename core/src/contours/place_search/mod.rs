@@ -4,6 +4,7 @@
 //! both sides: how much of the scan lies on surfaces of the map, and how many of the surfaces that should be in sight the scan shows,
 //! rather than the free space behind them. Only a clear gap to the second makes an answer.
 
+pub(super) mod best_places;
 mod coarse_search;
 mod place_grid;
 mod range_profile;
@@ -11,8 +12,8 @@ mod settling;
 mod support;
 
 use heapless::Vec;
-use nalgebra::Matrix3;
 
+use best_places::{BestPlaces, Candidate, Held, PlaceAnswer, PlaceFix};
 use coarse_search::{CoarseSearch, PLACES, Place};
 use place_grid::PlaceGrid;
 use range_profile::{InSight, RangeProfile};
@@ -23,51 +24,8 @@ use super::kept_map::Loading;
 use super::matcher::weak_axis;
 use super::refinement::Refining;
 use super::{KeptMap, SearchResult, SearchWindow, Submap, SurfacePoint, TILE, find_surface_points, search};
-use crate::geometry::{Point, Pose, ScanPoint, Transform, difference, wrap};
-use crate::order::insertion_sort_by;
+use crate::geometry::{Point, Pose, ScanPoint, Transform, wrap};
 use crate::sensing::PointView;
-
-/// Where a scan may have been taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlaceFix {
-    /// Pose of the frame of the scan's points in that of the map.
-    pub pose: Pose,
-    /// Inverse of its covariance (x, y, theta) if points err independently.
-    pub information: Matrix3<f64>,
-    /// Share of the scan's points that lie on surfaces of the map.
-    pub share: f32,
-    /// Share of the surfaces of the map that should be in sight and that the scan shows.
-    pub shown: f32,
-    /// The unit vector along which the surfaces do not say where it is.
-    pub free_axis: Option<ScanPoint>,
-}
-
-impl PlaceFix {
-    /// How well scan and map agree there, from 0 to 1.
-    #[must_use]
-    pub fn overlap(&self) -> f32 {
-        self.share * self.shown
-    }
-
-    /// Whether another pose is about the same place.
-    fn is_same(&self, other: &Pose) -> bool {
-        let apart = self.pose.position() - other.position();
-        apart.norm() < SAME.0 && libm::fabs(difference(self.pose.theta, other.theta)) < SAME.1
-    }
-}
-
-/// What a search ends in.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PlaceAnswer {
-    /// Scan and map agree at one place, and nowhere else nearly as well.
-    Found(PlaceFix),
-    /// They agree at two places, or all along a corridor.
-    Ambiguous(PlaceFix, PlaceFix),
-    /// Too few surfaces are seen to tell.
-    TooFew,
-    /// They agree nowhere.
-    Unknown,
-}
 
 /// Whether a search has ended.
 #[expect(clippy::large_enum_variant, reason = "there is no heap, and one such value at a time")]
@@ -79,9 +37,6 @@ pub enum PlaceProgress {
     Done(PlaceAnswer),
 }
 
-/// Poses closer than this are one place, m and rad.
-const SAME: (f64, f64) = (0.3, 0.1);
-
 /// A place is believed only if so much of the scan lies on surfaces,
 const LEAST_SHARE: f32 = 0.55;
 
@@ -91,17 +46,8 @@ const FEWEST: usize = 40;
 /// and so many of the surfaces in sight are shown.
 const LEAST_SHOWN: f32 = 0.55;
 
-/// A place is as good as the best one if they agree there this much as well.
-const AS_GOOD: f32 = 0.9;
-
-/// Places that are looked at closely,
-const CANDIDATES: usize = 4;
-
-/// if scan and map agree there nearby this much as well as at the best one.
+/// A place is looked at closely if scan and map agree there this much as well as at the best one.
 const WORTH: f32 = 0.6;
-
-/// Two places of a corridor, for whoever asks: along its axis, m.
-const ALONG: f64 = 1.0;
 
 /// Turns to each side of a place that are searched, and the angle between them, rad.
 const TURNS: i32 = 3;
@@ -131,24 +77,6 @@ const AGREED: f32 = 0.051;
 
 /// or else it is shifted, so often at the most.
 const MOST_SHIFTS: u8 = 3;
-
-/// What separate things say of a place.
-#[derive(Clone, Copy, Debug)]
-enum Held {
-    /// They hold it.
-    Surely,
-    /// Some say that it is here.
-    Disputed(Pose),
-    /// Too few hold it.
-    ByTooFew,
-}
-
-/// One of the best places.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    fix: PlaceFix,
-    held: Held,
-}
 
 /// The axis along which surfaces say least of a place, or the one across it.
 fn axis_of(fix: &PlaceFix, is_across: bool) -> ScanPoint {
@@ -198,8 +126,7 @@ pub struct PlaceSearch<const POINTS: usize = 400, const ROOM: usize = 6144, cons
     step: Step,
     /// Places that have been looked at.
     done: [bool; PLACES],
-    /// The best places, the best first.
-    best: Vec<Candidate, CANDIDATES>,
+    best: BestPlaces,
     /// The best score of a search around a place.
     score: f32,
     /// Times the place that is looked at was shifted to where most things have it.
@@ -221,7 +148,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
             submap: Submap::new(),
             step: Step::None,
             done: [false; PLACES],
-            best: Vec::new(),
+            best: BestPlaces::new(),
             score: 0.0,
             shifts: 0,
             debt: 0,
@@ -260,7 +187,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
                 Step::None => return PlaceProgress::Done(PlaceAnswer::TooFew),
                 Step::Answer => {
                     self.step = Step::None;
-                    return PlaceProgress::Done(self.answer());
+                    return PlaceProgress::Done(self.best.answer(self.coarse.is_crowded()));
                 }
                 Step::Mark { tile, point } => self.mark(map, (tile, point), &mut left),
                 Step::Search if self.coarse.advance(&self.grid, &mut left) => Step::Search,
@@ -402,7 +329,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
         }
         if found.share() >= LEAST_SHOWN {
             let pose = self.submap.origin().compose(&fix.pose);
-            self.keep(PlaceFix { pose, shown: found.share(), ..*fix });
+            self.best.keep(PlaceFix { pose, shown: found.share(), ..*fix });
         }
         Step::Choose
     }
@@ -410,7 +337,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
     /// Begins to look closely at one of the best places.
     fn first_settling(&mut self, place: usize) -> Step {
         self.shifts = 0;
-        let best = self.best.first().map_or(0.0, |best| best.fix.overlap());
+        let best = self.best.get(0).map_or(0.0, |best| best.fix.overlap());
         let fix = self.best.get(place).map(|candidate| candidate.fix).filter(|fix| fix.overlap() >= WORTH * best);
         match fix.and_then(|fix| Settling::begin(&fix.pose)) {
             Some(settling) => Step::Settle { place, settling },
@@ -473,43 +400,6 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
             self.first_settling(place + 1)
         } else {
             self.first_question(place, true)
-        }
-    }
-
-    /// Keeps the best that are not the same place.
-    fn keep(&mut self, fix: PlaceFix) {
-        let candidate = Candidate { fix, held: Held::ByTooFew };
-        if let Some(same) = self.best.iter_mut().find(|other| other.fix.is_same(&fix.pose)) {
-            if fix.overlap() > same.fix.overlap() {
-                *same = candidate;
-            }
-        } else if self.best.push(candidate).is_err()
-            && let Some(last) = self.best.last_mut().filter(|last| fix.overlap() > last.fix.overlap())
-        {
-            *last = candidate;
-        }
-        insertion_sort_by(&mut self.best, |one, other| other.fix.overlap().total_cmp(&one.fix.overlap()));
-    }
-
-    fn answer(&mut self) -> PlaceAnswer {
-        insertion_sort_by(&mut self.best, |one, other| other.fix.overlap().total_cmp(&one.fix.overlap()));
-        let Some((Candidate { fix: best, held }, others)) = self.best.split_first() else {
-            return PlaceAnswer::Unknown;
-        };
-        let is_second =
-            |other: &&Candidate| !best.is_same(&other.fix.pose) && other.fix.overlap() >= AS_GOOD * best.overlap();
-        let at = |pose: Pose| PlaceFix { pose, ..*best };
-        match (others.iter().find(is_second), best.free_axis, held) {
-            (Some(second), ..) => PlaceAnswer::Ambiguous(*best, second.fix),
-            (None, Some(axis), _) => {
-                let (x, y) = (best.pose.x + ALONG * f64::from(axis.x), best.pose.y + ALONG * f64::from(axis.y));
-                PlaceAnswer::Ambiguous(*best, at(Pose { x, y, ..best.pose }))
-            }
-            // One that was not looked at may be as good.
-            (None, None, _) if self.coarse.is_crowded() => PlaceAnswer::Unknown,
-            (None, None, Held::Surely) => PlaceAnswer::Found(*best),
-            (None, None, Held::Disputed(pose)) => PlaceAnswer::Ambiguous(*best, at(*pose)),
-            (None, None, Held::ByTooFew) => PlaceAnswer::Unknown,
         }
     }
 }
