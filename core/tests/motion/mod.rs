@@ -5,7 +5,7 @@
 mod drive;
 
 use self::drive::{Drive, KINDS, Kind, Path, parameters};
-use agv_core::geometry::{Pose, Twist};
+use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::localizer::{Event, Mode, OutputPredictor, Reason};
 use agv_core::measurement::{EncoderSample, LaserId, Reflectors, Scan, SpeedSample, Time};
 use agv_core::sensing::{PointScan, SensorPath};
@@ -257,6 +257,38 @@ fn the_pose_is_as_good_at_every_rate_of_the_odometry_and_latency_of_the_laser() 
         }
     }
     assert!(bad.is_empty(), "{bad:#?}");
+}
+
+#[test]
+fn a_filter_that_stands_in_the_past_is_as_right_of_now() {
+    // Straight on, round a bend, in serpentines, and round a bend from standstill to 1.9 m/s and back.
+    let paths = [
+        Path::straight(14.0),
+        Path::new(14.0, |_| (1.5, 0.6)),
+        Path::new(14.0, |time| (1.2, 0.5 * (1.5 * time).sin())),
+        Path::new(14.0, |time| (1.0 - 0.9 * (0.8 * time).cos(), 0.7)),
+    ];
+    let worst = |path: &Path, kind, slam, rate| {
+        let mut drive = Drive::start(path, kind, slam, rate);
+        drive.go(SETTLED, |_| {});
+        let (mut position, mut heading) = (0.0_f64, 0.0_f64);
+        drive.go(9.0, |drive| {
+            let said = drive.said();
+            position = position.max(path.error(&said));
+            heading = heading.max(difference(said.pose.theta, path.pose(said.time).theta).abs());
+        });
+        (position, heading)
+    };
+    for (number, path) in paths.iter().enumerate() {
+        for kind in KINDS {
+            for rate in [50, 100, 500] {
+                let [at_once, behind] = [false, true].map(|slam| worst(path, kind, slam, rate));
+                let (more, turned) = (behind.0 - at_once.0, behind.1 - at_once.1);
+                assert!(more < 1e-3, "{more} m more than {} m on path {number}, {kind:?} at {rate} Hz", at_once.0);
+                assert!(turned < 1e-4, "{turned} rad more than {} on path {number}, {kind:?} at {rate} Hz", at_once.1);
+            }
+        }
+    }
 }
 
 #[test]
