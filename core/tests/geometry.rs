@@ -8,7 +8,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::geometry::{Point, Pose, Twist, difference, wrap};
+use agv_core::geometry::{Point, Pose, ScanPoint, Twist, difference, sector, wrap};
 use proptest::prelude::*;
 
 fn pose() -> impl Strategy<Value = Pose> {
@@ -42,7 +42,33 @@ fn wrapping_is_exact_at_half_turns() {
     assert!(wrap(f64::NAN).is_nan() && wrap(f64::INFINITY).is_nan() && wrap(f64::NEG_INFINITY).is_nan());
 }
 
+#[test]
+fn axes_and_points_without_a_direction_have_a_sector() {
+    for (x, y, expected) in [(1.0, 0.0, 360), (0.0, 1.0, 540), (0.0, -1.0, 180), (-1.0, 0.0, 719), (-1.0, -0.0, 0)] {
+        assert_eq!(sector(&ScanPoint::new(x, y), 720), expected, "{x}, {y}");
+    }
+    for (x, y) in [(0.0, 0.0), (f32::NAN, 1.0), (f32::INFINITY, f32::INFINITY), (1e-40, -1e-40), (f32::MAX, 1.0)] {
+        assert!(sector(&ScanPoint::new(x, y), 720) < 720, "{x}, {y}");
+    }
+    assert_eq!(sector(&ScanPoint::new(1.0, 1.0), 0), 0);
+}
+
 proptest! {
+    #[test]
+    fn a_sector_holds_the_direction_of_its_points(
+        (angle, distance) in (-PI..PI, 0.01..100.0),
+        count in prop_oneof![1..20_usize, Just(360), Just(720), 500..4000_usize],
+    ) {
+        let point = ScanPoint::new((distance * angle.cos()) as f32, (distance * angle.sin()) as f32);
+        let share = (f64::from(point.y).atan2(f64::from(point.x)) / TAU + 0.5) * count as f64;
+        let found = sector(&point, count);
+        prop_assert!(found < count);
+        // By as much as single precision has it.
+        let rounding = 3e-7 * count as f64;
+        let (from, to) = (found as f64 - rounding, found as f64 + 1.0 + rounding);
+        prop_assert!(from <= share && share <= to, "{} of {} has {}", found, count, share);
+    }
+
     #[test]
     fn wrapping_is_exact(angle in any::<f64>()) {
         prop_assert_eq!(wrap(angle).to_bits(), wrapped_by_definition(angle).to_bits());

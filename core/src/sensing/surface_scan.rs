@@ -4,19 +4,19 @@ use serde::{Deserialize, Serialize};
 
 use super::PointView;
 use super::line::Moments;
-use crate::geometry::{Pose, ScanPoint, Transform};
+use crate::geometry::{Pose, ScanPoint, Transform, sector};
 
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// A point of it, m.
+    /// A point of it, m; infinitely far where nothing was seen.
     pub point: ScanPoint,
-    /// Its unit normal; zero where nothing was seen.
+    /// Its unit normal.
     pub normal: ScanPoint,
 }
 
 impl Surface {
-    const NONE: Self = Self { point: ScanPoint::new(0.0, 0.0), normal: ScanPoint::new(0.0, 0.0) };
+    const NONE: Self = Self { point: ScanPoint::new(f32::INFINITY, f32::INFINITY), normal: ScanPoint::new(0.0, 0.0) };
 }
 
 /// How pieces of surface are found.
@@ -67,7 +67,7 @@ impl<const DIRECTIONS: usize> SurfaceScan<DIRECTIONS> {
             let seen = Surface { point: transform.apply(&surface.point), normal: turned };
             let direction = self.direction(&seen.point, 0);
             if let Some(slot) = self.surfaces.get_mut(direction)
-                && (slot.normal == ScanPoint::zeros() || slot.point.norm_squared() > seen.point.norm_squared())
+                && slot.point.norm_squared() > seen.point.norm_squared()
             {
                 *slot = seen;
             }
@@ -76,27 +76,26 @@ impl<const DIRECTIONS: usize> SurfaceScan<DIRECTIONS> {
 
     /// The surface nearest to `point` among those that are seen up to `beside` sectors from it, with the square of its
     /// distance, m^2.
-    pub(super) fn nearest(&self, point: &ScanPoint, beside: usize) -> Option<(&Surface, f32)> {
-        let towards = self.direction(point, DIRECTIONS - beside);
-        let mut best: Option<(&Surface, f32)> = None;
-        for offset in 0..=2 * beside {
-            let sum = towards + offset;
-            let surface = self.surfaces.get(if sum >= DIRECTIONS { sum - DIRECTIONS } else { sum })?;
-            if surface.normal == ScanPoint::zeros() {
-                continue;
+    pub(super) fn nearest<'a>(&'a self, point: &ScanPoint, beside: usize) -> Option<(&'a Surface, f32)> {
+        let start = self.direction(point, DIRECTIONS - beside);
+        let end = start + 2 * beside + 1;
+        let (mut best, mut nearest) = (None, f32::INFINITY);
+        let mut look = |surfaces: &'a [Surface]| {
+            for surface in surfaces {
+                let square = (surface.point - point).norm_squared();
+                if square < nearest {
+                    (best, nearest) = (Some(surface), square);
+                }
             }
-            let square = (surface.point - point).norm_squared();
-            if best.is_none_or(|(_, nearest)| square < nearest) {
-                best = Some((surface, square));
-            }
-        }
-        best
+        };
+        look(self.surfaces.get(start..end.min(DIRECTIONS))?);
+        look(self.surfaces.get(..end.saturating_sub(DIRECTIONS))?);
+        best.map(|surface| (surface, nearest))
     }
 
     /// The sector in which a point lies, and `turn` sectors on.
     fn direction(&self, point: &ScanPoint, turn: usize) -> usize {
-        let share = libm::atan2f(point.y, point.x) / core::f32::consts::TAU + 0.5;
-        let sector = ((share * DIRECTIONS as f32) as usize).min(DIRECTIONS - 1) + turn;
+        let sector = sector(point, DIRECTIONS) + turn;
         if sector >= DIRECTIONS { sector - DIRECTIONS } else { sector }
     }
 }
