@@ -17,6 +17,9 @@ pub struct Surface {
 
 impl Surface {
     const NONE: Self = Self { point: ScanPoint::new(f32::INFINITY, f32::INFINITY), normal: ScanPoint::new(0.0, 0.0) };
+    /// At the sensor, with no normal. It fixes no pose, and is zeros: other values would be copied into a board's memory at the start by
+    /// way of its stack.
+    const UNSET: Self = Self { point: ScanPoint::new(0.0, 0.0), normal: ScanPoint::new(0.0, 0.0) };
 }
 
 /// How pieces of surface are found.
@@ -54,7 +57,7 @@ impl<const DIRECTIONS: usize> SurfaceScan<DIRECTIONS> {
     #[must_use]
     #[inline(always)]
     pub const fn new() -> Self {
-        Self { surfaces: [Surface::NONE; DIRECTIONS] }
+        Self { surfaces: [Surface::UNSET; DIRECTIONS] }
     }
 
     /// Replaces the content by the surfaces of a scan, seen from `place` in the frame of its points.
