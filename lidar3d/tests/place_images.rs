@@ -10,7 +10,9 @@ use std::cell::OnceCell;
 use std::sync::OnceLock;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Asked, Floor, Panorama, Place, PlaceImage, PlaceIndex, Pose, SECTORS, Span, Stored};
+use agv_lidar3d::place::{
+    Alignment, Asked, Floor, Panorama, Place, PlaceImage, PlaceIndex, Pose, SECTORS, Span, Stored,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::moosmann::{Drive, RINGS};
@@ -136,10 +138,15 @@ fn score(drive: &Drive, protocol: Protocol, distance: impl Fn(usize, usize) -> f
     best
 }
 
-/// Without what lies within `width` degrees round a direction, and turned by half a turn if so.
-fn masked(points: &Points, (direction, width): (f32, f32), is_reversed: bool) -> Points {
+/// Turned counter-clockwise by `heading` degrees.
+fn turned(points: &Points, heading: f32) -> Points {
+    let (sin, cos) = heading.to_radians().sin_cos();
+    points.iter().map(|point| point.map(|[x, y, z]| [x * cos - y * sin, x * sin + y * cos, z])).collect()
+}
+
+/// Without what lies within `width` degrees round a direction.
+fn masked(points: &Points, (direction, width): (f32, f32)) -> Points {
     let hide = |[x, y, z]: [f32; 3]| {
-        let [x, y] = if is_reversed { [-x, -y] } else { [x, y] };
         let off = (y.atan2(x).to_degrees() - direction + 540.0).rem_euclid(360.0) - 180.0;
         (off.abs() > width / 2.0).then_some([x, y, z])
     };
@@ -175,8 +182,8 @@ fn both(map: &Scans, asked: &Scans, protocol: Protocol) -> [Score; 2] {
     [score(drive, protocol, image), score(drive, protocol, context)]
 }
 
-/// The best ten of the images, aligned: one less the greatest score. Answers farther away than right ones are none.
-fn verified(map: &Scans, asked: &Scans, protocol: Protocol) -> Score {
+/// The best ten of the images, aligned: of a scan and a node the distance between them, m, and the score.
+fn aligned(map: &Scans, asked: &Scans, protocol: Protocol) -> Vec<Vec<Option<(f64, f64)>>> {
     let (drive, _) = drive().unwrap();
     let keys = &drive.keys;
     let nodes: Vec<usize> =
@@ -184,7 +191,7 @@ fn verified(map: &Scans, asked: &Scans, protocol: Protocol) -> Score {
     let stored: Vec<Option<Stored>> =
         (0..keys.len()).map(|key| nodes.contains(&key).then(|| Stored::new(&map.view(key).panorama))).collect();
     let mut seconds = Vec::new();
-    let mut scores = vec![vec![f64::MAX; keys.len()]; keys.len()];
+    let mut found = vec![vec![None; keys.len()]; keys.len()];
     for query in (1..keys.len()).step_by(2) {
         let alike = |node: &usize| Some((map.signatures(*node).image.likeness(&asked.signatures(query).image)?, *node));
         let mut best: Vec<_> = nodes.iter().filter_map(alike).collect();
@@ -194,15 +201,24 @@ fn verified(map: &Scans, asked: &Scans, protocol: Protocol) -> Score {
         for (likeness, node) in best.into_iter().take(10) {
             let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
             let began = std::time::Instant::now();
-            let found = stored[node].as_ref().unwrap().align(&scan, &headings, 6.0);
+            let alignment = stored[node].as_ref().unwrap().align(&scan, &headings, 6.0);
             seconds.push(began.elapsed().as_secs_f64());
-            let near = found.filter(|found| found.pose.place[0].hypot(found.pose.place[1]) as f64 <= protocol.right);
-            scores[query][node] = near.map_or(f64::MAX, |found| 1.0 - f64::from(found.score));
+            found[query][node] = alignment
+                .map(|Alignment { pose: Pose { place: [x, y], .. }, score }| (f64::from(x.hypot(y)), f64::from(score)));
         }
     }
     seconds.sort_by(f64::total_cmp);
     println!("  {} alignments, {:.1} ms at the median", seconds.len(), 1e3 * seconds[seconds.len() / 2]);
-    score(drive, protocol, |query, node| scores[query][node])
+    found
+}
+
+/// One less the greatest score. Answers from where none is right are none.
+fn verified(aligned: &[Vec<Option<(f64, f64)>>], protocol: Protocol) -> Score {
+    let (drive, _) = drive().unwrap();
+    score(drive, protocol, |query, node| {
+        let near = aligned[query][node].filter(|(apart, _)| *apart <= protocol.right);
+        near.map_or(f64::MAX, |(_, score)| 1.0 - score)
+    })
 }
 
 fn report(condition: &str, protocol: Protocol, [image, context]: [Score; 2]) {
@@ -227,61 +243,93 @@ fn whole_scans_are_recognised_better_than_by_scan_context() {
             assert!(context.r1 >= 0.775 && context.f1 >= 0.917, "{context:?}");
         }
     }
-    let found = verified(&whole, &whole, A10);
-    println!("A10 clean, verified: {:.3} / {:.3}", found.r1, found.f1);
-    assert!(found.r1 >= 0.98 && found.f1 >= 0.99, "{found:?}");
+    let aligned = aligned(&whole, &whole, A10);
+    for protocol in [A10, A10B] {
+        let found = verified(&aligned, protocol);
+        println!("{} clean, ten aligned: {:.3} / {:.3}", protocol.name, found.r1, found.f1);
+        assert!(found.r1 >= 0.98 && found.f1 >= 0.99, "{found:?}");
+    }
 }
 
-fn at_least_as_scan_context(condition: &str, scores: [Score; 2]) {
-    report(condition, A10, scores);
-    let [image, context] = scores;
-    assert!(image.r1 >= context.r1 && image.f1 >= context.f1, "{condition}: {image:?} {context:?}");
+/// What is done to the scans of the map and to those that are asked for.
+struct Stress {
+    name: &'static str,
+    /// Width of the sector that is hidden, deg, and in whose scans.
+    width: f32,
+    is_map_masked: bool,
+    /// Heading of the asked scans against the map's, deg, of that number.
+    heading: fn(usize) -> f32,
+    /// What else is done to the asked scans.
+    change: fn(usize, &Points) -> Points,
 }
 
-/// Masks of a width, the mean of eight directions: in the question alone, or in the map as well and the heading reversed.
-fn with_masks(width: f32, is_both: bool) -> [Score; 2] {
-    let whole = Scans::new(|_, points| points.clone());
-    let mut mean = [Score { r1: 0.0, f1: 0.0 }; 2];
-    for direction in (0..8).map(|eighth| 45.0 * eighth as f32) {
-        let asked = Scans::new(|_, points| masked(points, (direction, width), is_both));
-        let partial = Scans::new(|_, points| masked(points, (direction, width), false));
-        let scores = both(if is_both { &partial } else { &whole }, &asked, A10);
+const SAME: fn(usize, &Points) -> Points = |_, points| points.clone();
+const AHEAD: fn(usize) -> f32 = |_| 0.0;
+const REVERSED: fn(usize) -> f32 = |_| 180.0;
+/// As good as random: the golden angle.
+const RANDOM: fn(usize) -> f32 = |number| (137.507_76 * number as f32) % 360.0;
+
+const STRESSES: [Stress; 8] = {
+    const fn masks(name: &'static str, width: f32, is_map_masked: bool, heading: fn(usize) -> f32) -> Stress {
+        Stress { name, width, is_map_masked, heading, change: SAME }
+    }
+    const fn change(name: &'static str, change: fn(usize, &Points) -> Points) -> Stress {
+        Stress { name, width: 0.0, is_map_masked: false, heading: AHEAD, change }
+    }
+    [
+        masks("60 deg hidden in the question", 60.0, false, AHEAD),
+        masks("120 deg hidden in the question", 120.0, false, AHEAD),
+        masks("60 deg in both, reversed", 60.0, true, REVERSED),
+        masks("120 deg in both, reversed", 120.0, true, REVERSED),
+        masks("60 deg in both, random heading", 60.0, true, RANDOM),
+        masks("120 deg in both, random heading", 120.0, true, RANDOM),
+        change("tilt 3 deg", |number, points| tilted(points, 2.4 * number as f32)),
+        change("16 of 64 rings", |_, points| thinned(points)),
+    ]
+};
+
+/// Means over so many directions of a mask: image, Scan Context, ten aligned by A10 and A10b.
+fn under(stress: &Stress, directions: usize) -> [Score; 4] {
+    let mut mean = [Score { r1: 0.0, f1: 0.0 }; 4];
+    let directions = if stress.width > 0.0 { directions } else { 1 };
+    for number in 0..directions {
+        let mask = (360.0 / directions as f32 * number as f32, stress.width);
+        let map = Scans::new(|_, points| if stress.is_map_masked { masked(points, mask) } else { points.clone() });
+        let asked = Scans::new(|number, points| {
+            masked(&turned(&(stress.change)(number, points), (stress.heading)(number)), mask)
+        });
+        let [image, context] = both(&map, &asked, A10);
+        let aligned = aligned(&map, &asked, A10);
+        let scores = [image, context, verified(&aligned, A10), verified(&aligned, A10B)];
         for (mean, score) in mean.iter_mut().zip(scores) {
-            mean.r1 += score.r1 / 8.0;
-            mean.f1 += score.f1 / 8.0;
+            mean.r1 += score.r1 / directions as f64;
+            mean.f1 += score.f1 / directions as f64;
         }
     }
     mean
 }
 
+/// Masks are looked at in two directions; `AGV_STRESS_DIRECTIONS=8` makes the table of the book.
 #[test]
-fn masked_scans_are_recognised_at_least_as_well_as_by_scan_context() {
+fn changed_scans_are_recognised_at_least_as_well_as_by_scan_context() {
     if drive().is_none() {
         return;
     }
-    for width in [60.0, 120.0] {
-        at_least_as_scan_context(&format!("query {width}"), with_masks(width, false));
-        at_least_as_scan_context(&format!("both, reversed, {width}"), with_masks(width, true));
+    let directions = std::env::var("AGV_STRESS_DIRECTIONS").map_or(2, |count| count.parse().unwrap());
+    let mut short = Vec::new();
+    for stress in &STRESSES {
+        let [image, context, aligned, with_near] = under(stress, directions);
+        report(stress.name, A10, [image, context]);
+        for (protocol, aligned) in [(A10, aligned), (A10B, with_near)] {
+            println!("{} {}, ten aligned: {:.3} / {:.3}", protocol.name, stress.name, aligned.r1, aligned.f1);
+        }
+        let is_ahead = image.r1 >= context.r1 && image.f1 >= context.f1;
+        // By A10 up to three questions of 57 are lost whose nearest place the reference has 5.2 to 5.5 m away.
+        if !(is_ahead && aligned.r1 >= 0.9 && aligned.f1 >= 0.97 && with_near.r1 >= 0.93 && with_near.f1 >= 0.97) {
+            short.push(stress.name);
+        }
     }
-}
-
-#[test]
-fn masked_scans_are_verified() {
-    if drive().is_none() {
-        return;
-    }
-    let mut mean = Score { r1: 0.0, f1: 0.0 };
-    for direction in (0..4).map(|quarter| 90.0 * quarter as f32) {
-        let map = Scans::new(|_, points| masked(points, (direction, 120.0), false));
-        let asked = Scans::new(|_, points| masked(points, (direction, 120.0), true));
-        let found = verified(&map, &asked, A10);
-        println!("A10 both, reversed, 120 at {direction}, verified: {:.3} / {:.3}", found.r1, found.f1);
-        mean.r1 += found.r1 / 4.0;
-        mean.f1 += found.f1 / 4.0;
-    }
-    println!("A10 both, reversed, 120, verified: {:.3} / {:.3}", mean.r1, mean.f1);
-    // Short of what whole scans reach: a third of what the map and the question see is not the same third.
-    assert!(mean.r1 >= 0.8 && mean.f1 >= 0.92, "{mean:?}");
+    assert!(short.is_empty(), "{short:?}");
 }
 
 /// Images that are put together of sectors of others, in runs of random length, turned at random.
@@ -341,21 +389,10 @@ fn the_right_place_is_aligned_among_a_hundred_thousand() {
         };
         asked.iter().filter(has_right).count()
     };
-    let masked = Scans::new(|number, points| masked(points, (37.0 * number as f32, 120.0), true));
+    let masked = Scans::new(|number, points| masked(&turned(points, 180.0), (37.0 * number as f32, 120.0)));
     for (condition, scans, lost) in [("clean", &whole, 7), ("120 deg hidden, reversed", &masked, 32)] {
         let [alone, among] = [found(&few, scans), found(&many, scans)];
         println!("{condition}: right among ten {alone} of {}, among 100,000 others {among}", asked.len());
         assert!(among + lost >= alone && alone > 50, "{condition}");
     }
-}
-
-#[test]
-fn leaning_and_coarse_scans_are_recognised() {
-    if drive().is_none() {
-        return;
-    }
-    let whole = Scans::new(|_, points| points.clone());
-    let leaning = Scans::new(|number, points| tilted(points, 2.4 * number as f32));
-    report("tilt 3 deg", A10, both(&whole, &leaning, A10));
-    at_least_as_scan_context("16 of 64 rings", both(&whole, &Scans::new(|_, points| thinned(points)), A10));
 }

@@ -330,9 +330,11 @@ fn places_of_a_street_are_found_again() {
     assert!(errors.len() > 10 && errors[errors.len() / 2] < 0.05 && errors[errors.len() - 1] < 0.5, "{errors:?}");
     let complaint = refusal(&["lidar3d", "places", "find", poses, scans]);
     assert!(complaint.contains("no file of places"), "{complaint}");
-    let older = files.write("older.places3d", b"AGVP3D\x01\nwhatever");
-    let complaint = refusal(&["lidar3d", "places", "find", &older, scans]);
-    assert!(complaint.contains("index them again"), "{complaint}");
+    for version in [b"AGVP3D\x01\nwhatever", b"AGVP3D\x02\nwhatever"] {
+        let older = files.write("older.places3d", version);
+        let complaint = refusal(&["lidar3d", "places", "find", &older, scans]);
+        assert!(complaint.contains("index them again"), "{complaint}");
+    }
     let complaint = refusal(&["lidar3d", "places", "find", &map, scans, "--method", "aligned", "--check"]);
     assert!(complaint.contains("methods that compare signatures"), "{complaint}");
     let complaint = refusal(&["lidar3d", "places", "index", scans, "--height", "-1", "-o", &map]);

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use agv_lidar3d::place::{
-    BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, Panorama, PlaceImage, Span,
-    from_key_scans,
+    BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, Panorama, PlaceImage, ScoreLimit,
+    Span, from_key_scans,
 };
 use serde::{Deserialize, Serialize};
 
@@ -22,10 +22,10 @@ const NUMBERS_APART: usize = 15;
 const LEARNING_PLACES: usize = 128;
 
 /// First bytes of a file of places: of this program, and their version.
-const MAGIC: [u8; 8] = *b"AGVP3D\x02\n";
+const MAGIC: [u8; 8] = *b"AGVP3D\x03\n";
 
-/// The same of files without images and panoramas.
-const OLDER: [u8; 8] = *b"AGVP3D\x01\n";
+/// The same of files without images and panoramas, and of those with one limit for all places.
+const OLDER: [[u8; 8]; 2] = [*b"AGVP3D\x01\n", *b"AGVP3D\x02\n"];
 
 /// A place as it is stored.
 #[derive(Clone, Debug)]
@@ -49,8 +49,8 @@ pub struct PlaceMap {
     pub rings: usize,
     /// Between which elevations it looks.
     pub span: Span,
-    /// The score from which answers are believed, if it was learnt.
-    pub limit: Option<f32>,
+    /// From which score on answers are believed, if it was learnt.
+    pub limit: Option<ScoreLimit>,
     /// The places.
     pub places: Vec<StoredPlace>,
 }
@@ -138,7 +138,8 @@ struct File {
     rings: u16,
     /// Least and greatest elevation, rad.
     span: [f32; 2],
-    limit: Option<f32>,
+    /// Always, of a place that is like no other one, and per score with another one.
+    limit: Option<[f32; 3]>,
     places: Vec<Entry>,
 }
 
@@ -179,7 +180,7 @@ pub fn write(path: &Path, map: &PlaceMap) -> Result<(), TextFileError> {
         is_height_given: matches!(map.standing, Standing::Given(_)),
         rings: map.rings as u16,
         span: [map.span.least, map.span.most],
-        limit: map.limit,
+        limit: map.limit.map(|limit| [limit.always, limit.unlike, limit.slope]),
         places: places.collect(),
     };
     let failed = |reason: String| TextFileError::of_system(path, std::io::Error::other(reason));
@@ -196,7 +197,9 @@ pub fn read(path: &Path) -> Result<PlaceMap, TextFileError> {
     let foreign =
         || TextFileError::of_line(path, 1, "this is no file of places that 'agv lidar3d places index' has written");
     let old = || TextFileError::of_line(path, 1, "an older version has stored these places: index them again");
-    let body = bytes.strip_prefix(&MAGIC).ok_or_else(|| if bytes.starts_with(&OLDER) { old() } else { foreign() })?;
+    let body = bytes
+        .strip_prefix(&MAGIC)
+        .ok_or_else(|| if OLDER.iter().any(|older| bytes.starts_with(older)) { old() } else { foreign() })?;
     let file: File = postcard::from_bytes(body).map_err(|_| foreign())?;
     map(&file).ok_or_else(foreign)
 }
@@ -211,9 +214,13 @@ fn map(file: &File) -> Option<PlaceMap> {
         standing: if file.is_height_given { Standing::Given(height) } else { Standing::Found(height) },
         rings,
         span,
-        limit: file.limit.filter(|limit| limit.is_finite()),
+        limit: file.limit.filter(|limit| limit.iter().all(|value| value.is_finite())).map(limit),
         places: places?,
     })
+}
+
+fn limit([always, unlike, slope]: [f32; 3]) -> ScoreLimit {
+    ScoreLimit { always, unlike, slope }
 }
 
 fn place(entry: &Entry, rings: usize, span: Span) -> Option<StoredPlace> {

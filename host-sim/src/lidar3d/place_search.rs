@@ -1,7 +1,7 @@
 //! Which stored place a scan is of, and where: the best ten by their images are aligned.
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Asked, Place, PlaceIndex, Pose, Query};
+use agv_lidar3d::place::{Asked, Place, PlaceIndex, Pose, Query, ScoreLimit};
 
 use super::place_map::PlaceMap;
 use super::view::View;
@@ -45,13 +45,13 @@ impl<'a> PlaceSearch<'a> {
         };
         let places: Vec<Place<'a>> = map.places.iter().map(place).collect::<Option<_>>()?;
         let reach = REACH.max(REACH_SHARE * map.spacing().unwrap_or(0.0));
-        let index = PlaceIndex::new(places, reach as f32).with_limit(map.limit.unwrap_or(0.0));
+        let index = PlaceIndex::new(places, reach as f32).with_limit(map.limit.unwrap_or(ScoreLimit::NONE));
         Some(Self { map, index, origin: [x0, y0] })
     }
 
     /// Learns from which score on answers are believed; see [`PlaceIndex::learnt_limit`].
     #[must_use]
-    pub fn learnt_limit(&self, progress: impl FnMut(usize)) -> f32 {
+    pub fn learnt_limit(&self, progress: impl FnMut(usize)) -> ScoreLimit {
         self.index.learnt_limit(progress)
     }
 

@@ -22,6 +22,12 @@ const CELL: f32 = 0.5;
 const CELLS: usize = (2.0 * REACH / CELL) as usize;
 /// A point is there if its range is right to this, m, and this part of the range.
 const TOLERANCE: [f32; 2] = [0.12, 0.008];
+/// The same of a pose that is known to half a metre and two degrees.
+const ROUGHLY: [f32; 2] = [0.5, 0.01];
+/// Points that the panorama knows count for so many of all at the least: a pose that leaves fewer agrees by chance.
+const FEWEST: f32 = 0.25;
+/// Weight of a hidden point among those that contradict.
+const HIDDEN: f32 = 0.5;
 /// Directions that must see farther before a point is seen through.
 const THROUGH: usize = 3;
 
@@ -62,6 +68,21 @@ impl<'a> Voters<'a> {
         self.points.is_empty()
     }
 
+    /// Part of the points of another scan that agree where it lies roughly at a pose in this one, 0 to 1.
+    pub fn rough_agreement(&self, points: &[[f32; 3]], pose: &Pose) -> f32 {
+        let out = pose.out();
+        let (mut agreed, mut all) = (0.0_f32, 0.0_f32);
+        for point in points {
+            match verdict(self.panorama, &self.knows, out(*point), ROUGHLY) {
+                Some(Verdict::There) => (agreed, all) = (agreed + 1.0, all + 1.0),
+                Some(Verdict::Through) => all += 1.0,
+                Some(Verdict::Hidden) => all += HIDDEN,
+                None => {}
+            }
+        }
+        agreed / all.max(FEWEST * points.len() as f32).max(1.0)
+    }
+
     /// Part of the cells that agree where another scan lies at a pose in this one, 0 to 1: the mean of both ways.
     pub fn agreement(&self, other: &Self, pose: &Pose) -> f32 {
         let (out, back) = (pose.out(), pose.back());
@@ -93,7 +114,7 @@ fn agreement(panorama: &Panorama, knows: &[bool; COLUMNS], points: impl Iterator
         let number = at(y) * CELLS + at(x);
         let Some(cell) = cells.get_mut(number).filter(|_| at(x) < CELLS) else { continue };
         let is_first = cell.is_empty();
-        let count = match verdict(panorama, knows, seen) {
+        let count = match verdict(panorama, knows, seen, TOLERANCE) {
             Some(Verdict::There) => &mut cell.there,
             Some(Verdict::Through) => &mut cell.through,
             Some(Verdict::Hidden) => &mut cell.hidden,
@@ -110,7 +131,7 @@ fn agreement(panorama: &Panorama, knows: &[bool; COLUMNS], points: impl Iterator
         // Shares of the points, of the weight of the root of their number.
         let weight = 1.0 / libm::sqrtf(there + through + hidden);
         agreed += weight * there;
-        all += weight * (there + through + 0.5 * hidden);
+        all += weight * (there + through + HIDDEN * hidden);
     }
     if all > 0.0 { agreed / all } else { 0.0 }
 }
@@ -123,13 +144,13 @@ enum Verdict {
 }
 
 /// How a point is seen; None if nobody has looked into its direction, which a mast or a load hides.
-fn verdict(panorama: &Panorama, knows: &[bool; COLUMNS], point: [f32; 3]) -> Option<Verdict> {
+fn verdict(panorama: &Panorama, knows: &[bool; COLUMNS], point: [f32; 3], tolerance: [f32; 2]) -> Option<Verdict> {
     let (column, level) = panorama.column(point);
     if knows.get(column * COLUMNS / panorama.columns()) != Some(&true) {
         return None;
     }
     let Some((row, range)) = panorama.row(point, level) else { return Some(Verdict::Hidden) };
-    let tolerance = TOLERANCE[0] + TOLERANCE[1] * range;
+    let tolerance = tolerance[0] + tolerance[1] * range;
     let (mut looked, mut farther) = (0, 0);
     for i in 0..3 {
         for j in 0..3 {

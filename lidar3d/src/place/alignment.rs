@@ -17,7 +17,12 @@ const POINTS: [usize; 2] = [300, 900];
 /// Coarse starts: turns to both sides of a heading, rad, and steps to the sides, cells of the plan.
 const TURNS: [f32; 5] = [-0.0698, -0.0349, 0.0, 0.0349, 0.0698];
 const STRIDE: usize = 3;
-/// Starts that go on.
+/// Places at each heading that are looked at, how many of all, and how many go on.
+///
+/// Where sensors have hidden sectors, other places often fit the plan better than the right one: the plan does not know
+/// what was seen through.
+const PLACES: usize = 3;
+const LOOKED_AT: usize = 40;
 const STARTS: usize = 4;
 /// Steps of the climb: m and rad, and how often they are halved.
 const CLIMB: [f32; 2] = [0.4, 0.0175];
@@ -26,6 +31,7 @@ const HALVINGS: usize = 5;
 const STEPS: usize = 20;
 /// A refined pose whose score is less by no more than this is the better one: scores do not show centimetres.
 const EQUAL: f32 = 0.02;
+
 /// What an alignment found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
@@ -78,23 +84,34 @@ impl<'a> Stored<'a> {
             return None;
         }
         let [coarse, fine] = &self.plans;
-        let stride = STRIDE as f32 * CELL;
-        let steps = (reach / stride) as usize;
-        let start = |heading: f32| {
-            let (step, fit) = coarse.best_step(&asked.few, heading, steps, STRIDE);
-            (fit, Pose { place: step.map(|step| stride * step as f32), heading })
-        };
-        let turned = headings.iter().flat_map(|heading| TURNS.map(|turn| heading + turn));
-        let mut starts: Vec<(f32, Pose)> = turned.map(start).collect();
-        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let climbed = starts.iter().take(STARTS).map(|(_, pose)| {
-            let pose = climb(coarse, &asked.few, *pose);
+        let climbed = self.starts(asked, headings, reach).into_iter().map(|pose| {
+            let pose = climb(coarse, &asked.few, pose);
             climb(fine, &asked.many, pose)
         });
         let scored = |pose: Pose| Alignment { pose, score: self.voters.agreement(&asked.voters, &pose) };
         let found = climbed.map(scored).max_by(|a, b| a.score.total_cmp(&b.score))?;
         let refined = scored(refined(self.voters.panorama, &asked.many, found.pose));
         Some(if refined.score > found.score - EQUAL { refined } else { found })
+    }
+
+    /// Where the search goes on: of the places that fit the plan, those that agree roughly.
+    fn starts(&self, asked: &Asked<'_>, headings: &[f32], reach: f32) -> Vec<Pose> {
+        let stride = STRIDE as f32 * CELL;
+        let steps = (reach / stride) as usize;
+        let at = |heading: f32| {
+            let found = self.plans[0].best_steps(&asked.few, heading, steps, STRIDE, PLACES).into_iter();
+            found.map(move |(step, fit)| (fit, Pose { place: step.map(|step| stride * step as f32), heading }))
+        };
+        let best_first = |starts: &mut Vec<(f32, Pose)>| starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let turned = headings.iter().flat_map(|heading| TURNS.map(|turn| heading + turn));
+        let mut starts: Vec<(f32, Pose)> = turned.flat_map(at).collect();
+        best_first(&mut starts);
+        starts.truncate(LOOKED_AT);
+        for (fit, pose) in &mut starts {
+            *fit = self.voters.rough_agreement(&asked.few, pose);
+        }
+        best_first(&mut starts);
+        starts.into_iter().take(STARTS).map(|(_, pose)| pose).collect()
     }
 }
 

@@ -80,8 +80,16 @@ impl FloorPlan {
         share(sum, known, points.len())
     }
 
-    /// The best of places up to `steps` times `stride` cells away in each direction, at a heading: steps along x and y, and the fit.
-    pub(super) fn best_step(&self, points: &[[f32; 3]], heading: f32, steps: usize, stride: usize) -> ([i32; 2], f32) {
+    /// The best of places up to `steps` times `stride` cells away in each direction, at a heading: steps along x and y, and the fit,
+    /// best first. Each fits better than those next to it, so at most `count` really different ones are told.
+    pub(super) fn best_steps(
+        &self,
+        points: &[[f32; 3]],
+        heading: f32,
+        steps: usize,
+        stride: usize,
+        count: usize,
+    ) -> Vec<([i32; 2], f32)> {
         let width = 2 * steps + 1;
         let (sin, cos) = libm::sincosf(heading);
         // The cell of the first step; a point outside may step in.
@@ -95,11 +103,24 @@ impl FloorPlan {
             known.fill(0);
             add_steps(&self.known, 1, &cells, stride, width, &mut known);
         }
-        let fits = sums.iter().zip(&known).map(|(sum, known)| share(*sum, *known, points.len()));
-        let (at, fit) = fits.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
+        let fits: Vec<f32> = sums.iter().zip(&known).map(|(sum, known)| share(*sum, *known, points.len())).collect();
         let step = |at: usize| at as i32 - steps as i32;
-        ([step(at % width), step(at / width)], fit)
+        let peaks = (0..fits.len()).filter(|at| is_peak(&fits, width, *at));
+        let mut best: Vec<([i32; 2], f32)> = peaks.map(|at| ([step(at % width), step(at / width)], fits[at])).collect();
+        best.sort_by(|a, b| b.1.total_cmp(&a.1));
+        best.truncate(count);
+        best
     }
+}
+
+/// Whether a step fits better than all next to it; of equal ones the first counts.
+fn is_peak(fits: &[f32], width: usize, at: usize) -> bool {
+    let (row, column) = (at / width, at % width);
+    let rows = row.saturating_sub(1)..=(row + 1).min(width - 1);
+    let columns = column.saturating_sub(1)..=(column + 1).min(width - 1);
+    let next = rows.flat_map(|row| columns.clone().map(move |column| row * width + column));
+    next.filter(|other| *other != at)
+        .all(|other| if other < at { fits[other] < fits[at] } else { fits[other] <= fits[at] })
 }
 
 /// Mean value of the points in known directions, 0 to 1.
@@ -188,7 +209,8 @@ mod tests {
                 .collect();
             let plan = FloorPlan::new(&occupied(&points), 0.45, &[true; COLUMNS]);
             let moved: Vec<[f32; 3]> = points.iter().map(|[x, y, up]| [x - 1.5, y + 0.75, *up]).collect();
-            let (step, fit) = plan.best_step(&moved, 0.0, 4, 3);
+            let told = plan.best_steps(&moved, 0.0, 4, 3, 2);
+            let (step, fit) = told[0];
             let mut best = (0.0_f32, [0, 0]);
             for (i, j) in (-4..=4).flat_map(|j| (-4..=4).map(move |i| (i, j))) {
                 let pose = Pose { place: [0.75 * i as f32, 0.75 * j as f32], heading: 0.0 };
@@ -200,6 +222,10 @@ mod tests {
             assert_eq!(best.1, [2, -1], "{middle:?}");
             assert_eq!(step, best.1, "{middle:?}");
             assert!((fit - best.0).abs() < 1e-6, "{middle:?}: {fit} {}", best.0);
+            // The second is elsewhere, and no better.
+            if let Some(([x, y], second)) = told.get(1) {
+                assert!((x - step[0]).abs().max((y - step[1]).abs()) > 1 && *second <= fit, "{middle:?}: {told:?}");
+            }
         }
     }
 }

@@ -4,12 +4,13 @@
 //! believed is learnt from the map alone: no two of its places that lie apart may be taken for one another. Where another
 //! place agrees nearly as well, the answer is that it is one of them.
 
+use std::collections::BTreeMap;
 use std::vec::Vec;
 
 use super::agreement::Voters;
 use super::image::Likeness;
-use super::look_alikes;
-use super::{Alignment, Asked, AskedImage, Panorama, PlaceImage, Pose, RingKey, SECTORS, Stored};
+use super::look_alikes::LookAlike;
+use super::{Alignment, Asked, AskedImage, Panorama, PlaceImage, Pose, RingKey, SECTORS, ScoreLimit, Stored};
 
 /// Places that are aligned.
 const CANDIDATES: usize = 10;
@@ -40,7 +41,7 @@ pub struct Place<'a> {
 /// An answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// Number of the place.
+    /// Number of the place that is nearest to the pose.
     pub place: usize,
     /// The sensor's pose in the map.
     pub pose: Pose,
@@ -53,6 +54,7 @@ pub struct Answer {
 }
 
 /// Where a scan may have been made.
+#[derive(Clone, Copy)]
 struct Found {
     place: usize,
     /// In the map.
@@ -66,7 +68,7 @@ pub struct PlaceIndex<'a> {
     keys: Vec<RingKey>,
     /// How far from a place a scan may be taken to belong to it, m.
     reach: f32,
-    limit: f32,
+    limit: ScoreLimit,
 }
 
 /// A scan that is asked for.
@@ -78,39 +80,48 @@ pub struct Query<'a> {
 }
 
 impl<'a> PlaceIndex<'a> {
-    /// Of places that lie at most `reach` from where scans are to be recognised, m. Believes every answer.
+    /// Of places that lie at most `reach` from where scans are to be recognised, m. Believes what agrees better than the place does with others.
     #[must_use]
     pub fn new(places: Vec<Place<'a>>, reach: f32) -> Self {
         let keys = places.iter().map(|place| RingKey::new(place.image)).collect();
-        Self { places, keys, reach, limit: 0.0 }
+        Self { places, keys, reach, limit: ScoreLimit::NONE }
     }
 
     /// The same, with a limit that was learnt before.
     #[must_use]
-    pub fn with_limit(self, limit: f32) -> Self {
+    pub fn with_limit(self, limit: ScoreLimit) -> Self {
         Self { limit, ..self }
     }
 
-    /// Learns from which score on answers are believed, from 512 places at the most, as long as ten alignments take for each.
-    /// `progress` is called before each with how many there are.
+    /// Learns from which score on answers are believed, from 512 places at the most, as long as ten alignments take for each, and ten
+    /// more for each other place that one looks like. `progress` is called before each with how many there are.
     #[must_use]
-    pub fn learnt_limit(&self, mut progress: impl FnMut(usize)) -> f32 {
+    pub fn learnt_limit(&self, mut progress: impl FnMut(usize)) -> ScoreLimit {
         let step = self.places.len().div_ceil(LEARNING).max(1);
         let count = self.places.len().div_ceil(step);
-        let learnt = self.places.iter().step_by(step).map(|place| {
+        let mut known = BTreeMap::new();
+        let learnt = self.places.iter().enumerate().step_by(step).filter_map(|(number, place)| {
             progress(count);
-            self.look_alike(place)
+            let best = *best(self.known_look_alikes(number, &mut known))?;
+            let others = self.known_look_alikes(best.place, &mut known).iter();
+            let is_apart = |other: &&Found| self.places.get(other.place).is_some_and(|other| are_apart(other, place));
+            Some(LookAlike { score: best.score, other: greatest(others.filter(is_apart)) })
         });
-        look_alikes::limit(learnt.collect())
+        ScoreLimit::learnt(&learnt.collect::<Vec<_>>())
     }
 
-    /// The greatest score of a place with another one of the map that lies apart. Pairs that are aligned to the very spot where
-    /// both lie see the same things rightly, and teach nothing.
-    fn look_alike(&self, place: &Place<'_>) -> f32 {
+    /// What [`Self::look_alikes`] finds of the place of that number, once.
+    fn known_look_alikes<'k>(&self, number: usize, known: &'k mut BTreeMap<usize, Vec<Found>>) -> &'k [Found] {
+        let found = || self.places.get(number).map(|place| self.look_alikes(place)).unwrap_or_default();
+        known.entry(number).or_insert_with(found)
+    }
+
+    /// Where a place may be taken to lie among others of the map. Pairs that are aligned to the very spot where both lie see the same
+    /// things rightly, and teach nothing.
+    fn look_alikes(&self, place: &Place<'_>) -> Vec<Found> {
         let scan = Asked::new(place.panorama, place.panorama.points());
-        let found = self.found(place.image, &scan, Some(place));
-        let others = found.into_iter().filter(|found| found.pose.apart(&place.pose) > SAME_SPOT);
-        others.map(|found| found.score).fold(0.0, f32::max)
+        let found = self.found(place.image, &scan, Some(place)).into_iter();
+        found.filter(|found| found.pose.apart(&place.pose) > SAME_SPOT).collect()
     }
 
     /// The places whose images are most alike to one, best first: those that are aligned.
@@ -123,13 +134,14 @@ impl<'a> PlaceIndex<'a> {
     #[must_use]
     pub fn find(&self, query: &Query<'_>) -> Option<Answer> {
         let found = self.found(query.image, &query.scan, None);
-        let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let best = best(&found)?;
+        let look_alike = greatest(self.look_alikes(self.places.get(best.place)?).iter());
         let is_rival = |other: &Found| other.pose.apart(&best.pose) > SAME_SPOT && other.score > best.score - GAP;
         Some(Answer {
-            place: best.place,
+            place: self.nearest(&best.pose, 1, |_, _| true).first().map_or(best.place, |(number, _)| *number),
             pose: best.pose,
             score: best.score,
-            is_believed: best.score > self.limit && best.score > self.look_alike(self.places.get(best.place)?),
+            is_believed: self.limit.believes(best.score, look_alike),
             is_ambiguous: found.iter().any(is_rival),
         })
     }
@@ -137,7 +149,7 @@ impl<'a> PlaceIndex<'a> {
     /// Where a scan may have been made: aligned to the places most alike. If it is that of a place of the map, only those count
     /// that lie apart from it.
     fn found(&self, image: &PlaceImage, scan: &Asked<'_>, own: Option<&Place<'_>>) -> Vec<Found> {
-        let is_apart = |other: &Place<'_>| own.is_none_or(|own| other.pose.apart(&own.pose) > APART);
+        let is_apart = |other: &Place<'_>| own.is_none_or(|own| are_apart(other, own));
         let found = |(likeness, number): (Likeness, usize)| {
             let aligned = self.aligned(number, &likeness, scan)?;
             let pose = aligned.pose.within(&self.places.get(number)?.pose);
@@ -156,17 +168,27 @@ impl<'a> PlaceIndex<'a> {
         let is_other = |number: usize, place: &Place<'_>| {
             number != aligned && own.is_none_or(|own| !core::ptr::eq(own.panorama, place.panorama))
         };
-        let mut next: Vec<(f32, &Place<'a>)> = Vec::with_capacity(NEIGHBOURS + 1);
+        self.nearest(pose, NEIGHBOURS, is_other).into_iter().map(|(_, place)| place).collect()
+    }
+
+    /// So many places next to a pose, nearest first, of those in its neighbourhood that are wanted.
+    fn nearest(
+        &self,
+        pose: &Pose,
+        count: usize,
+        is_wanted: impl Fn(usize, &Place<'_>) -> bool,
+    ) -> Vec<(usize, &Place<'a>)> {
+        let apart = |place: &Place<'_>| place.pose.apart(pose);
+        let mut next: Vec<(usize, &Place<'a>)> = Vec::with_capacity(count + 1);
         for (number, place) in self.places.iter().enumerate() {
-            let apart = place.pose.apart(pose);
-            let is_nearer = next.len() < NEIGHBOURS || next.last().is_some_and(|(last, _)| apart < *last);
-            if apart <= NEIGHBOURHOOD * self.reach && is_nearer && is_other(number, place) {
-                let at = next.partition_point(|(other, _)| *other <= apart);
-                next.insert(at, (apart, place));
-                next.truncate(NEIGHBOURS);
+            let is_nearer = next.len() < count || next.last().is_some_and(|(_, last)| apart(place) < apart(last));
+            if apart(place) <= NEIGHBOURHOOD * self.reach && is_nearer && is_wanted(number, place) {
+                let at = next.partition_point(|(_, other)| apart(other) <= apart(place));
+                next.insert(at, (number, place));
+                next.truncate(count);
             }
         }
-        next.into_iter().map(|(_, place)| place).collect()
+        next
     }
 
     /// The places whose images are most alike, of those that are wanted, best first.
@@ -198,4 +220,17 @@ impl<'a> PlaceIndex<'a> {
         let found = Stored::new(self.places.get(number)?.panorama).align(scan, &headings, self.reach)?;
         (libm::hypotf(found.pose.place[0], found.pose.place[1]) <= self.reach).then_some(found)
     }
+}
+
+/// Whether two places are different ones.
+fn are_apart(one: &Place<'_>, other: &Place<'_>) -> bool {
+    one.pose.apart(&other.pose) > APART
+}
+
+fn best(found: &[Found]) -> Option<&Found> {
+    found.iter().max_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+fn greatest<'f>(found: impl Iterator<Item = &'f Found>) -> f32 {
+    found.map(|found| found.score).fold(0.0, f32::max)
 }
