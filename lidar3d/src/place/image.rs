@@ -3,6 +3,10 @@
 //! The bins are those of Scan Context (Kim and Kim 2018). As a mast or a load hides whole sectors, a sector of which hardly
 //! a beam comes back is not known, and no distance counts it.
 
+use core::ops::Range;
+
+use wide::{i16x8, i32x4};
+
 use super::Floor;
 use super::arctangent::sector_of;
 use super::levelled::Block;
@@ -83,6 +87,14 @@ impl PlaceImage {
         self.bins.map(|rings| rings.iter().map(|bin| u32::from(*bin) * u32::from(*bin)).sum())
     }
 
+    fn factors(&self) -> Bins {
+        self.bins.map(|rings| rings.map(i16::from))
+    }
+
+    fn masks(&self) -> Masks {
+        core::array::from_fn(|sector| if self.known >> sector & 1 == 1 { u32::MAX } else { 0 })
+    }
+
     /// As it is stored: bins, sector after sector, and a bit a sector that it knows.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -107,9 +119,10 @@ impl PlaceImage {
         (known >> SECTORS == 0 && bins.iter().enumerate().all(is_empty)).then_some(Self { bins, known })
     }
 
-    /// Rings of the sectors that it knows.
-    pub(super) fn sectors(&self) -> impl Iterator<Item = &[u8; RINGS]> {
-        self.bins.iter().enumerate().filter(|(sector, _)| self.known >> sector & 1 == 1).map(|(_, rings)| rings)
+    /// Rings of those of some sectors that it knows.
+    pub(super) fn known_of(&self, sectors: Range<usize>) -> impl Iterator<Item = &[u8; RINGS]> {
+        let bins = sectors.clone().zip(self.bins.get(sectors).unwrap_or_default());
+        bins.filter(|(sector, _)| self.known >> sector & 1 == 1).map(|(_, rings)| rings)
     }
 
     /// Number of sectors that it knows.
@@ -119,12 +132,29 @@ impl PlaceImage {
     }
 }
 
+/// Bins that are multiplied at once; all are a multiple of it.
+const LANES: usize = 8;
+const _: () = assert!((SECTORS * RINGS).is_multiple_of(LANES));
+
+/// Bins as they are multiplied.
+type Bins = [[i16; RINGS]; SECTORS];
+
+/// All ones for a sector that is known.
+type Masks = [u32; SECTORS];
+
 /// An image that is asked for, ready to be compared with many.
 #[derive(Clone, Debug)]
 pub struct AskedImage {
     /// Its sectors, twice round.
-    bins: [[[u8; RINGS]; SECTORS]; 2],
-    known: u64,
+    bins: [Bins; 2],
+    known: [Masks; 2],
+    squares: [[u32; SECTORS]; 2],
+}
+
+/// A stored image, ready to be compared at all turns.
+struct StoredImage {
+    bins: Bins,
+    known: Masks,
     squares: [u32; SECTORS],
 }
 
@@ -132,16 +162,16 @@ impl AskedImage {
     /// Of an image.
     #[must_use]
     pub fn new(image: &PlaceImage) -> Self {
-        Self { bins: [image.bins; 2], known: image.known, squares: image.squares() }
+        Self { bins: [image.factors(); 2], known: [image.masks(); 2], squares: [image.squares(); 2] }
     }
 
     /// How alike it is to a stored one: see [`PlaceImage::likeness`].
     #[must_use]
     pub fn likeness(&self, stored: &PlaceImage) -> Option<Likeness> {
-        let squares = stored.squares();
+        let stored = StoredImage { bins: stored.factors(), known: stored.masks(), squares: stored.squares() };
         let mut distances = [f32::MAX; SECTORS];
         for (turn, distance) in distances.iter_mut().enumerate() {
-            *distance = self.distance_at(stored, &squares, turn);
+            *distance = self.distance_at(&stored, turn);
         }
         let best = |except: Option<usize>| {
             let turns =
@@ -154,24 +184,26 @@ impl AskedImage {
     }
 
     /// Distance where the asked scene is turned by so many sectors.
-    fn distance_at(&self, stored: &PlaceImage, squares: &[u32; SECTORS], turn: usize) -> f32 {
-        const ALL: u64 = (1 << SECTORS) - 1;
-        // The sectors of the asked image, turned back.
-        let known = if turn == 0 { self.known } else { (self.known >> turn | self.known << (SECTORS - turn)) & ALL };
-        let common = known & stored.known;
-        if common.count_ones() < LEAST_SECTORS {
+    fn distance_at(&self, stored: &StoredImage, turn: usize) -> f32 {
+        // No sum comes near to what it can hold; unchecked, they are added side by side.
+        let turned = |of: &[[u32; SECTORS]; 2]| -> [u32; SECTORS] {
+            let sectors = of.as_flattened().get(turn..turn + SECTORS);
+            sectors.and_then(|sectors| sectors.try_into().ok()).unwrap_or([0; SECTORS])
+        };
+        let (known, squares) = (turned(&self.known), turned(&self.squares));
+        let common = known.iter().zip(&stored.known).map(|(one, other)| one & other & 1).fold(0, u32::wrapping_add);
+        if common < LEAST_SECTORS {
             return f32::MAX;
         }
-        let turned = self.bins.as_flattened().get(turn..turn + SECTORS).unwrap_or_default();
+        let bins = self.bins.as_flattened().get(turn..turn + SECTORS).unwrap_or_default();
         // What one of them does not know is empty there.
-        let pairs = stored.bins.as_flattened().iter().zip(turned.as_flattened());
-        let both: u32 = pairs.map(|(a, b)| u32::from(*a) * u32::from(*b)).sum();
-        let length = |squares: &[u32; SECTORS], known: u64| -> u32 {
-            squares.iter().enumerate().map(|(sector, square)| (known >> sector & 1) as u32 * square).sum()
+        let lanes = |bins| <[i16]>::as_chunks::<LANES>(bins).0.iter().map(|lanes| i16x8::new(*lanes));
+        let pairs = lanes(stored.bins.as_flattened()).zip(lanes(bins.as_flattened()));
+        let both: i32 = pairs.fold(i32x4::default(), |sum, (a, b)| sum + a.dot(b)).reduce_add();
+        let length = |squares: &[u32; SECTORS], known: &Masks| -> u32 {
+            squares.iter().zip(known).map(|(square, known)| square & known).fold(0, u32::wrapping_add)
         };
-        let own = length(squares, common);
-        let other =
-            length(&self.squares, if turn == 0 { common } else { (common << turn | common >> (SECTORS - turn)) & ALL });
+        let (own, other) = (length(&stored.squares, &known), length(&squares, &stored.known));
         if own == 0 || other == 0 {
             return f32::MAX;
         }

@@ -110,7 +110,7 @@ mod tests {
     /// A hall whose corners look alike: what is believed elsewhere is not believed there.
     #[test]
     fn a_place_with_a_twin_has_a_higher_limit() {
-        let off = |number: usize| 0.02 * libm::sinf(12.9 * number as f32);
+        let off = |number: usize| 0.01 * (libm::sinf(12.9 * number as f32) + libm::sinf(7.3 * number as f32));
         let corner = |number: usize| LookAlike { score: 0.78 + off(number), other: 0.76 + off(number + 3) };
         let aisle = |number: usize| LookAlike { score: 0.55 + off(number), other: 0.54 + off(number + 5) };
         let pairs: Vec<LookAlike> = (0..16).map(corner).chain((0..84).map(aisle)).collect();

@@ -50,5 +50,5 @@ pub use plane_fit::fitted_surfaces;
 pub use pose::Pose;
 #[cfg(feature = "std")]
 pub use recognition::{Answer, Place, PlaceIndex, Query};
-pub use ring_key::RingKey;
+pub use ring_key::{AskedKey, RingKey};
 pub use threshold::from_key_scans;

@@ -10,7 +10,7 @@ use std::vec::Vec;
 use super::agreement::Voters;
 use super::image::Likeness;
 use super::look_alikes::LookAlike;
-use super::{Alignment, Asked, AskedImage, Panorama, PlaceImage, Pose, RingKey, SECTORS, ScoreLimit, Stored};
+use super::{Alignment, Asked, AskedImage, AskedKey, Panorama, PlaceImage, Pose, RingKey, SECTORS, ScoreLimit, Stored};
 
 /// Places that are aligned.
 const CANDIDATES: usize = 10;
@@ -198,18 +198,19 @@ impl<'a> PlaceIndex<'a> {
             let place = self.places.get(number).filter(|place| is_wanted(place))?;
             Some((asked.likeness(place.image)?, number))
         };
-        let mut alike: Vec<_> = self.near(&RingKey::new(image)).into_iter().filter_map(compare).collect();
+        let mut alike: Vec<_> = self.near(&AskedKey::new(image)).into_iter().filter_map(compare).collect();
         alike.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
         alike.truncate(CANDIDATES);
         alike
     }
 
     /// The places whose keys are nearest.
-    fn near(&self, asked: &RingKey) -> Vec<usize> {
+    fn near(&self, asked: &AskedKey) -> Vec<usize> {
         let mut numbers: Vec<usize> = (0..self.places.len()).collect();
         if numbers.len() > COMPARED {
-            let distances: Vec<u32> = self.keys.iter().map(|key| key.square_distance(asked)).collect();
-            numbers.select_nth_unstable_by_key(COMPARED, |number| distances.get(*number).copied());
+            let distances: Vec<f32> = self.keys.iter().map(|key| asked.square_distance(key)).collect();
+            let distance = |number: &usize| distances.get(*number).copied().unwrap_or(f32::MAX);
+            numbers.select_nth_unstable_by(COMPARED, |a, b| distance(a).total_cmp(&distance(b)));
             numbers.truncate(COMPARED);
         }
         numbers
