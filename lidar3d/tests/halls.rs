@@ -9,7 +9,7 @@ mod support;
 use std::f32::consts::{PI, TAU};
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Asked, Floor, Panorama, Place, PlaceImage, PlaceIndex, Pose, Query, ScoreLimit, Span};
+use agv_lidar3d::place::{Asked, Floor, Panorama, Place, PlaceImage, PlaceIndex, Pose, Query, Span};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::scan_context::ScanContext;
@@ -227,7 +227,7 @@ struct Outcome {
     verified: Vec<(f32, bool)>,
     believed: [usize; 2],
     ambiguous: usize,
-    limit: ScoreLimit,
+    limit: f32,
     errors: Vec<f32>,
 }
 
@@ -291,7 +291,7 @@ fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
         let scan = Asked::new(&asked.panorama, asked.points.iter().copied());
         let Some(answer) = index.find(&Query { image: &asked.image, scan }) else { continue };
         let is_right = places[answer.place].pose.apart(&pose) <= RIGHT && answer.pose.apart(&pose) < 0.5;
-        outcome.verified.push((1.0 - answer.score, is_right));
+        outcome.verified.push((1.0 - answer.agreement.score, is_right));
         outcome.ambiguous += usize::from(answer.is_ambiguous);
         if answer.is_believed {
             outcome.believed[usize::from(!is_right)] += 1;
@@ -343,10 +343,9 @@ fn places_in_halls_are_told_apart_by_alignment() {
         let context = best_f1(&outcome.context, outcome.answerable);
         let recall = right as f32 / outcome.answerable as f32;
         println!(
-            "{hall:?} {rings}, seed {seed}: F1 verified {verified:.3}, Scan Context {context:.3}; limit {:.2} or {:.2}: recall \
+            "{hall:?} {rings}, seed {seed}: F1 verified {verified:.3}, Scan Context {context:.3}; limit {:.2}: recall \
              {recall:.3}, {wrong} wrong of {queries}; {} ambiguous; {:.0} mm",
-            outcome.limit.always,
-            outcome.limit.unlike + outcome.limit.slope * 0.5,
+            outcome.limit,
             outcome.ambiguous,
             1e3 * outcome.errors.get(outcome.errors.len() / 2).copied().unwrap_or(f32::NAN)
         );

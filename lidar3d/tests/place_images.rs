@@ -203,8 +203,9 @@ fn aligned(map: &Scans, asked: &Scans, protocol: Protocol) -> Vec<Vec<Option<(f6
             let began = std::time::Instant::now();
             let alignment = stored[node].as_ref().unwrap().align(&scan, &headings, 6.0);
             seconds.push(began.elapsed().as_secs_f64());
-            found[query][node] = alignment
-                .map(|Alignment { pose: Pose { place: [x, y], .. }, score }| (f64::from(x.hypot(y)), f64::from(score)));
+            found[query][node] = alignment.map(|Alignment { pose: Pose { place: [x, y], .. }, agreement }| {
+                (f64::from(x.hypot(y)), f64::from(agreement.score))
+            });
         }
     }
     seconds.sort_by(f64::total_cmp);

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use agv_lidar3d::place::{
-    BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, Panorama, PlaceImage, ScoreLimit,
-    Span, from_key_scans,
+    BINS, DIRECTIONS, ENRICHED_LENGTH, Enriched, Facing, Histogram, Orientation, Panorama, PlaceImage, Span,
+    from_key_scans,
 };
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ const LEARNING_PLACES: usize = 128;
 /// First bytes of a file of places: of this program, and their version.
 const MAGIC: [u8; 8] = *b"AGVP3D\x03\n";
 
-/// The same of files without images and panoramas, and of those with one limit for all places.
+/// The same of files without images and panoramas, and of those whose limit is one of scores.
 const OLDER: [[u8; 8]; 2] = [*b"AGVP3D\x01\n", *b"AGVP3D\x02\n"];
 
 /// A place as it is stored.
@@ -49,8 +49,8 @@ pub struct PlaceMap {
     pub rings: usize,
     /// Between which elevations it looks.
     pub span: Span,
-    /// From which score on answers are believed, if it was learnt.
-    pub limit: Option<ScoreLimit>,
+    /// The agreement of what is visible from which on answers are believed, if it was learnt.
+    pub limit: Option<f32>,
     /// The places.
     pub places: Vec<StoredPlace>,
 }
@@ -138,8 +138,7 @@ struct File {
     rings: u16,
     /// Least and greatest elevation, rad.
     span: [f32; 2],
-    /// Always, of a place that is like no other one, and per score with another one.
-    limit: Option<[f32; 3]>,
+    limit: Option<f32>,
     places: Vec<Entry>,
 }
 
@@ -180,7 +179,7 @@ pub fn write(path: &Path, map: &PlaceMap) -> Result<(), TextFileError> {
         is_height_given: matches!(map.standing, Standing::Given(_)),
         rings: map.rings as u16,
         span: [map.span.least, map.span.most],
-        limit: map.limit.map(|limit| [limit.always, limit.unlike, limit.slope]),
+        limit: map.limit,
         places: places.collect(),
     };
     let failed = |reason: String| TextFileError::of_system(path, std::io::Error::other(reason));
@@ -214,13 +213,9 @@ fn map(file: &File) -> Option<PlaceMap> {
         standing: if file.is_height_given { Standing::Given(height) } else { Standing::Found(height) },
         rings,
         span,
-        limit: file.limit.filter(|limit| limit.iter().all(|value| value.is_finite())).map(limit),
+        limit: file.limit.filter(|limit| limit.is_finite()),
         places: places?,
     })
-}
-
-fn limit([always, unlike, slope]: [f32; 3]) -> ScoreLimit {
-    ScoreLimit { always, unlike, slope }
 }
 
 fn place(entry: &Entry, rings: usize, span: Span) -> Option<StoredPlace> {

@@ -1,7 +1,7 @@
 //! Which stored place a scan is of, and where: the best ten by their images are aligned.
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Asked, Place, PlaceIndex, Pose, Query, ScoreLimit};
+use agv_lidar3d::place::{Agreement, Asked, Place, PlaceIndex, Pose, Query};
 
 use super::place_map::PlaceMap;
 use super::view::View;
@@ -25,9 +25,9 @@ pub struct FoundPlace {
     pub place: usize,
     /// x, y (m) and heading (rad) of the sensor.
     pub pose: [f64; 3],
-    /// Part of the floor plan that agrees, 0 to 1.
-    pub score: f32,
-    /// Whether that is more than any two different places of the map have in common.
+    /// How much of the floor plan agrees.
+    pub agreement: Agreement,
+    /// Whether of what is visible more agrees than the map has taught that different places have in common.
     pub is_believed: bool,
     /// Whether another place agrees nearly as well.
     pub is_ambiguous: bool,
@@ -45,13 +45,13 @@ impl<'a> PlaceSearch<'a> {
         };
         let places: Vec<Place<'a>> = map.places.iter().map(place).collect::<Option<_>>()?;
         let reach = REACH.max(REACH_SHARE * map.spacing().unwrap_or(0.0));
-        let index = PlaceIndex::new(places, reach as f32).with_limit(map.limit.unwrap_or(ScoreLimit::NONE));
+        let index = PlaceIndex::new(places, reach as f32).with_limit(map.limit.unwrap_or(0.0));
         Some(Self { map, index, origin: [x0, y0] })
     }
 
-    /// Learns from which score on answers are believed; see [`PlaceIndex::learnt_limit`].
+    /// Learns from which agreement on answers are believed; see [`PlaceIndex::learnt_limit`].
     #[must_use]
-    pub fn learnt_limit(&self, progress: impl FnMut(usize)) -> ScoreLimit {
+    pub fn learnt_limit(&self, progress: impl FnMut(usize)) -> f32 {
         self.index.learnt_limit(progress)
     }
 
@@ -67,7 +67,7 @@ impl<'a> PlaceSearch<'a> {
         Some(FoundPlace {
             place: answer.place,
             pose: [self.origin[0] + x, self.origin[1] + y, f64::from(answer.pose.heading)],
-            score: answer.score,
+            agreement: answer.agreement,
             is_believed: answer.is_believed,
             is_ambiguous: answer.is_ambiguous,
         })

@@ -263,7 +263,7 @@ impl Test<'_> {
             let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
             let found = Stored::new(&self.stored[node].view.panorama).align(&scan, &headings, REACH)?;
             let is_near = f64::from(found.pose.place[0].hypot(found.pose.place[1])) <= self.protocol.right;
-            is_near.then_some((1.0 - f64::from(found.score), node))
+            is_near.then_some((1.0 - f64::from(found.agreement.score), node))
         });
         found.min_by(|a, b| a.0.total_cmp(&b.0))
     }

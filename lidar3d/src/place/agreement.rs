@@ -26,6 +26,8 @@ const TOLERANCE: [f32; 2] = [0.12, 0.008];
 const ROUGHLY: [f32; 2] = [0.5, 0.01];
 /// Points that the panorama knows count for so many of all at the least: a pose that leaves fewer agrees by chance.
 const FEWEST: f32 = 0.25;
+/// What both see counts for so much of all at the least.
+const LEAST_SEEN: f32 = 0.1;
 /// Weight of a hidden point among those that contradict.
 const HIDDEN: f32 = 0.5;
 /// Directions that must see farther before a point is seen through.
@@ -42,6 +44,28 @@ struct Cell {
 impl Cell {
     fn is_empty(self) -> bool {
         self.there == 0 && self.through == 0 && self.hidden == 0
+    }
+}
+
+/// How much of two scans agrees, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// Part of the cells of the floor plan that is there for both, one that is hidden counting half: by it poses are compared.
+    pub score: f32,
+    /// Part of what both see that is the same: what is hidden from one of them says neither.
+    pub visible: f32,
+}
+
+impl Agreement {
+    /// None of none.
+    pub(super) fn mean(all: impl Iterator<Item = Self>) -> Self {
+        let (mut sum, mut count) = (Self { score: 0.0, visible: 0.0 }, 0.0_f32);
+        for one in all {
+            sum = Self { score: sum.score + one.score, visible: sum.visible + one.visible };
+            count += 1.0;
+        }
+        let share = 1.0 / count.max(1.0);
+        Self { score: sum.score * share, visible: sum.visible * share }
     }
 }
 
@@ -83,14 +107,14 @@ impl<'a> Voters<'a> {
         agreed / all.max(FEWEST * points.len() as f32).max(1.0)
     }
 
-    /// Part of the cells that agree where another scan lies at a pose in this one, 0 to 1: the mean of both ways.
-    pub fn agreement(&self, other: &Self, pose: &Pose) -> f32 {
+    /// How much agrees where another scan lies at a pose in this one: the mean of both ways.
+    pub fn agreement(&self, other: &Self, pose: &Pose) -> Agreement {
         let (out, back) = (pose.out(), pose.back());
         let there = other.points.iter().map(|point| out(*point));
         let here = self.points.iter().map(|point| (back(*point), *point));
         let from_here = agreement(self.panorama, &self.knows, there.map(|point| (point, point)));
         let from_there = agreement(other.panorama, &other.knows, here);
-        0.5 * (from_here + from_there)
+        Agreement::mean([from_here, from_there].into_iter())
     }
 }
 
@@ -104,9 +128,13 @@ pub(super) fn thinned(points: &[[f32; 3]], count: usize) -> Vec<[f32; 3]> {
     points.iter().step_by(points.len().div_ceil(count).max(1)).copied().collect()
 }
 
-/// Part of the cells of the floor plan that agree, 0 to 1, where the panorama knows these directions. Of each point: where it is
-/// for the panorama, and where it is for the plan.
-fn agreement(panorama: &Panorama, knows: &[bool; COLUMNS], points: impl Iterator<Item = ([f32; 3], [f32; 3])>) -> f32 {
+/// How much of the cells of the floor plan agrees where the panorama knows these directions. Of each point: where it is for the
+/// panorama, and where it is for the plan.
+fn agreement(
+    panorama: &Panorama,
+    knows: &[bool; COLUMNS],
+    points: impl Iterator<Item = ([f32; 3], [f32; 3])>,
+) -> Agreement {
     let mut cells = vec![Cell::default(); CELLS * CELLS];
     let mut voting = Vec::new();
     for (seen, [x, y, _]) in points {
@@ -125,15 +153,17 @@ fn agreement(panorama: &Panorama, knows: &[bool; COLUMNS], points: impl Iterator
             voting.push(number);
         }
     }
-    let (mut agreed, mut all) = (0.0, 0.0);
+    let (mut agreed, mut seen, mut all) = (0.0_f32, 0.0_f32, 0.0_f32);
     for Cell { there, through, hidden } in voting.into_iter().filter_map(|number| cells.get(number).copied()) {
         let [there, through, hidden] = [there, through, hidden].map(f32::from);
         // Shares of the points, of the weight of the root of their number.
         let weight = 1.0 / libm::sqrtf(there + through + hidden);
         agreed += weight * there;
-        all += weight * (there + through + HIDDEN * hidden);
+        seen += weight * (there + through);
+        all += weight * (there + through + hidden);
     }
-    if all > 0.0 { agreed / all } else { 0.0 }
+    let share = |of: f32| if of > 0.0 { agreed / of } else { 0.0 };
+    Agreement { score: share(seen + HIDDEN * (all - seen)), visible: share(seen.max(LEAST_SEEN * all)) }
 }
 
 /// How a point is seen.

@@ -4,7 +4,7 @@
 
 use std::vec::Vec;
 
-use super::agreement::{Voters, is_standing, thinned};
+use super::agreement::{Agreement, Voters, is_standing, thinned};
 use super::floor_plan::{CELL, FloorPlan, occupied};
 use super::panorama::Panorama;
 use super::pose::Pose;
@@ -37,8 +37,8 @@ const EQUAL: f32 = 0.02;
 pub struct Alignment {
     /// Where the asked scan lies in the stored place.
     pub pose: Pose,
-    /// Part of the cells of the floor plan that agree, 0 to 1.
-    pub score: f32,
+    /// How much of the floor plan agrees.
+    pub agreement: Agreement,
 }
 
 /// A stored place, ready for alignments.
@@ -88,10 +88,10 @@ impl<'a> Stored<'a> {
             let pose = climb(coarse, &asked.few, pose);
             climb(fine, &asked.many, pose)
         });
-        let scored = |pose: Pose| Alignment { pose, score: self.voters.agreement(&asked.voters, &pose) };
-        let found = climbed.map(scored).max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let scored = |pose: Pose| Alignment { pose, agreement: self.voters.agreement(&asked.voters, &pose) };
+        let found = climbed.map(scored).max_by(|a, b| a.agreement.score.total_cmp(&b.agreement.score))?;
         let refined = scored(refined(self.voters.panorama, &asked.many, found.pose));
-        Some(if refined.score > found.score - EQUAL { refined } else { found })
+        Some(if refined.agreement.score > found.agreement.score - EQUAL { refined } else { found })
     }
 
     /// Where the search goes on: of the places that fit the plan, those that agree roughly.

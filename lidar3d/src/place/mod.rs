@@ -32,6 +32,8 @@ mod solved;
 mod threshold;
 
 #[cfg(feature = "std")]
+pub use agreement::Agreement;
+#[cfg(feature = "std")]
 pub use alignment::{Alignment, Asked, Stored};
 pub use enriched::{ENRICHED_LENGTH, Enriched};
 pub use facing::{Facing, relative_turn};
@@ -39,8 +41,6 @@ pub use floor::Floor;
 pub use histogram::{BINS, Histogram, chi_square, normalised_chi_square, normalised_sorensen, sorensen};
 pub use image::{AskedImage, Likeness, PlaceImage, RINGS, SECTORS};
 pub use key_signatures::KeySignatures;
-#[cfg(feature = "std")]
-pub use look_alikes::ScoreLimit;
 pub use loop_closure::{Limits, loop_closure};
 pub use normals::{Neighbours, surfaces, vertical_parts};
 pub use orientation::{DIRECTIONS, Orientation};

@@ -4,13 +4,12 @@
 //! believed is learnt from the map alone: no two of its places that lie apart may be taken for one another. Where another
 //! place agrees nearly as well, the answer is that it is one of them.
 
-use std::collections::BTreeMap;
 use std::vec::Vec;
 
-use super::agreement::Voters;
+use super::agreement::{Agreement, Voters};
 use super::image::Likeness;
-use super::look_alikes::LookAlike;
-use super::{Alignment, Asked, AskedImage, AskedKey, Panorama, PlaceImage, Pose, RingKey, SECTORS, ScoreLimit, Stored};
+use super::look_alikes::limit;
+use super::{Alignment, Asked, AskedImage, AskedKey, Panorama, PlaceImage, Pose, RingKey, SECTORS, Stored};
 
 /// Places that are aligned.
 const CANDIDATES: usize = 10;
@@ -45,9 +44,10 @@ pub struct Answer {
     pub place: usize,
     /// The sensor's pose in the map.
     pub pose: Pose,
-    /// Part of the floor plan that agrees, 0 to 1: the mean of the place and of those next to the pose.
-    pub score: f32,
-    /// Whether the score is above the limit that the map teaches, and above all that the place has with others of the map.
+    /// How much of the floor plan agrees: the mean of the place and of those next to the pose.
+    pub agreement: Agreement,
+    /// Whether what is visible agrees by more than the limit that the map teaches, and by more than it does between the place and
+    /// others of the map.
     pub is_believed: bool,
     /// Whether another pose agrees nearly as well.
     pub is_ambiguous: bool,
@@ -59,7 +59,7 @@ struct Found {
     place: usize,
     /// In the map.
     pose: Pose,
-    score: f32,
+    agreement: Agreement,
 }
 
 /// Stored places, ready to be asked.
@@ -68,7 +68,7 @@ pub struct PlaceIndex<'a> {
     keys: Vec<RingKey>,
     /// How far from a place a scan may be taken to belong to it, m.
     reach: f32,
-    limit: ScoreLimit,
+    limit: f32,
 }
 
 /// A scan that is asked for.
@@ -84,43 +84,36 @@ impl<'a> PlaceIndex<'a> {
     #[must_use]
     pub fn new(places: Vec<Place<'a>>, reach: f32) -> Self {
         let keys = places.iter().map(|place| RingKey::new(place.image)).collect();
-        Self { places, keys, reach, limit: ScoreLimit::NONE }
+        Self { places, keys, reach, limit: 0.0 }
     }
 
     /// The same, with a limit that was learnt before.
     #[must_use]
-    pub fn with_limit(self, limit: ScoreLimit) -> Self {
+    pub fn with_limit(self, limit: f32) -> Self {
         Self { limit, ..self }
     }
 
-    /// Learns from which score on answers are believed, from 512 places at the most, as long as ten alignments take for each, and ten
-    /// more for each other place that one looks like. `progress` is called before each with how many there are.
+    /// Learns from which agreement of what is visible on answers are believed, from 512 places at the most, as long as ten alignments
+    /// take for each. `progress` is called before each with how many there are.
     #[must_use]
-    pub fn learnt_limit(&self, mut progress: impl FnMut(usize)) -> ScoreLimit {
+    pub fn learnt_limit(&self, mut progress: impl FnMut(usize)) -> f32 {
         let step = self.places.len().div_ceil(LEARNING).max(1);
         let count = self.places.len().div_ceil(step);
-        let mut known = BTreeMap::new();
-        let learnt = self.places.iter().enumerate().step_by(step).filter_map(|(number, place)| {
+        let (mut alike, mut same) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for (number, place) in self.places.iter().enumerate().step_by(step) {
             progress(count);
-            let best = *best(self.known_look_alikes(number, &mut known))?;
-            let others = self.known_look_alikes(best.place, &mut known).iter();
-            let is_apart = |other: &&Found| self.places.get(other.place).is_some_and(|other| are_apart(other, place));
-            Some(LookAlike { score: best.score, other: greatest(others.filter(is_apart)) })
-        });
-        ScoreLimit::learnt(&learnt.collect::<Vec<_>>())
-    }
-
-    /// What [`Self::look_alikes`] finds of the place of that number, once.
-    fn known_look_alikes<'k>(&self, number: usize, known: &'k mut BTreeMap<usize, Vec<Found>>) -> &'k [Found] {
-        let found = || self.places.get(number).map(|place| self.look_alikes(place)).unwrap_or_default();
-        known.entry(number).or_insert_with(found)
+            let scan = Asked::new(place.panorama, place.panorama.points());
+            alike.extend(best(&self.look_alikes(place, &scan)).map(|found| found.agreement.visible));
+            let next = self.agreements(&place.pose, number, Some(place), &scan);
+            same.extend((!next.is_empty()).then(|| Agreement::mean(next.into_iter()).visible));
+        }
+        limit(alike, same)
     }
 
     /// Where a place may be taken to lie among others of the map. Pairs that are aligned to the very spot where both lie see the same
     /// things rightly, and teach nothing.
-    fn look_alikes(&self, place: &Place<'_>) -> Vec<Found> {
-        let scan = Asked::new(place.panorama, place.panorama.points());
-        let found = self.found(place.image, &scan, Some(place)).into_iter();
+    fn look_alikes(&self, place: &Place<'_>, scan: &Asked<'_>) -> Vec<Found> {
+        let found = self.found(place.image, scan, Some(place)).into_iter();
         found.filter(|found| found.pose.apart(&place.pose) > SAME_SPOT).collect()
     }
 
@@ -135,13 +128,17 @@ impl<'a> PlaceIndex<'a> {
     pub fn find(&self, query: &Query<'_>) -> Option<Answer> {
         let found = self.found(query.image, &query.scan, None);
         let best = best(&found)?;
-        let look_alike = greatest(self.look_alikes(self.places.get(best.place)?).iter());
-        let is_rival = |other: &Found| other.pose.apart(&best.pose) > SAME_SPOT && other.score > best.score - GAP;
+        let place = self.places.get(best.place)?;
+        let look_alikes = self.look_alikes(place, &Asked::new(place.panorama, place.panorama.points()));
+        let look_alike = look_alikes.iter().map(|found| found.agreement.visible).fold(0.0, f32::max);
+        let is_rival = |other: &Found| {
+            other.pose.apart(&best.pose) > SAME_SPOT && other.agreement.score > best.agreement.score - GAP
+        };
         Some(Answer {
             place: self.nearest(&best.pose, 1, |_, _| true).first().map_or(best.place, |(number, _)| *number),
             pose: best.pose,
-            score: best.score,
-            is_believed: self.limit.believes(best.score, look_alike),
+            agreement: best.agreement,
+            is_believed: best.agreement.visible > self.limit.max(look_alike),
             is_ambiguous: found.iter().any(is_rival),
         })
     }
@@ -153,22 +150,23 @@ impl<'a> PlaceIndex<'a> {
         let found = |(likeness, number): (Likeness, usize)| {
             let aligned = self.aligned(number, &likeness, scan)?;
             let pose = aligned.pose.within(&self.places.get(number)?.pose);
-            let neighbours = self.neighbours(&pose, number, own);
-            let score =
-                |place: &&Place<'_>| Voters::of(place.panorama).agreement(&scan.voters, &pose.seen_from(&place.pose));
-            let all = aligned.score + neighbours.iter().map(score).sum::<f32>();
-            Some(Found { place: number, pose, score: all / (1 + neighbours.len()) as f32 })
+            let others = self.agreements(&pose, number, own, scan);
+            let agreement = Agreement::mean(core::iter::once(aligned.agreement).chain(others));
+            Some(Found { place: number, pose, agreement })
         };
         self.alike(image, is_apart).into_iter().filter_map(found).collect()
     }
 
-    /// The places next to a pose, but for the one that is aligned and the asked one. They see the same things from elsewhere: where
-    /// a scan is of another place that looks the same, they agree less.
-    fn neighbours(&self, pose: &Pose, aligned: usize, own: Option<&Place<'_>>) -> Vec<&Place<'a>> {
+    /// How much a scan at a pose agrees with the places next to it, but for the one that is aligned and the asked one. They see the
+    /// same things from elsewhere: where a scan is of another place that looks the same, they agree less.
+    fn agreements(&self, pose: &Pose, aligned: usize, own: Option<&Place<'_>>, scan: &Asked<'_>) -> Vec<Agreement> {
         let is_other = |number: usize, place: &Place<'_>| {
             number != aligned && own.is_none_or(|own| !core::ptr::eq(own.panorama, place.panorama))
         };
-        self.nearest(pose, NEIGHBOURS, is_other).into_iter().map(|(_, place)| place).collect()
+        let agreement = |(_, place): (usize, &Place<'_>)| {
+            Voters::of(place.panorama).agreement(&scan.voters, &pose.seen_from(&place.pose))
+        };
+        self.nearest(pose, NEIGHBOURS, is_other).into_iter().map(agreement).collect()
     }
 
     /// So many places next to a pose, nearest first, of those in its neighbourhood that are wanted.
@@ -229,9 +227,5 @@ fn are_apart(one: &Place<'_>, other: &Place<'_>) -> bool {
 }
 
 fn best(found: &[Found]) -> Option<&Found> {
-    found.iter().max_by(|a, b| a.score.total_cmp(&b.score))
-}
-
-fn greatest<'f>(found: impl Iterator<Item = &'f Found>) -> f32 {
-    found.map(|found| found.score).fold(0.0, f32::max)
+    found.iter().max_by(|a, b| a.agreement.score.total_cmp(&b.agreement.score))
 }

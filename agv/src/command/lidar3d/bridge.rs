@@ -231,7 +231,7 @@ impl FirstPlace {
             };
             note(&format!(
                 "the {name} is at {:.2} {:.2} m, {:.4} rad; agreement {:.2}",
-                pose.x, pose.y, pose.theta, found.score
+                pose.x, pose.y, pose.theta, found.agreement.visible
             ));
             self.map = None;
         }

@@ -10,6 +10,7 @@ use agv_host_sim::lidar3d::place_map::{self, Answer, Limits, PlaceMap, StoredPla
 use agv_host_sim::lidar3d::place_search::{FoundPlace, PlaceSearch};
 use agv_host_sim::lidar3d::refinement::{Alignment, Surfaces, Target};
 use agv_host_sim::lidar3d::signatures::{Method, Signatures};
+use agv_lidar3d::place::Agreement;
 use anyhow::{Context, ensure};
 use nalgebra::Vector3;
 use serde_json::json;
@@ -20,8 +21,9 @@ use crate::command::stop;
 
 const HELP: &str = "\
 Each scan is looked at by itself. By images of the places the ten most alike are chosen; each is aligned to the scan, and the
-share of the floor plan that agrees decides. An answer is 'found' if more agrees than of any two different places of the map,
-'ambiguous' if another place agrees nearly as well, else 'unsure'.
+share of the floor plan that agrees decides (score; what is hidden from one of them counts half). An answer is 'found' if of what
+both see (visible) more agrees than the map has taught that different places have in common, 'ambiguous' if another place agrees
+nearly as well, else 'unsure'.
 
 The other methods compare signatures alone: an answer is 'found' if its signature is nearer to that of the place than those of
 any two different places are to each other. With the scans that the places are of, --refine aligns what is found to them,
@@ -34,8 +36,8 @@ Examples:
   agv lidar3d places find street.places3d velodyne_dist --every 10 --json
   agv lidar3d places find street.places3d today.pcap --method enriched --refine drive.pcap
 
-Keys of --json, one object a scan: scan, answer, place, place_scan, score, distance, turn_deg, x_m, y_m, heading_deg,
-share_on_surfaces, deviation_m. The score is null for signatures, the distance for images, positions for places without poses,
+Keys of --json, one object a scan: scan, answer, place, place_scan, score, visible, distance, turn_deg, x_m, y_m,
+heading_deg, share_on_surfaces, deviation_m. Score and visible are null for signatures, the distance for images, positions for places without poses,
 and the last two for scans that --refine has not aligned.";
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -111,13 +113,16 @@ impl Find {
             println!("{}", serde_json::to_string_pretty(&objects)?);
             return Ok(());
         }
-        println!("scan   answer     place    score distance     turn        x        y");
+        println!("scan   answer     place    score  visible distance     turn        x        y");
         for row in rows {
             let at = row.pose.map_or_else(String::new, |[x, y, _]| format!(" {x:>8.2} {y:>8.2}"));
             let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.4}"));
-            let (score, distance) = (number(row.score), number(row.distance));
+            let score = number(row.agreement.map(|agreement| agreement.score.into()));
+            let visible = number(row.agreement.map(|agreement| agreement.visible.into()));
+            let distance = number(row.distance);
             let Row { scan, answer, place, turn, .. } = row;
-            println!("{scan:<6} {answer:<10} {place:>5} {score:>8} {distance:>8} {:>7.1}°{at}", turn.to_degrees());
+            let turn = turn.to_degrees();
+            println!("{scan:<6} {answer:<10} {place:>5} {score:>8} {visible:>8} {distance:>8} {turn:>7.1}°{at}");
         }
         Ok(())
     }
@@ -184,7 +189,7 @@ struct Row {
     scan: usize,
     answer: &'static str,
     place: usize,
-    score: Option<f64>,
+    agreement: Option<Agreement>,
     distance: Option<f64>,
     /// Since the place, rad.
     turn: f64,
@@ -202,8 +207,8 @@ impl Row {
         };
         let turn = found.pose[2] - place.pose.map_or(0.0, |[_, _, heading]| heading);
         let turn = turn.sin().atan2(turn.cos());
-        let score = Some(f64::from(found.score));
-        Self { scan, answer, place: found.place, score, distance: None, turn, pose: Some(found.pose), refined: None }
+        let (agreement, pose) = (Some(found.agreement), Some(found.pose));
+        Self { scan, answer, place: found.place, agreement, distance: None, turn, pose, refined: None }
     }
 
     fn object(&self, places: &[StoredPlace]) -> serde_json::Value {
@@ -213,7 +218,8 @@ impl Row {
             "answer": self.answer,
             "place": self.place,
             "place_scan": places[self.place].scan,
-            "score": self.score,
+            "score": self.agreement.map(|agreement| agreement.score),
+            "visible": self.agreement.map(|agreement| agreement.visible),
             "distance": self.distance,
             "turn_deg": self.turn.to_degrees(),
             "x_m": pose.map(|pose| pose[0]),
@@ -240,7 +246,7 @@ impl Found {
             scan: self.scan,
             answer: if self.answer.is_believed { "found" } else { "unsure" },
             place: self.answer.place,
-            score: None,
+            agreement: None,
             distance: Some(self.answer.distance),
             turn: self.turn(),
             pose: self.pose(&places[self.answer.place]),

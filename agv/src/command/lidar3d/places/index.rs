@@ -8,7 +8,7 @@ use agv_host_sim::lidar3d::place_map::{self, PlaceMap, StoredPlace};
 use agv_host_sim::lidar3d::place_search::PlaceSearch;
 use agv_host_sim::lidar3d::signatures::Signatures;
 use agv_host_sim::lidar3d::view::{Standing, View};
-use agv_lidar3d::place::{KeySignatures, ScoreLimit};
+use agv_lidar3d::place::KeySignatures;
 use anyhow::ensure;
 use serde_json::json;
 
@@ -26,7 +26,7 @@ Examples:
   agv lidar3d places index drive.pcap --poses poses.txt --height 1.9 --output hall.places3d
   agv lidar3d places index velodyne_dist --output street.places3d --json
 
-Keys of --json: scans, places, sensor_height_m, limit, limit_unlike, limit_slope; the last three are null without poses.";
+Keys of --json: scans, places, sensor_height_m, limit; the last is null without poses.";
 
 /// Store the places of a drive.
 #[derive(clap::Args)]
@@ -95,30 +95,23 @@ impl Index {
         place_map::write(&self.output, &map)?;
         let height = map.standing.height();
         if self.json {
-            let summary = json!({ "scans": scans, "places": map.places.len(), "sensor_height_m": height,
-                "limit": map.limit.map(|limit| limit.always), "limit_unlike": map.limit.map(|limit| limit.unlike),
-                "limit_slope": map.limit.map(|limit| limit.slope) });
+            let summary =
+                json!({ "scans": scans, "places": map.places.len(), "sensor_height_m": height, "limit": map.limit });
             println!("{summary}");
         } else {
             output::print_rows(&[
                 ["scans".to_owned(), scans.to_string()],
                 ["places".to_owned(), map.places.len().to_string()],
                 ["sensor height".to_owned(), format!("{height:.2} m")],
-                ["believed from".to_owned(), map.limit.map_or("-".to_owned(), described)],
+                ["believed from".to_owned(), map.limit.map_or("-".to_owned(), |limit| format!("{limit:.2}"))],
             ]);
         }
         Ok(())
     }
 }
 
-/// A limit in words.
-fn described(limit: ScoreLimit) -> String {
-    let ScoreLimit { always, unlike, slope } = limit;
-    format!("{always:.2}, or {unlike:.2} and {slope:.2} of the score of the place with another one")
-}
-
-/// From which score on answers are believed; None without poses.
-fn learnt_limit(map: &PlaceMap) -> Option<ScoreLimit> {
+/// From which agreement of what is visible on answers are believed; None without poses.
+fn learnt_limit(map: &PlaceMap) -> Option<f32> {
     let search = PlaceSearch::new(map)?;
     let bar = progress::bar("look-alikes", 0);
     let limit = search.learnt_limit(|places| {
