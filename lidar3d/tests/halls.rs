@@ -349,7 +349,7 @@ fn places_in_halls_are_told_apart_by_alignment() {
             outcome.ambiguous,
             1e3 * outcome.errors.get(outcome.errors.len() / 2).copied().unwrap_or(f32::NAN)
         );
-        // Of the recall .85 is wanted, which not every hall of racks reaches.
+        // Of the recall .85 is wanted, which not every hall of machines reaches.
         if !(verified >= 0.97 && verified > context && recall >= 0.6 && wrong * 1000 <= queries) {
             short.push(format!("{hall:?} {rings}, seed {seed}"));
         }

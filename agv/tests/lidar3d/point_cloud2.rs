@@ -1,11 +1,17 @@
 //! `sensor_msgs/PointCloud2` in recordings of ROS 2, byte by byte as the definitions say: MCAP (mcap.dev/spec), CDR (OMG DDSI-RTPS 10) and
-//! the message itself, with the fields of several drivers.
+//! the message itself, with the fields of several drivers; and as a running ROS publishes them over foxglove_bridge
+//! (github.com/foxglove/ws-protocol, docs/spec.md).
 
+use std::net::TcpListener;
 use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 
 use agv_core::measurement::Time;
 use agv_host_sim::lidar3d::{Revolution, SetupOptions, Source};
+use serde_json::{Value, json};
+use tungstenite::handshake::server::{Request, Response};
+use tungstenite::http::HeaderValue;
+use tungstenite::{Message, accept_hdr};
 
 use crate::support::{Files, refusal};
 
@@ -224,4 +230,75 @@ fn clouds_that_contradict_themselves_are_refused_in_one_line() {
         let complaint = wrong(change);
         assert!(complaint.contains(expected), "{expected}: {complaint}");
     }
+}
+
+/// A bridge for one client that offers clouds on topics, and something else. A subscriber is sent all clouds of its topic.
+fn bridge(topics: Vec<(&'static str, Vec<Vec<u8>>)>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    std::thread::spawn(move || {
+        let protocol = |request: &Request, mut response: Response| {
+            assert!(request.headers()["sec-websocket-protocol"].to_str().unwrap().contains("foxglove.websocket.v1"));
+            let name = HeaderValue::from_static("foxglove.websocket.v1");
+            response.headers_mut().insert("Sec-WebSocket-Protocol", name);
+            Ok(response)
+        };
+        let mut socket = accept_hdr(listener.accept().unwrap().0, protocol).unwrap();
+        let mut say = |value: Value| socket.send(Message::text(value.to_string())).unwrap();
+        say(
+            json!({ "op": "serverInfo", "name": "foxglove_bridge", "capabilities": [], "supportedEncodings": ["cdr"] }),
+        );
+        let channel = |id: usize, topic: &str, kind: &str| json!({ "id": id, "topic": topic, "encoding": "cdr", "schemaName": kind, "schema": "", "schemaEncoding": "ros2msg" });
+        say(json!({ "op": "advertise", "channels": [channel(3, "/rosout", "rcl_interfaces/msg/Log")] }));
+        let clouds =
+            |(number, (topic, _)): (usize, &(&str, _))| channel(10 + number, topic, "sensor_msgs/msg/PointCloud2");
+        let channels: Vec<Value> = topics.iter().enumerate().map(clouds).collect();
+        say(json!({ "op": "advertise", "channels": channels }));
+        while let Ok(message) = socket.read() {
+            let Ok(request) = serde_json::from_str::<Value>(message.to_text().unwrap_or_default()) else { continue };
+            for wanted in request["subscriptions"].as_array().unwrap() {
+                let (_, clouds) = &topics[wanted["channelId"].as_u64().unwrap() as usize - 10];
+                for cloud in clouds {
+                    let id = wanted["id"].as_u64().unwrap() as u32;
+                    // Data of nobody's subscription, a time message, and the cloud.
+                    socket.send(Message::binary([&[1][..], &99_u32.to_le_bytes(), &[0; 8], &[1]].concat())).unwrap();
+                    socket.send(Message::binary([&[2][..], &[0; 8]].concat())).unwrap();
+                    socket.send(Message::binary([&[1][..], &id.to_le_bytes(), &[0; 8], cloud].concat())).unwrap();
+                }
+            }
+        }
+    });
+    format!("ws://{address}")
+}
+
+#[test]
+fn clouds_of_a_running_ros_are_those_of_a_recording() {
+    let address = bridge(vec![("/points", vec![velodyne().message(), ouster().message()])]);
+    let stop = AtomicBool::new(false);
+    let source = Source::parse(&format!("{address}#/points")).unwrap();
+    assert!(source.is_live());
+    let mut found = Vec::new();
+    let read = source.open(&SetupOptions::default(), &stop).unwrap().revolutions(&stop, |revolution| {
+        found.push(revolution);
+        if found.len() == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!(read.unwrap().points, 8);
+    check(&found[0], Time::from_micros(10_000));
+    check(&found[1], Time::from_micros(110_000));
+}
+
+#[test]
+fn what_a_running_ros_has_not_is_said_in_one_line() {
+    let one = || vec![velodyne().message()];
+    let complaint = refusal(&["lidar3d", "info", &bridge(vec![("/front", one()), ("/rear", one())])]);
+    assert!(complaint.contains("/front, /rear"), "{complaint}");
+    let mut short = velodyne();
+    short.data.truncate(60);
+    let complaint = refusal(&["lidar3d", "info", &bridge(vec![("/front", vec![short.message()])])]);
+    assert!(complaint.contains("#/front: a cloud is shorter than it says"), "{complaint}");
+    let complaint = Source::parse("ws://#/points").unwrap_err();
+    assert!(complaint.contains("names no machine"), "{complaint}");
+    let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let complaint = refusal(&["lidar3d", "info", &format!("ws://{free}")]);
+    assert!(complaint.contains("refused"), "{complaint}");
 }

@@ -11,9 +11,16 @@ pub mod clouds;
 pub mod decoder;
 pub mod kind;
 pub mod live;
+#[cfg(all(feature = "bags", feature = "point-clouds"))]
+pub mod live_clouds;
+#[cfg(not(all(feature = "bags", feature = "point-clouds")))]
+#[path = "no_live_clouds.rs"]
+pub mod live_clouds;
 pub mod mount;
 pub mod place_map;
 pub mod place_search;
+#[cfg(all(feature = "bags", feature = "point-clouds"))]
+pub mod point_cloud2;
 pub mod projection;
 pub mod refinement;
 pub mod revolution;

@@ -14,6 +14,7 @@ use super::capture::{self, CaptureError};
 use super::clouds;
 use super::kind::{Datagram, Kind};
 use super::live::Listener;
+use super::live_clouds::LiveClouds;
 use super::revolution::{Revolution, Revolutions};
 use super::setup::Setup;
 use super::setup_options::{SetupError, SetupOptions};
@@ -79,10 +80,12 @@ pub enum Source {
     Clouds(PathBuf, Vec<PathBuf>),
     /// Clouds in a recording of ROS 2, and their topic if it was named.
     Bag(PathBuf, Option<String>),
+    /// Clouds of a running ROS 2: where its bridge is, and their topic if it was named.
+    LiveClouds(String, Option<String>),
 }
 
 impl Source {
-    /// `udp` or `udp:PORT` is the network, a folder holds range images or point clouds, a name that ends in .pcd, .bin,
+    /// `udp` or `udp:PORT` is the network, `ws://HOST[:PORT][#TOPIC]` a running ROS 2, a folder holds range images or point clouds, a name that ends in .pcd, .bin,
     /// .ply or .las is a point cloud, one that ends in .mcap or .db3 and a folder of rosbag2 is a recording of ROS 2, behind which
     /// `#TOPIC` may stand, and any other is a capture.
     ///
@@ -94,6 +97,7 @@ impl Source {
             Some(rest) if rest.starts_with(':') => {
                 rest[1..].parse().map(Self::Live).map_err(|_| format!("'{}' is no port", &rest[1..]))
             }
+            _ if text.starts_with(WEB_SOCKET) => live_clouds(text),
             _ if bag(text).is_some() => bag(text).ok_or_else(String::new),
             _ if Path::new(text).is_dir() => {
                 let found = clouds::in_folder(Path::new(text));
@@ -112,7 +116,15 @@ impl Source {
                 path.display().to_string()
             }
             Self::Live(port) => format!("UDP port {port}"),
+            Self::LiveClouds(address, None) => format!("{WEB_SOCKET}{address}"),
+            Self::LiveClouds(address, Some(topic)) => format!("{WEB_SOCKET}{address}#{topic}"),
         }
+    }
+
+    /// Whether it is a sensor that sends now, and does not wait.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        matches!(self, Self::Live(_) | Self::LiveClouds(..))
     }
 
     /// Looks at the source, as far as is needed to decode it; a live one is listened to until `stop` is set.
@@ -126,6 +138,7 @@ impl Source {
             Self::Clouds(path, files) => opened_clouds(&path, files, options)?,
             Self::Bag(path, topic) => opened_bag(path, topic.as_deref(), options)?,
             Self::Live(port) => opened_port(port, options, stop)?,
+            Self::LiveClouds(address, topic) => opened_live_clouds(&address, topic.as_deref(), options, stop)?,
         };
         Ok(OpenSource { options: options.clone(), setup, survey, packets })
     }
@@ -173,6 +186,18 @@ fn opened_bag(path: PathBuf, topic: Option<&str>, options: &SetupOptions) -> Ope
     Ok((survey, Some(setup), Packets::Bag(path, topic, count)))
 }
 
+fn opened_live_clouds(address: &str, topic: Option<&str>, options: &SetupOptions, stop: &AtomicBool) -> Opened {
+    let mut clouds = LiveClouds::subscribe(address, topic, stop).map_err(SourceError::Cloud)?;
+    while !stop.load(Ordering::Relaxed) {
+        if let Some((revolution, lasers)) = clouds.receive().map_err(SourceError::Cloud)? {
+            let survey = Survey { kind: Some(Kind::Cloud), turns: f64::INFINITY, ..Survey::default() };
+            let setup = Setup::of_clouds(options, lasers);
+            return Ok((survey, Some(setup), Packets::LiveClouds(Box::new(clouds), revolution)));
+        }
+    }
+    Err(SourceError::Cloud(format!("{}: no cloud came", clouds.name())))
+}
+
 fn opened_port(port: u16, options: &SetupOptions, stop: &AtomicBool) -> Opened {
     let network = |problem| SourceError::Network { port, problem };
     let ouster = options.ouster()?;
@@ -200,11 +225,22 @@ fn opened_port(port: u16, options: &SetupOptions, stop: &AtomicBool) -> Opened {
 }
 
 enum Packets {
-    Capture { path: PathBuf, port: Option<u16>, ouster: Option<Box<ouster::Sensor>> },
+    Capture {
+        path: PathBuf,
+        port: Option<u16>,
+        ouster: Option<Box<ouster::Sensor>>,
+    },
     Images(RangeImages),
     Clouds(Vec<PathBuf>),
     Bag(PathBuf, String, usize),
-    Live { port: u16, listener: Box<Listener>, waiting: Vec<(Time, Vec<u8>)>, ouster: Option<Box<ouster::Sensor>> },
+    /// And the first cloud, which has been looked at.
+    LiveClouds(Box<LiveClouds>, Revolution),
+    Live {
+        port: u16,
+        listener: Box<Listener>,
+        waiting: Vec<(Time, Vec<u8>)>,
+        ouster: Option<Box<ouster::Sensor>>,
+    },
 }
 
 /// A source that has been looked at.
@@ -250,7 +286,7 @@ impl OpenSource {
             Packets::Images(images) => Some(images.files.len() as u64),
             Packets::Clouds(files) => Some(files.len() as u64),
             Packets::Bag(_, _, count) => Some(*count as u64),
-            Packets::Live { .. } => None,
+            Packets::Live { .. } | Packets::LiveClouds(..) => None,
         }
     }
 
@@ -265,6 +301,10 @@ impl OpenSource {
         mut take: impl FnMut(Revolution) -> ControlFlow<()>,
     ) -> Result<Tally, SourceError> {
         let setup = self.setup()?;
+        match self.packets {
+            Packets::LiveClouds(clouds, first) => return live_revolutions(*clouds, first, &setup, stop, take),
+            _ => {}
+        }
         match &self.packets {
             Packets::Clouds(files) => return cloud_revolutions(files, &setup, stop, take),
             Packets::Bag(path, topic, _) => return bag_revolutions(path, topic, &setup, stop, take),
@@ -316,7 +356,7 @@ impl Packets {
                 image_packets(images, push)?;
                 Ok("the range images".to_owned())
             }
-            Self::Clouds(_) | Self::Bag(..) => Ok(String::new()),
+            Self::Clouds(_) | Self::Bag(..) | Self::LiveClouds(..) => Ok(String::new()),
             Self::Live { port, listener, waiting, ouster } => {
                 let port_now = listener.port();
                 let mut is_going = waiting.drain(..).try_for_each(|(time, bytes)| {
@@ -373,6 +413,28 @@ fn bag_revolutions(
     Ok(tally)
 }
 
+/// Each cloud that comes as a revolution, until `stop` is set.
+fn live_revolutions(
+    mut clouds: LiveClouds,
+    first: Revolution,
+    setup: &Setup,
+    stop: &AtomicBool,
+    mut take: impl FnMut(Revolution) -> ControlFlow<()>,
+) -> Result<Tally, SourceError> {
+    let mut tally = Tally::default();
+    let mut next = Some(first);
+    while !stop.load(Ordering::Relaxed) {
+        if let Some(mut revolution) = next {
+            filtered(&mut revolution, setup, &mut tally);
+            if take(revolution).is_break() {
+                break;
+            }
+        }
+        next = clouds.receive().map_err(SourceError::Cloud)?.map(|(revolution, _)| revolution);
+    }
+    Ok(tally)
+}
+
 /// Each file as a revolution.
 fn cloud_revolutions(
     files: &[PathBuf],
@@ -402,6 +464,23 @@ fn filtered(revolution: &mut Revolution, setup: &Setup, tally: &mut Tally) {
     revolution.points.retain(|point| range(point.position) <= setup.filter.far);
     tally.far += (far - revolution.points.len()) as u64;
     tally.points += revolution.points.len() as u64;
+}
+
+/// What an address of a running ROS begins with, and the port of its bridge if none is stated.
+const WEB_SOCKET: &str = "ws://";
+const BRIDGE_PORT: u16 = 8765;
+
+/// `ws://HOST[:PORT][#TOPIC]`.
+fn live_clouds(text: &str) -> Result<Source, String> {
+    let rest = text.trim_start_matches(WEB_SOCKET);
+    let (host, topic) = rest.split_once('#').map_or((rest, None), |(host, topic)| (host, Some(topic.to_owned())));
+    let host = host.trim_end_matches('/');
+    if host.is_empty() {
+        return Err(format!("'{text}' names no machine: {WEB_SOCKET}HOST[:PORT][#TOPIC]"));
+    }
+    let has_port = host.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+    let address = if has_port { host.to_owned() } else { format!("{host}:{BRIDGE_PORT}") };
+    Ok(Source::LiveClouds(address, topic))
 }
 
 /// A recording of ROS 2; None if the name is of something else.

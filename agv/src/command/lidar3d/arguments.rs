@@ -10,8 +10,8 @@ use agv_lidar3d::packet::{self, Tally};
 pub const SOURCES: &str = "\
 A SOURCE is a capture (pcap or pcapng), a folder of range images (velodyne_config.txt and data/*.png), a point cloud (.pcd,
 KITTI's .bin, .ply or .las) or a folder of them, a recording of ROS 2 with PointCloud2 (.mcap, .db3 or a folder of rosbag2, as
-FILE#TOPIC where it has several), or udp[:PORT] for a sensor that sends to this machine (port 2368 if none is
-stated).
+FILE#TOPIC where it has several), udp[:PORT] for a sensor that sends to this machine (port 2368 if none is stated), or
+ws://HOST[:PORT][#TOPIC] for PointCloud2 of a running ROS 2 with foxglove_bridge (port 8765 if none is stated).
 
 Sensors: Velodyne HDL-64E (db.xml or YAML), HDL-32E, VLP-16, VLP-32C, VLS-128; Hesai Pandar40P, PandarQT64, PandarXT32 (CSV of
 its angles); Ouster (JSON of its metadata). A capture is read at the port of the first packet of a sensor.";

@@ -75,7 +75,7 @@ impl Bridge {
         let Standing { height, levelling, mount } = self.standing()?;
         let places = self.places.as_deref().map(place_map::read).transpose()?;
         let stop = stop::on_interrupt()?;
-        let is_live = matches!(self.source, Source::Live(_));
+        let is_live = self.source.is_live();
         let listener =
             TcpListener::bind(("0.0.0.0", self.serve_port)).with_context(|| format!("port {}", self.serve_port))?;
         if is_live {
