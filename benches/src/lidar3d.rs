@@ -167,7 +167,7 @@ fn fleet(criterion: &mut Criterion, image: &PlaceImage, panorama: &Panorama) {
     let other = |number: usize| {
         let mut bytes = bytes;
         for (at, byte) in bytes.iter_mut().take(PlaceImage::BYTES - 8).enumerate() {
-            *byte = byte.wrapping_add((number * (at % 97 + 1) * 2_654_435_761 >> 24) as u8);
+            *byte = byte.wrapping_add(((number * (at % 97 + 1) * 2_654_435_761) >> 24) as u8);
         }
         PlaceImage::from_bytes(&bytes)
     };

@@ -233,6 +233,7 @@ fn clouds_that_contradict_themselves_are_refused_in_one_line() {
 }
 
 /// A bridge for one client that offers clouds on topics, and something else. A subscriber is sent all clouds of its topic.
+#[expect(clippy::result_large_err, reason = "the library wants the answer of a handshake so")]
 fn bridge(topics: Vec<(&'static str, Vec<Vec<u8>>)>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();

@@ -301,9 +301,8 @@ impl OpenSource {
         mut take: impl FnMut(Revolution) -> ControlFlow<()>,
     ) -> Result<Tally, SourceError> {
         let setup = self.setup()?;
-        match self.packets {
-            Packets::LiveClouds(clouds, first) => return live_revolutions(*clouds, first, &setup, stop, take),
-            _ => {}
+        if let Packets::LiveClouds(clouds, first) = self.packets {
+            return live_revolutions(*clouds, first, &setup, stop, take);
         }
         match &self.packets {
             Packets::Clouds(files) => return cloud_revolutions(files, &setup, stop, take),
