@@ -187,7 +187,9 @@ fn fleet(criterion: &mut Criterion, image: &PlaceImage, panorama: &Panorama) {
             bencher.iter(|| index.candidates(black_box(asked)))
         });
         group.bench_function(format!("answer/{name}"), |bencher| {
-            bencher.iter(|| index.find(&Query { image: asked, scan: Asked::new(panorama, panorama.points()) }));
+            bencher.iter(|| {
+                index.find(&Query { image: asked, scan: Asked::new(panorama, panorama.points()), earlier: &[] })
+            });
         });
     }
 }

@@ -9,7 +9,7 @@ mod support;
 use std::f32::consts::{PI, TAU};
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Asked, Floor, Panorama, Place, PlaceImage, PlaceIndex, Pose, Query, Span};
+use agv_lidar3d::place::{Asked, Earlier, Floor, Panorama, Place, PlaceImage, PlaceIndex, Pose, Query, Span};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::scan_context::ScanContext;
@@ -289,7 +289,7 @@ fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
         let (node, distance) = distances.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         outcome.context.push((distance, places[node].pose.apart(&pose) <= RIGHT));
         let scan = Asked::new(&asked.panorama, asked.points.iter().copied());
-        let Some(answer) = index.find(&Query { image: &asked.image, scan }) else { continue };
+        let Some(answer) = index.find(&Query { image: &asked.image, scan, earlier: &[] }) else { continue };
         let is_right = places[answer.place].pose.apart(&pose) <= RIGHT && answer.pose.apart(&pose) < 0.5;
         outcome.verified.push((1.0 - answer.agreement.score, is_right));
         outcome.ambiguous += usize::from(answer.is_ambiguous);
@@ -355,4 +355,63 @@ fn places_in_halls_are_told_apart_by_alignment() {
         }
     }
     assert!(short.is_empty(), "short of what they must show: {short:?}");
+}
+
+/// Answers of one hall: right and believed, wrong and believed, ambiguous.
+#[derive(Debug, Default)]
+struct Told {
+    right: usize,
+    wrong: usize,
+    ambiguous: usize,
+}
+
+/// Each question alone, and with two scans from 2 and 4 m before; how many have an answer.
+fn along_the_way(hall: Hall, rings: usize, seed: u64, queries: usize) -> ([Told; 2], usize) {
+    let mut random = Random(ChaCha8Rng::seed_from_u64(seed));
+    let lidar = lidar(rings);
+    let scene = scene(hall, &mut random);
+    let stored = surveyed(hall, &scene, &lidar, &mut random);
+    let places: Vec<Place> =
+        stored.iter().map(|(pose, seen)| Place { pose: *pose, image: &seen.image, panorama: &seen.panorama }).collect();
+    let index = PlaceIndex::new(places.clone(), RIGHT);
+    let limit = index.learnt_limit(|_| ());
+    let index = index.with_limit(limit);
+    let (mut told, mut answerable) = ([Told::default(), Told::default()], 0);
+    for number in 0..queries {
+        let pose = asked_at(hall, number, &mut random);
+        let now = changed(hall, &scene, &pose, &mut random);
+        let before = |back: f32| Pose { place: [-back, 0.0], heading: 0.0 };
+        let views: Vec<Seen> = [pose, before(2.0).within(&pose), before(4.0).within(&pose)]
+            .iter()
+            .map(|pose| seen(&scan(&now, pose, &lidar, &mut random), &lidar))
+            .collect();
+        let asked = |seen: &usize| Asked::new(&views[*seen].panorama, views[*seen].points.iter().copied());
+        let earlier = [Earlier { scan: asked(&1), pose: before(2.0) }, Earlier { scan: asked(&2), pose: before(4.0) }];
+        answerable += usize::from(places.iter().any(|place| place.pose.apart(&pose) <= RIGHT));
+        for (told, earlier) in told.iter_mut().zip([&[][..], &earlier]) {
+            let Some(answer) = index.find(&Query { image: &views[0].image, scan: asked(&0), earlier }) else {
+                continue;
+            };
+            let is_right = places[answer.place].pose.apart(&pose) <= RIGHT && answer.pose.apart(&pose) < 0.5;
+            told.right += usize::from(answer.is_believed && is_right);
+            told.wrong += usize::from(answer.is_believed && !is_right);
+            told.ambiguous += usize::from(answer.is_ambiguous);
+        }
+    }
+    (told, answerable)
+}
+
+#[test]
+fn scans_on_the_way_tell_more_than_one() {
+    let queries = std::env::var("AGV_HALL_QUERIES").map_or(24, |queries| queries.parse().unwrap());
+    let seeds = std::env::var("AGV_HALL_SEEDS").unwrap_or(SEED.to_string());
+    for (hall, seed) in [Hall::Racks, Hall::Machines].iter().flat_map(|hall| seeds.split(',').map(move |s| (*hall, s)))
+    {
+        let ([alone, together], answerable) = along_the_way(hall, 16, seed.parse().unwrap(), queries);
+        println!(
+            "{hall:?} 16, seed {seed}, {queries} questions, {answerable} with an answer: {alone:?}, with two more scans {together:?}"
+        );
+        assert!(together.wrong <= alone.wrong && together.ambiguous <= alone.ambiguous, "{alone:?} {together:?}");
+        assert!(together.right + queries / 24 >= alone.right && alone.right > 0, "{alone:?} {together:?}");
+    }
 }

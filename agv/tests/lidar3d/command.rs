@@ -300,7 +300,6 @@ fn places_of_a_street_are_found_again() {
     assert!((0.1..0.9).contains(&found["limit"].as_f64().unwrap()), "{found}");
     let bytes = std::fs::metadata(&map).unwrap().len();
     assert!(bytes < 16_000 * found["places"].as_u64().unwrap(), "{bytes} bytes");
-    let answers = results(&["lidar3d", "places", "find", &map, scans, "--every", "7", "--json"]);
     let truth = std::fs::read_to_string(poses).unwrap();
     let truth: Vec<[f64; 2]> = truth
         .lines()
@@ -309,12 +308,26 @@ fn places_of_a_street_are_found_again() {
             [values[3], values[7]]
         })
         .collect();
-    let (mut off, mut wrong) = (Vec::new(), 0);
-    for answer in answers.as_array().unwrap().iter().filter(|answer| answer["answer"] == "found") {
-        let [x, y] = truth[answer["scan"].as_u64().unwrap() as usize];
-        off.push((answer["x_m"].as_f64().unwrap() - x).hypot(answer["y_m"].as_f64().unwrap() - y));
-        wrong += usize::from(off.last().is_some_and(|off| *off > 1.0));
-    }
+    let find = ["lidar3d", "places", "find", &map, scans, "--every", "7", "--json"];
+    let told = |more: &[&str]| {
+        let answers = results(&[&find[..], more].concat());
+        let (mut off, mut wrong) = (Vec::new(), 0);
+        for answer in answers.as_array().unwrap().iter().filter(|answer| answer["answer"] == "found") {
+            let [x, y] = truth[answer["scan"].as_u64().unwrap() as usize];
+            off.push((answer["x_m"].as_f64().unwrap() - x).hypot(answer["y_m"].as_f64().unwrap() - y));
+            wrong += usize::from(off.last().is_some_and(|off| *off > 1.0));
+        }
+        (off, wrong)
+    };
+    let (mut off, wrong) = told(&[]);
+    // Those of the way tell no less.
+    let (together, wrong_together) = told(&["--sequence", "2"]);
+    assert!(
+        together.len() >= off.len() && wrong_together <= wrong,
+        "{} {} {wrong_together}",
+        off.len(),
+        together.len()
+    );
     off.sort_by(f64::total_cmp);
     assert!(off.len() > 60 && wrong == 0 && off[off.len() / 2] < 0.1, "{off:?}");
     // Aligned to the stored scans they are where the other program puts them, although places are 4 m apart.

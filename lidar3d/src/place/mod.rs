@@ -49,6 +49,6 @@ pub use plane_fit::fitted_surfaces;
 #[cfg(feature = "std")]
 pub use pose::Pose;
 #[cfg(feature = "std")]
-pub use recognition::{Answer, Place, PlaceIndex, Query};
+pub use recognition::{Answer, Earlier, Place, PlaceIndex, Query};
 pub use ring_key::{AskedKey, RingKey};
 pub use threshold::from_key_scans;

@@ -77,6 +77,16 @@ pub struct Query<'a> {
     pub image: &'a PlaceImage,
     /// Its points, levelled, and its panorama.
     pub scan: Asked<'a>,
+    /// Scans that were made on the way to it: what they see says as well where it is. May be none.
+    pub earlier: &'a [Earlier<'a>],
+}
+
+/// A scan that was made earlier.
+pub struct Earlier<'a> {
+    /// Its points, levelled, and its panorama.
+    pub scan: Asked<'a>,
+    /// Where it was made, in the frame of the one that is asked for.
+    pub pose: Pose,
 }
 
 impl<'a> PlaceIndex<'a> {
@@ -104,7 +114,7 @@ impl<'a> PlaceIndex<'a> {
             progress(count);
             let scan = Asked::new(place.panorama, place.panorama.points());
             alike.extend(best(&self.look_alikes(place, &scan)).map(|found| found.agreement.visible));
-            let next = self.agreements(&place.pose, number, Some(place), &scan);
+            let next = self.agreements(&place.pose, Some(number), Some(place), &scan);
             same.extend((!next.is_empty()).then(|| Agreement::mean(next.into_iter()).visible));
         }
         limit(alike, same)
@@ -113,7 +123,7 @@ impl<'a> PlaceIndex<'a> {
     /// Where a place may be taken to lie among others of the map. Pairs that are aligned to the very spot where both lie see the same
     /// things rightly, and teach nothing.
     fn look_alikes(&self, place: &Place<'_>, scan: &Asked<'_>) -> Vec<Found> {
-        let found = self.found(place.image, scan, Some(place)).into_iter();
+        let found = self.found(place.image, scan, &[], Some(place)).into_iter();
         found.filter(|found| found.pose.apart(&place.pose) > SAME_SPOT).collect()
     }
 
@@ -126,7 +136,7 @@ impl<'a> PlaceIndex<'a> {
     /// The place that a scan is of; None if no place is like it.
     #[must_use]
     pub fn find(&self, query: &Query<'_>) -> Option<Answer> {
-        let found = self.found(query.image, &query.scan, None);
+        let found = self.found(query.image, &query.scan, query.earlier, None);
         let best = best(&found)?;
         let place = self.places.get(best.place)?;
         let look_alikes = self.look_alikes(place, &Asked::new(place.panorama, place.panorama.points()));
@@ -145,23 +155,38 @@ impl<'a> PlaceIndex<'a> {
 
     /// Where a scan may have been made: aligned to the places most alike. If it is that of a place of the map, only those count
     /// that lie apart from it.
-    fn found(&self, image: &PlaceImage, scan: &Asked<'_>, own: Option<&Place<'_>>) -> Vec<Found> {
+    fn found(
+        &self,
+        image: &PlaceImage,
+        scan: &Asked<'_>,
+        earlier: &[Earlier<'_>],
+        own: Option<&Place<'_>>,
+    ) -> Vec<Found> {
         let is_apart = |other: &Place<'_>| own.is_none_or(|own| are_apart(other, own));
         let found = |(likeness, number): (Likeness, usize)| {
             let aligned = self.aligned(number, &likeness, scan)?;
             let pose = aligned.pose.within(&self.places.get(number)?.pose);
-            let others = self.agreements(&pose, number, own, scan);
-            let agreement = Agreement::mean(core::iter::once(aligned.agreement).chain(others));
+            let others = self.agreements(&pose, Some(number), own, scan);
+            let before = earlier
+                .iter()
+                .flat_map(|earlier| self.agreements(&earlier.pose.within(&pose), None, None, &earlier.scan));
+            let agreement = Agreement::mean(core::iter::once(aligned.agreement).chain(others).chain(before));
             Some(Found { place: number, pose, agreement })
         };
         self.alike(image, is_apart).into_iter().filter_map(found).collect()
     }
 
-    /// How much a scan at a pose agrees with the places next to it, but for the one that is aligned and the asked one. They see the
+    /// How much a scan at a pose agrees with the places next to it, but for one that it is aligned to and the asked one. They see the
     /// same things from elsewhere: where a scan is of another place that looks the same, they agree less.
-    fn agreements(&self, pose: &Pose, aligned: usize, own: Option<&Place<'_>>, scan: &Asked<'_>) -> Vec<Agreement> {
+    fn agreements(
+        &self,
+        pose: &Pose,
+        aligned: Option<usize>,
+        own: Option<&Place<'_>>,
+        scan: &Asked<'_>,
+    ) -> Vec<Agreement> {
         let is_other = |number: usize, place: &Place<'_>| {
-            number != aligned && own.is_none_or(|own| !core::ptr::eq(own.panorama, place.panorama))
+            Some(number) != aligned && own.is_none_or(|own| !core::ptr::eq(own.panorama, place.panorama))
         };
         let agreement = |(_, place): (usize, &Place<'_>)| {
             Voters::of(place.panorama).agreement(&scan.voters, &pose.seen_from(&place.pose))

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use agv_host_sim::lidar3d::Source;
 use agv_host_sim::lidar3d::place_map::{self, Answer, Limits, PlaceMap, StoredPlace};
-use agv_host_sim::lidar3d::place_search::{FoundPlace, PlaceSearch};
+use agv_host_sim::lidar3d::place_search::{FoundPlace, PlaceSearch, Sequence};
 use agv_host_sim::lidar3d::refinement::{Alignment, Surfaces, Target};
 use agv_host_sim::lidar3d::signatures::{Method, Signatures};
 use agv_lidar3d::place::Agreement;
@@ -20,7 +20,7 @@ use crate::command::lidar3d::arguments::SOURCES;
 use crate::command::stop;
 
 const HELP: &str = "\
-Each scan is looked at by itself. By images of the places the ten most alike are chosen; each is aligned to the scan, and the
+Each scan is looked at by itself, with --sequence together with those of the way to it. By images of the places the ten most alike are chosen; each is aligned to the scan, and the
 share of the floor plan that agrees decides (score; what is hidden from one of them counts half). An answer is 'found' if of what
 both see (visible) more agrees than the map has taught that different places have in common, 'ambiguous' if another place agrees
 nearly as well, else 'unsure'.
@@ -34,6 +34,7 @@ The turn is how far the sensor has turned to the left since.
 Examples:
   agv lidar3d places find street.places3d today.pcap --calibration db.xml
   agv lidar3d places find street.places3d velodyne_dist --every 10 --json
+  agv lidar3d places find hall.places3d udp --sequence 4
   agv lidar3d places find street.places3d today.pcap --method enriched --refine drive.pcap
 
 Keys of --json, one object a scan: scan, answer, place, place_scan, score, visible, distance, turn_deg, x_m, y_m,
@@ -90,6 +91,9 @@ pub struct Find {
     /// The scans that the places are of: refines the poses of what signatures have found.
     #[arg(long, value_name = "SOURCE", value_parser = Source::parse, requires = "method")]
     refine: Option<Source>,
+    /// So many scans of the way to each help to tell it, at least a metre apart.
+    #[arg(long, value_name = "SCANS", default_value_t = 0, value_parser = clap::value_parser!(u8).range(..=50), conflicts_with = "method")]
+    sequence: u8,
     /// Only every so many scans.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -139,10 +143,11 @@ impl Find {
         let named = || format!("{}: the places have no poses", self.places.display());
         let search = PlaceSearch::new(map).with_context(named)?;
         let mut rows = Vec::new();
+        let mut sequence = Sequence::new(self.sequence.into());
         let stop = stop::on_interrupt()?;
         self.drive().for_each(Some(map.standing), &stop, |scan, cloud, _| {
             if self.is_wanted(scan)
-                && let Some(found) = search.find(cloud)
+                && let Some(found) = search.find_next(cloud, &mut sequence)
             {
                 rows.push(Row::of_alignment(scan, &found, &map.places[found.place]));
             }
