@@ -252,6 +252,15 @@ fn surveyed(hall: Hall, scene: &Scene, lidar: &Lidar, random: &mut Random) -> Ve
     poses.map(|pose| (pose, seen(&scan(&cuboids, &pose, lidar, random), lidar))).collect()
 }
 
+/// The places, an index of them, and what it has learnt from which agreement on answers are believed.
+fn indexed(stored: &[(Pose, Seen)]) -> (Vec<Place<'_>>, PlaceIndex<'_>, f32) {
+    let places: Vec<Place> =
+        stored.iter().map(|(pose, seen)| Place { pose: *pose, image: &seen.image, panorama: &seen.panorama }).collect();
+    let index = PlaceIndex::new(places.clone(), RIGHT);
+    let limit = index.learnt_limit(|_| ());
+    (places, index.with_limit(limit), limit)
+}
+
 /// Where a question is asked.
 fn asked_at(hall: Hall, number: usize, random: &mut Random) -> Pose {
     let lane = lanes(hall)[number % lanes(hall).len()];
@@ -264,11 +273,7 @@ fn run(hall: Hall, rings: usize, seed: u64, queries: usize) -> Outcome {
     let lidar = lidar(rings);
     let scene = scene(hall, &mut random);
     let stored = surveyed(hall, &scene, &lidar, &mut random);
-    let places: Vec<Place> =
-        stored.iter().map(|(pose, seen)| Place { pose: *pose, image: &seen.image, panorama: &seen.panorama }).collect();
-    let index = PlaceIndex::new(places.clone(), RIGHT);
-    let limit = index.learnt_limit(|_| ());
-    let index = index.with_limit(limit);
+    let (places, index, limit) = indexed(&stored);
     let mut outcome = Outcome {
         answerable: 0,
         context: Vec::new(),
@@ -371,11 +376,7 @@ fn along_the_way(hall: Hall, rings: usize, seed: u64, queries: usize) -> ([Told;
     let lidar = lidar(rings);
     let scene = scene(hall, &mut random);
     let stored = surveyed(hall, &scene, &lidar, &mut random);
-    let places: Vec<Place> =
-        stored.iter().map(|(pose, seen)| Place { pose: *pose, image: &seen.image, panorama: &seen.panorama }).collect();
-    let index = PlaceIndex::new(places.clone(), RIGHT);
-    let limit = index.learnt_limit(|_| ());
-    let index = index.with_limit(limit);
+    let (places, index, _) = indexed(&stored);
     let (mut told, mut answerable) = ([Told::default(), Told::default()], 0);
     for number in 0..queries {
         let pose = asked_at(hall, number, &mut random);
