@@ -17,6 +17,7 @@ pub mod live_clouds;
 #[path = "no_live_clouds.rs"]
 pub mod live_clouds;
 pub mod mount;
+pub mod open_source;
 pub mod place_map;
 pub mod place_search;
 #[cfg(all(feature = "bags", feature = "point-clouds"))]
@@ -30,14 +31,17 @@ pub mod setup;
 mod setup_options;
 pub mod signatures;
 pub mod source;
+pub mod source_error;
 pub mod spinning_lidar;
 pub mod stand;
 pub mod survey;
 pub mod view;
 pub mod wall_points;
 
+pub use open_source::OpenSource;
 pub use revolution::{Revolution, Revolutions};
 pub use setup::Setup;
 pub use setup_options::{SetupError, SetupOptions};
-pub use source::{OpenSource, Source, SourceError};
+pub use source::Source;
+pub use source_error::SourceError;
 pub use survey::Survey;

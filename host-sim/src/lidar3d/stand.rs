@@ -7,9 +7,10 @@ use agv_lidar3d::calibration::Laser;
 use agv_lidar3d::geometry::Offsets;
 use agv_lidar3d::intrinsic::Return;
 
+use super::open_source::OpenSource;
 use super::revolution::Revolution;
 use super::setup::Setup;
-use super::source::{OpenSource, SourceError};
+use super::source_error::SourceError;
 
 /// The returns of the first whole revolution of a source, as they were measured: without any correction.
 ///
