@@ -199,7 +199,7 @@ fn aligned(map: &Scans, asked: &Scans, protocol: Protocol) -> Vec<Vec<Option<(f6
         let view = asked.view(query);
         let scan = Asked::new(&view.panorama, view.points.iter().copied());
         for (likeness, node) in best.into_iter().take(10) {
-            let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
+            let headings = likeness.headings();
             let began = std::time::Instant::now();
             let alignment = stored[node].as_ref().unwrap().align(&scan, &headings, 6.0);
             seconds.push(began.elapsed().as_secs_f64());

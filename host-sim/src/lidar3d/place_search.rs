@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use agv_lidar3d::cloud::Cloud;
-use agv_lidar3d::place::{Agreement, Asked, AskedImage, Earlier, Place, PlaceIndex, Pose, Query, SECTORS, Stored};
+use agv_lidar3d::place::{Agreement, Asked, Earlier, Place, PlaceIndex, Pose, Query, Stored};
 
 use super::place_map::PlaceMap;
 use super::view::View;
@@ -67,6 +67,9 @@ impl<'a> PlaceSearch<'a> {
     #[must_use]
     pub fn find_next(&self, cloud: &Cloud<'_>, sequence: &mut Sequence) -> Option<FoundPlace> {
         let seen = self.seen(cloud);
+        if sequence.length == 0 {
+            return self.find_of(&seen, &[]);
+        }
         sequence.move_on(&seen);
         let earlier: Vec<Earlier<'_>> =
             sequence.kept.iter().map(|(earlier, pose)| Earlier { scan: earlier.asked(), pose: *pose }).collect();
@@ -152,9 +155,8 @@ impl Sequence {
 
 /// Where a scan was taken, seen from the one before; None if they do not fit.
 fn motion(last: &Seen, next: &Seen) -> Option<Pose> {
-    let turns = AskedImage::new(&next.view.image).likeness(&last.view.image)?.turns;
-    let turned = turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
-    let headings = [0.0, turned[0], turned[1]];
+    let [one, other] = last.view.image.likeness(&next.view.image)?.headings();
+    let headings = [0.0, one, other];
     let found = Stored::new(&last.view.panorama).align(&next.asked(), &headings, STEP)?;
     (found.agreement.score > AGREED).then_some(found.pose)
 }

@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use agv_lidar3d::cloud::Cloud;
 use agv_lidar3d::place::{
-    Asked, AskedImage, DIRECTIONS, Floor, Histogram, Neighbours, Panorama, PlaceImage, SECTORS, Span, Stored,
-    chi_square, from_key_scans,
+    Asked, AskedImage, DIRECTIONS, Floor, Histogram, Neighbours, Panorama, PlaceImage, Span, Stored, chi_square,
+    from_key_scans,
 };
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -260,8 +260,7 @@ impl Test<'_> {
         alike.sort_by(|a, b| a.0.distance.total_cmp(&b.0.distance));
         let scan = Asked::new(&asked.view.panorama, asked.points.iter().copied());
         let found = alike.into_iter().take(CANDIDATES).filter_map(|(likeness, node)| {
-            let headings = likeness.turns.map(|turn| -(turn as f32) * std::f32::consts::TAU / SECTORS as f32);
-            let found = Stored::new(&self.stored[node].view.panorama).align(&scan, &headings, REACH)?;
+            let found = Stored::new(&self.stored[node].view.panorama).align(&scan, &likeness.headings(), REACH)?;
             let is_near = f64::from(found.pose.place[0].hypot(found.pose.place[1])) <= self.protocol.right;
             is_near.then_some((1.0 - f64::from(found.agreement.score), node))
         });

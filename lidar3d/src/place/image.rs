@@ -43,6 +43,14 @@ pub struct Likeness {
     pub turns: [usize; 2],
 }
 
+impl Likeness {
+    /// The headings that the asked scan may have in the stored place, rad, counter-clockwise, best first.
+    #[must_use]
+    pub fn headings(&self) -> [f32; 2] {
+        self.turns.map(|turn| -(turn as f32) * core::f32::consts::TAU / SECTORS as f32)
+    }
+}
+
 impl PlaceImage {
     /// Bytes of an image when it is stored.
     pub const BYTES: usize = SECTORS * RINGS + 8;

@@ -9,7 +9,7 @@ use std::vec::Vec;
 use super::agreement::{Agreement, Voters};
 use super::image::Likeness;
 use super::look_alikes::limit;
-use super::{Alignment, Asked, AskedImage, AskedKey, Panorama, PlaceImage, Pose, RingKey, SECTORS, Stored};
+use super::{Alignment, Asked, AskedImage, AskedKey, Panorama, PlaceImage, Pose, RingKey, Stored};
 
 /// Places that are aligned.
 const CANDIDATES: usize = 10;
@@ -240,8 +240,7 @@ impl<'a> PlaceIndex<'a> {
     }
 
     fn aligned(&self, number: usize, likeness: &Likeness, scan: &Asked<'_>) -> Option<Alignment> {
-        let headings = likeness.turns.map(|turn| -(turn as f32) * core::f32::consts::TAU / SECTORS as f32);
-        let found = Stored::new(self.places.get(number)?.panorama).align(scan, &headings, self.reach)?;
+        let found = Stored::new(self.places.get(number)?.panorama).align(scan, &likeness.headings(), self.reach)?;
         (libm::hypotf(found.pose.place[0], found.pose.place[1]) <= self.reach).then_some(found)
     }
 }
