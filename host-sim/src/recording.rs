@@ -174,3 +174,11 @@ pub fn truth_at(truth: &[Truth], time: Time) -> Option<Pose> {
     let share = time.since(previous.time) / next.time.since(previous.time);
     Some(previous.pose.compose(&previous.pose.between(&next.pose).fraction(share)))
 }
+
+/// The true pose at a time; before the recorded truth its first pose and behind it its last, as the vehicle stands there.
+/// None if there is no truth.
+#[must_use]
+pub fn truth_or_stand_at(truth: &[Truth], time: Time) -> Option<Pose> {
+    let (first, last) = (truth.first()?, truth.last()?);
+    truth_at(truth, time.clamp(first.time, last.time))
+}

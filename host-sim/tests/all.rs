@@ -12,6 +12,7 @@ mod output_file;
 mod published;
 mod report;
 mod simulate;
+mod truth;
 mod two_lasers;
 mod wheel_table;
 mod wheeled_fit;

@@ -10,6 +10,8 @@ use std::sync::atomic::Ordering;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use agv_core::geometry::Pose;
+use agv_core::localizer::Event;
 use agv_core::measurement::EncoderFault;
 use agv_core::state::{LaserHealth, Mode, Relocalization};
 use agv_host_sim::acceptance::{self, Verdict};
@@ -134,7 +136,18 @@ fn vehicles_of_other_kinds_drive_through_the_hall() {
         let mut faults = agv_tests::faults(&drive.driven).into_iter();
         assert!(faults.all(|heard| heard.heard < drive.driven.begin), "{reports:?} {:?}", drive.driven.emergencies);
         assert_replayed(&drive, 900);
+        let given = first_given(&drive.driven).unwrap().between(&recording.truth[0].pose);
+        assert!(given.x.hypot(given.y) < 0.05, "{reports:?}: it was said to be {given:?} beside its place");
     }
+}
+
+/// Where the controller was first said to be, by those who look on or by its own search.
+fn first_given(driven: &Driven) -> Option<Pose> {
+    let events = log::read_contents(&driven.log, |_| ()).unwrap().recording.events;
+    events.iter().find_map(|event| match event.view() {
+        Event::SetPose(fix) => Some(fix.pose),
+        _ => None,
+    })
 }
 
 /// What the firmware has logged, line by line.
@@ -188,7 +201,7 @@ fn a_vehicle_that_is_told_nothing_finds_itself() {
     assert!(errors.position_p95_m < 0.1, "{errors:?}");
     let found = |driven: &Driven| {
         let events = log::read_contents(&driven.log, |_| ()).unwrap().recording.events;
-        events.iter().filter(|event| matches!(event.view(), agv_core::localizer::Event::SetPose(_))).count()
+        events.iter().filter(|event| matches!(event.view(), Event::SetPose(_))).count()
     };
     assert_eq!(found(&driven), 1);
     assert_replayed(&Drive { driven, folder }, 300);

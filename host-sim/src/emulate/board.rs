@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use super::run_delay::RunDelay;
 use crate::bus::{BusError, SlcanBus};
 
 /// Why the board does not run.
@@ -142,6 +143,12 @@ impl Board {
                 Err(_) => std::thread::sleep(Duration::from_millis(5)),
             }
         }
+    }
+
+    /// How long the machine keeps the emulator waiting, from now on.
+    #[must_use]
+    pub fn run_delay(&self) -> RunDelay {
+        RunDelay::of(self.child.id())
     }
 
     /// Whether it still runs.

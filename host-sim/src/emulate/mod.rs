@@ -8,4 +8,5 @@ pub mod foreign_traffic;
 pub mod gyro;
 pub mod motion;
 pub mod own_controller;
+pub mod run_delay;
 pub mod vehicle;

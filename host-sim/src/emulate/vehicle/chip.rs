@@ -24,7 +24,7 @@ use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::EmulatedMotion;
 use crate::live::stream::LogCopy;
 use crate::log::Reader;
-use crate::recording::{Recording, truth_at};
+use crate::recording::{Recording, truth_or_stand_at};
 use crate::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
 
 /// Port of the laser.
@@ -255,8 +255,8 @@ impl Play<'_> {
         } else if self.motion.are_operational() && now > self.last_order + BETWEEN_ORDERS.as_micros() as u64 {
             self.last_order = now;
             self.orders = (self.orders + 1) % 16;
-            let pose = truth_at(&self.recording.truth, self.first).unwrap_or_default();
-            self.frames.extend(initial_pose(pose, self.controller, self.orders));
+            let pose = truth_or_stand_at(&self.recording.truth, self.first);
+            self.frames.extend(pose.into_iter().flat_map(|pose| initial_pose(pose, self.controller, self.orders)));
         }
         Ok(())
     }
@@ -316,6 +316,7 @@ impl Play<'_> {
             begin: self.origin + Duration::from_micros(self.begin.unwrap_or_default()),
             first: self.first,
             longest_stall: 0.0,
+            longest_delay: 0.0,
         })
     }
 }

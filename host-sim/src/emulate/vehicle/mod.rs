@@ -46,7 +46,7 @@ pub struct VehicleOptions<'a> {
     pub key: Option<[u8; KEY]>,
     /// Whether the flash begins with settings. If not, the controller finds the file `flash.bin` that is there.
     pub provision: bool,
-    /// Whether the controller is told where it is when it starts. If not, it has to find out.
+    /// Whether the controller is told where it is when it starts. If not, or if the recording has no truth, it has to find out.
     pub is_told: bool,
 }
 
@@ -67,6 +67,9 @@ pub struct Driven {
     /// Longest time that this machine kept the encoders waiting, s. Encoders that are late by 20 ms are a fault, so a drive
     /// on a machine that is too busy shows how faults are met, and no more.
     pub longest_stall: f64,
+    /// Longest time that this machine kept a thread of the emulator waiting for a core within a fiftieth of a second, s. Not known, and 0,
+    /// where the machine does not run Linux.
+    pub longest_delay: f64,
 }
 
 /// The settings of a vehicle that is as the recording says, in the emulator's network.
@@ -152,7 +155,8 @@ pub fn drive(
     });
     outcome?;
     let stream = stream.map_err(|_| std::io::Error::other("the recording of the log stream broke down"))??;
-    let Heard { poses, emergencies, begin, longest_stall } = heard.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let Heard { poses, emergencies, begin, longest_stall, longest_delay } =
+        heard.into_inner().unwrap_or_else(PoisonError::into_inner);
     let begin = begin.ok_or(VehicleError::NotLocalised(poses.last().map(|heard| heard.pose.mode)))?;
-    Ok(Driven { log, stream, poses, emergencies, begin, first, longest_stall })
+    Ok(Driven { log, stream, poses, emergencies, begin, first, longest_stall, longest_delay })
 }

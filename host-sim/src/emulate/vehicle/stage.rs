@@ -20,7 +20,8 @@ use crate::emulate::board::{Board, BoardError};
 use crate::emulate::foreign_traffic::ForeignTraffic;
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::EmulatedMotion;
-use crate::recording::{Recording, truth_at};
+use crate::emulate::run_delay::RunDelay;
+use crate::recording::{Recording, truth_or_stand_at};
 use crate::serve::nav350::Nav350;
 
 /// Standard deviations of the pose that the controller is told, m and rad.
@@ -84,8 +85,9 @@ impl Stage<'_> {
         seconds: f64,
     ) -> Result<(), VehicleError> {
         let mut play = self.begin(bus)?;
+        let mut delay = board.run_delay();
         loop {
-            play.note_stall();
+            play.note_stall(&mut delay);
             if self.stopped.load(Ordering::Relaxed) || play.end.is_some_and(|end| Instant::now() > end) {
                 return Ok(());
             }
@@ -146,9 +148,10 @@ impl Stage<'_> {
         self.heard().poses.last().map(|heard| heard.pose.mode)
     }
 
-    fn pose(&self) -> Pose {
+    /// Where the vehicle is. None if the recording has no truth.
+    fn pose(&self) -> Option<Pose> {
         let driven = self.heard().begin.map_or(0.0, |begin| begin.elapsed().as_secs_f64());
-        truth_at(&self.recording.truth, self.first.offset(driven)).unwrap_or_default()
+        truth_or_stand_at(&self.recording.truth, self.first.offset(driven))
     }
 }
 
@@ -170,7 +173,7 @@ impl Play<'_> {
     }
 
     /// Notes how long the loop took, and how many frames of other nodes there was time for.
-    fn note_stall(&mut self) {
+    fn note_stall(&mut self, delay: &mut RunDelay) {
         let now = Instant::now();
         let passed = (now - self.looked).as_secs_f64();
         self.looked = now;
@@ -180,6 +183,7 @@ impl Play<'_> {
         if self.end.is_some() {
             let mut heard = self.stage.heard();
             heard.longest_stall = heard.longest_stall.max(passed);
+            heard.longest_delay = delay.look().as_secs_f64();
         }
     }
 
@@ -254,8 +258,9 @@ impl Play<'_> {
 
     /// Tells the controller where it is.
     fn tell_pose(&mut self) -> Result<(), BoardError> {
+        let Some(pose) = self.stage.pose() else { return Ok(()) };
         self.orders = (self.orders + 1) % 16;
-        for frame in initial_pose(self.stage.pose(), self.controller, self.orders) {
+        for frame in initial_pose(pose, self.controller, self.orders) {
             self.send(&frame)?;
         }
         Ok(())

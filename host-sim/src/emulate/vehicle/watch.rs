@@ -66,6 +66,8 @@ pub(super) struct Heard {
     pub begin: Option<Instant>,
     /// See [`super::Driven::longest_stall`], s.
     pub longest_stall: f64,
+    /// See [`super::Driven::longest_delay`], s.
+    pub longest_delay: f64,
 }
 
 impl Watch<'_> {
