@@ -5,7 +5,7 @@ use crate::filter::{Ekf, PoseObservation};
 use crate::geometry::Pose;
 use crate::maps::Verdict;
 use crate::measurement::{LaserId, Scan, Time};
-use crate::sources::{ContourOutcome, FindContours, FindFeatures, ScanBehind, see_contours};
+use crate::sources::{ContourOutcome, FindContours, FindFeatures, LaserPlace, ScanBehind, see_contours};
 
 /// While reflectors have the position as well as this, m, contours do not correct it.
 const BY_REFLECTORS: f64 = 0.02;
@@ -89,12 +89,11 @@ impl<C: Capacities> Localizer<C> {
         parameters.maps.slam && parameters.sources.contours && C::Contours::KEYS > 0 && !self.contours.has_map()
     }
 
-    /// Corrects the pose by the contours of the way behind, where the filter stands; `place` is where the laser was then in the frame
-    /// of the points.
-    pub(super) fn fuse_contours_behind(&mut self, mount: &Pose, place: &Pose) {
+    /// Corrects the pose by the contours of the way behind, where the filter stands.
+    pub(super) fn fuse_contours_behind(&mut self, laser: LaserPlace) {
         let step = self.step_until(self.slam.time());
         let is_led = self.distance.reflector <= LED_BEHIND && self.outputs.sources.reflectors.gated == 0;
-        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step, is_led };
+        let scan = ScanBehind { points: self.features.points(), laser, step, is_led };
         let told = (self.slam.time(), &mut self.outputs.sources.contours);
         self.contour_correction = ContourCorrection::Applied;
         if self.behind.see(&mut self.contours, self.slam.parts().0, &scan, told) {
@@ -104,10 +103,8 @@ impl<C: Capacities> Localizer<C> {
     }
 
     /// Makes the scan one of the way behind if it is time for one.
-    pub(super) fn keep_contours_behind(&mut self, mount: &Pose, place: &Pose) {
-        let step = Pose::default();
-        let scan = ScanBehind { points: self.features.points(), place: *place, laser: *mount, step, is_led: false };
-        self.behind.keep(&mut self.contours, self.slam.parts().0, &scan);
+    pub(super) fn keep_contours_behind(&mut self, laser: &LaserPlace) {
+        self.behind.keep(&mut self.contours, self.slam.parts().0, laser);
     }
 
     fn tell_contours(&mut self, time: Time, laser: LaserId, outcome: &ContourOutcome, is_used: bool) {

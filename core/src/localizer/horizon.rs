@@ -3,7 +3,7 @@
 use super::{Capacities, Localizer};
 use crate::geometry::Pose;
 use crate::measurement::{LaserId, Scan, Time};
-use crate::sources::FindFeatures;
+use crate::sources::{FindFeatures, LaserPlace};
 
 impl<C: Capacities> Localizer<C> {
     /// Fuses the reflectors of the workspace that came without a scan.
@@ -49,11 +49,12 @@ impl<C: Capacities> Localizer<C> {
         }
         // What lies behind is seen by the first laser.
         let is_first = scan.laser == LaserId::FIRST;
-        let is_behind = is_first && self.uses_contours_behind();
-        if is_behind {
-            self.fuse_contours_behind(mount, &place);
+        let behind =
+            (is_first && self.uses_contours_behind()).then_some(LaserPlace { in_points: place, mount: *mount });
+        if let Some(laser) = behind {
+            self.fuse_contours_behind(laser);
         }
-        let is_aligned = is_first && !is_behind && self.parameters.sources.key_scans;
+        let is_aligned = is_first && behind.is_none() && self.parameters.sources.key_scans;
         if is_aligned {
             let status = &mut self.outputs.sources.key_scans;
             status.begin(self.slam.time());
@@ -61,8 +62,8 @@ impl<C: Capacities> Localizer<C> {
         }
         self.fuse(scan.start);
         self.slam.finish(false, &self.parameters.slam);
-        if is_behind {
-            self.keep_contours_behind(mount, &place);
+        if let Some(laser) = &behind {
+            self.keep_contours_behind(laser);
         }
         if is_aligned {
             self.slam.keep(self.features.points(), &place, &self.parameters);

@@ -45,14 +45,21 @@ pub(crate) struct ContoursBehind {
     is_contradicted: bool,
 }
 
+/// Where the laser was when the filter's time was.
+#[derive(Clone, Copy)]
+pub(crate) struct LaserPlace {
+    /// In the frame of the scan's points.
+    pub in_points: Pose,
+    /// In R: its mount.
+    pub mount: Pose,
+}
+
 /// A scan as it is compared with the way behind.
 pub(crate) struct ScanBehind<'a> {
     /// Its points.
     pub points: PointView<'a>,
-    /// The laser at the time of the filter in the frame of the points.
-    pub place: Pose,
-    /// The mount of the laser in R.
-    pub laser: Pose,
+    /// The laser that took it.
+    pub laser: LaserPlace,
     /// The motion since the scan before.
     pub step: Pose,
     /// Whether reflectors lead the vehicle.
@@ -93,7 +100,7 @@ impl ContoursBehind {
             status.add(time, Verdict::Unknown, false, None);
             return false;
         };
-        let Some(compared) = self.compare(filter, scan, &found) else { return false };
+        let Some(compared) = self.compare(filter, &scan.laser, &found) else { return false };
         // Reflectors would have shown what is wrong with the odometry. A line alone, such as where a leaning laser meets the floor, may turn by
         // itself.
         let is_doubtful = scan.is_led || found.free_axis.is_some();
@@ -107,7 +114,7 @@ impl ContoursBehind {
         status.add(time, verdict, is_used, Some(compared.square / GATE));
         let past = filter.past_pose(SLOT).filter(|_| is_used && found.free_axis.is_none());
         self.matched = past.map(|past| {
-            let turn = turn_back(-past.theta - scan.laser.theta);
+            let turn = turn_back(-past.theta - scan.laser.mount.theta);
             turn * compared.observation.covariance * turn.transpose()
         });
         self.matched.is_some()
@@ -115,12 +122,12 @@ impl ContoursBehind {
 
     /// Where the frame of the scan's points should be in the submap.
     fn predict<S: Slots>(&self, filter: &Ekf<S>, scan: &ScanBehind) -> Option<Prediction> {
-        let pose = filter.expected_relative_pose(SLOT, &scan.laser)?;
+        let pose = filter.expected_relative_pose(SLOT, &scan.laser.mount)?;
         let known = RelativePose { pose, covariance: Matrix3::zeros() };
-        let covariance = filter.residual_covariance(&filter.observe_relative_pose(SLOT, &known, &scan.laser)?);
+        let covariance = filter.residual_covariance(&filter.observe_relative_pose(SLOT, &known, &scan.laser.mount)?);
         let deviation = |variance: f64| libm::sqrt(variance.max(0.0));
         Some(Prediction::of_filter(
-            self.anchor.compose(&pose).compose(&scan.place.inverse()),
+            self.anchor.compose(&pose).compose(&scan.laser.in_points.inverse()),
             deviation(larger_axis(covariance.m11, covariance.m12, covariance.m22)),
             deviation(covariance.m33),
             &scan.step,
@@ -128,18 +135,18 @@ impl ContoursBehind {
     }
 
     /// What a match says of the way since the pose in the slot.
-    fn compare<S: Slots>(&self, filter: &Ekf<S>, scan: &ScanBehind, found: &ContourMatch) -> Option<Compared> {
+    fn compare<S: Slots>(&self, filter: &Ekf<S>, laser: &LaserPlace, found: &ContourMatch) -> Option<Compared> {
         let free = Matrix3::from_diagonal_element(1.0 / (FREE * FREE));
         let own =
             (found.information / (INFLATION * f64::from(found.scatter).max(LEAST_SCATTER)) + free).try_inverse()?;
         // From the frame of the points to the laser, and from the submap to where the laser was.
-        let jacobian = turn_back(self.anchor.theta) * found.pose.compose_jacobian_first(&scan.place);
+        let jacobian = turn_back(self.anchor.theta) * found.pose.compose_jacobian_first(&laser.in_points);
         let least = Vector3::new(LEAST_POSITION, LEAST_POSITION, LEAST_HEADING);
         let seen = RelativePose {
-            pose: self.anchor.between(&found.pose.compose(&scan.place)),
+            pose: self.anchor.between(&found.pose.compose(&laser.in_points)),
             covariance: jacobian * own * jacobian.transpose() + Matrix3::from_diagonal(&least.component_mul(&least)),
         };
-        let observation = filter.observe_relative_pose(SLOT, &seen, &scan.laser)?;
+        let observation = filter.observe_relative_pose(SLOT, &seen, &laser.mount)?;
         let root = filter.residual_covariance(&observation).cholesky()?;
         let square = observation.residual.dot(&root.solve(&observation.residual));
         square.is_finite().then_some(Compared { observation, square })
@@ -149,28 +156,33 @@ impl ContoursBehind {
     ///
     /// It is one of so many in the submap, and moves it by that share of its own error. If it told nothing along an axis, what it adds is as
     /// wrong there as the pose is: then the submap is where the vehicle is.
-    pub(crate) fn keep<S: Slots, C: FindContours>(&mut self, contours: &mut C, filter: &mut Ekf<S>, scan: &ScanBehind) {
+    pub(crate) fn keep<S: Slots, C: FindContours>(
+        &mut self,
+        contours: &mut C,
+        filter: &mut Ekf<S>,
+        laser: &LaserPlace,
+    ) {
         // It would lie askew among those before it.
         if self.is_contradicted {
             return;
         }
-        let known = filter.expected_relative_pose(SLOT, &scan.laser);
+        let known = filter.expected_relative_pose(SLOT, &laser.mount);
         if known.is_none() {
             contours.forget_keys();
         }
-        let laser = known.map_or(Pose::default(), |since| self.anchor.compose(&since));
-        if contours.keep(&laser.compose(&scan.place.inverse())) {
+        let in_submap = known.map_or(Pose::default(), |since| self.anchor.compose(&since));
+        if contours.keep(&in_submap.compose(&laser.in_points.inverse())) {
             let key = Vector3::new(KEY_POSITION, KEY_POSITION, KEY_HEADING);
             let mut doubt = Matrix3::from_diagonal(&key.component_mul(&key));
             match self.matched {
                 Some(covariance) => {
-                    filter.carry_past_pose(SLOT, &scan.laser);
+                    filter.carry_past_pose(SLOT, &laser.mount);
                     doubt += covariance / C::KEYS.max(1) as f64;
                 }
                 None => filter.remember_pose(SLOT),
             }
             filter.doubt_past_pose(SLOT, &doubt);
-            self.anchor = laser;
+            self.anchor = in_submap;
         }
     }
 }

@@ -34,7 +34,7 @@ pub use status::SourceStatus;
 pub(crate) use aid::correct as correct_by_aid;
 pub(crate) use association::{Believed, Comparison};
 pub(crate) use contours::{ContourOutcome, see_contours};
-pub(crate) use contours_behind::{ContoursBehind, ScanBehind};
+pub(crate) use contours_behind::{ContoursBehind, LaserPlace, ScanBehind};
 pub(crate) use correction::{Outcome, correct};
 pub(crate) use features::{FeatureFinder, FindFeatures};
 pub(crate) use key_scans::KeyScans;
