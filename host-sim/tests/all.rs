@@ -11,6 +11,7 @@ mod motion;
 mod output_file;
 mod published;
 mod report;
+mod run_delay;
 mod simulate;
 mod truth;
 mod two_lasers;

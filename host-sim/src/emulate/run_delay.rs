@@ -1,7 +1,7 @@
 //! How long the machine lets a program wait for a core.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// How often it is looked at.
@@ -14,7 +14,7 @@ pub struct RunDelay {
     tasks: PathBuf,
     /// What each thread has waited until the last look, ns.
     waited: HashMap<String, u64>,
-    due: Instant,
+    due: Option<Instant>,
     longest: Duration,
 }
 
@@ -22,21 +22,21 @@ impl RunDelay {
     /// Of the program with this number.
     #[must_use]
     pub fn of(process: u32) -> Self {
-        Self {
-            tasks: format!("/proc/{process}/task").into(),
-            waited: HashMap::new(),
-            due: Instant::now(),
-            longest: Duration::ZERO,
-        }
+        Self::of_tasks(format!("/proc/{process}/task"))
+    }
+
+    /// Of the program whose threads have their folders in this one.
+    #[must_use]
+    pub fn of_tasks(folder: impl Into<PathBuf>) -> Self {
+        Self { tasks: folder.into(), waited: HashMap::new(), due: None, longest: Duration::ZERO }
     }
 
     /// Looks, if the last look was long enough ago, and gives the longest wait of a thread from one look to the next so far.
-    pub fn look(&mut self) -> Duration {
-        let now = Instant::now();
-        if now < self.due {
+    pub fn look(&mut self, now: Instant) -> Duration {
+        if self.due.is_some_and(|due| now < due) {
             return self.longest;
         }
-        self.due = now + INTERVAL;
+        self.due = Some(now + INTERVAL);
         for task in std::fs::read_dir(&self.tasks).into_iter().flatten().flatten() {
             let Some(waited) = waited(&task.path()) else { continue };
             let before = self.waited.insert(task.file_name().to_string_lossy().into_owned(), waited);
@@ -48,6 +48,6 @@ impl RunDelay {
     }
 }
 
-fn waited(task: &std::path::Path) -> Option<u64> {
+fn waited(task: &Path) -> Option<u64> {
     std::fs::read_to_string(task.join("schedstat")).ok()?.split_whitespace().nth(1)?.parse().ok()
 }

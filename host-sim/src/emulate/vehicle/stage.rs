@@ -62,6 +62,8 @@ struct Play<'a> {
     start: Instant,
     /// When the loop came by last.
     looked: Instant,
+    /// How long the machine keeps the emulator waiting.
+    delay: RunDelay,
     /// When the drive ends, once it has begun.
     end: Option<Instant>,
     last_order: Instant,
@@ -84,10 +86,9 @@ impl Stage<'_> {
         is_streaming: &AtomicBool,
         seconds: f64,
     ) -> Result<(), VehicleError> {
-        let mut play = self.begin(bus)?;
-        let mut delay = board.run_delay();
+        let mut play = self.begin(bus, board.run_delay())?;
         loop {
-            play.note_stall(&mut delay);
+            play.note_stall();
             if self.stopped.load(Ordering::Relaxed) || play.end.is_some_and(|end| Instant::now() > end) {
                 return Ok(());
             }
@@ -115,7 +116,7 @@ impl Stage<'_> {
         }
     }
 
-    fn begin(&self, bus: SlcanBus) -> Result<Play<'_>, VehicleError> {
+    fn begin(&self, bus: SlcanBus, delay: RunDelay) -> Result<Play<'_>, VehicleError> {
         let nodes = self.settings.nodes;
         let node = |number| NodeId::new(number).unwrap_or(FIRST_NODE);
         let controller = node(nodes.controller);
@@ -133,6 +134,7 @@ impl Stage<'_> {
             foreign_due: 0.0,
             start,
             looked: start,
+            delay,
             end: None,
             last_order: start,
             orders: 0,
@@ -173,7 +175,7 @@ impl Play<'_> {
     }
 
     /// Notes how long the loop took, and how many frames of other nodes there was time for.
-    fn note_stall(&mut self, delay: &mut RunDelay) {
+    fn note_stall(&mut self) {
         let now = Instant::now();
         let passed = (now - self.looked).as_secs_f64();
         self.looked = now;
@@ -181,9 +183,10 @@ impl Play<'_> {
         // What a stall has held up is left out: a bus takes no more frames than it has time for.
         self.foreign_due = (self.foreign_due + rate * passed).min(LONGEST_BURST);
         if self.end.is_some() {
+            let delay = self.delay.look(now).as_secs_f64();
             let mut heard = self.stage.heard();
             heard.longest_stall = heard.longest_stall.max(passed);
-            heard.longest_delay = delay.look().as_secs_f64();
+            heard.longest_delay = delay;
         }
     }
 
