@@ -63,12 +63,25 @@ pub struct Equipment {
     #[arg(long, value_name = "SLIP", value_parser = slip)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slip: Option<f64>,
+    /// True error of the gyro's scale, share; the seed chooses its sign, and what is stated of it stays [default: 0.002].
+    #[arg(long, value_name = "SHARE", value_parser = scale_error)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_scale_error: Option<f64>,
 }
 
 /// A slip that a wheel can have.
 fn slip(text: &str) -> Result<f64, String> {
     let slip: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if (0.0..=0.1).contains(&slip) { Ok(slip) } else { Err("a slip is from 0 to 0.1".to_owned()) }
+}
+
+/// An error that a gyro's scale can have, share.
+///
+/// # Errors
+/// In words, if it is no number, or larger.
+pub fn scale_error(text: &str) -> Result<f64, String> {
+    let share: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.0..=0.1).contains(&share) { Ok(share) } else { Err("an error of the scale is from 0 to 0.1".to_owned()) }
 }
 
 impl Equipment {
@@ -78,6 +91,9 @@ impl Equipment {
         scenario.gyro.fitted = self.gyro;
         if let Some(slip) = self.slip {
             scenario.odometry.slip = slip;
+        }
+        if let Some(share) = self.gyro_scale_error {
+            scenario.gyro.scale_error = share;
         }
     }
 

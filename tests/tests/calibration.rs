@@ -36,7 +36,7 @@ fn the_real_tricycle_is_calibrated() {
 #[test]
 fn real_robots_of_four_kinds_are_calibrated() {
     let Some(folder) = recordings("real_robots_of_four_kinds_are_calibrated", "optiodom") else { return };
-    let outcome = optiodom::run(&folder).unwrap();
+    let outcome = optiodom::run(&folder, false).unwrap();
     let cell = |kind: &str, path: &str, method: &str| {
         let is_it = |cell: &&optiodom::Cell| cell.kind == kind && cell.path == path && cell.method == method;
         outcome.cells.iter().find(is_it).unwrap()

@@ -163,7 +163,7 @@ struct Drive {
 }
 
 /// What is to be measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroOptions {
     /// Drives of each kind.
     pub drives: u32,
@@ -177,6 +177,8 @@ pub struct GyroOptions {
     pub sound: bool,
     /// With this vehicle alone.
     pub only: Option<VehicleKind>,
+    /// True error of the gyro's scale where headings are measured, share; none for the simulator's.
+    pub scale_error: Option<f64>,
 }
 
 impl GyroOptions {
@@ -187,7 +189,8 @@ impl GyroOptions {
     }
 
     fn kinds(&self) -> impl Iterator<Item = Kind> {
-        let of = |vehicle| kinds().map(move |(before, way, has_gyro)| Kind { vehicle, before, way, has_gyro });
+        let scale_error = self.scale_error;
+        let of = move |vehicle| kinds().map(move |(before, way, has_gyro)| Kind { vehicle, before, way, has_gyro, scale_error });
         self.vehicles().filter(|_| self.headings).flat_map(of)
     }
 
@@ -289,6 +292,7 @@ struct Kind {
     before: Before,
     way: Way,
     has_gyro: bool,
+    scale_error: Option<f64>,
 }
 
 fn kinds() -> impl Iterator<Item = (Before, Way, bool)> {
@@ -303,7 +307,7 @@ fn slips_of() -> impl Iterator<Item = (Way, ShownBy)> {
 }
 
 fn heading_row(kind: Kind, found: &[(u64, Drive)]) -> HeadingRow {
-    let Kind { vehicle, before, way, has_gyro } = kind;
+    let Kind { vehicle, before, way, has_gyro, .. } = kind;
     let mut lost: Vec<f64> = found.iter().map(|(_, drive)| drive.lost.to_degrees()).collect();
     lost.sort_by(f64::total_cmp);
     // No drive is as good as one that was not made.
@@ -333,7 +337,7 @@ fn segment(length: f64, curvature: f64) -> PathSegment {
 
 /// A hall with reflectors at its walls, and the way through it.
 fn scenario(kind: Kind, seed: u64) -> Scenario {
-    let Kind { vehicle, before, way, has_gyro } = kind;
+    let Kind { vehicle, before, way, has_gyro, scale_error } = kind;
     let mut scenario = Scenario { seed, ..Scenario::default() };
     let place = |number: u32| {
         // No two of them are as far apart as two others.
@@ -379,7 +383,7 @@ fn scenario(kind: Kind, seed: u64) -> Scenario {
         start: PoseOptions { x: 0.0, y: -1.0, heading_deg: 0.0 },
         legs: vec![Leg { direction: Direction::Forward, segments }],
     };
-    Equipment { vehicle, gyro: has_gyro, ..Equipment::default() }.apply(&mut scenario);
+    Equipment { vehicle, gyro: has_gyro, gyro_scale_error: scale_error, ..Equipment::default() }.apply(&mut scenario);
     scenario
 }
 
@@ -431,7 +435,7 @@ fn blind_drive(kind: Kind, seed: u64) -> Result<Drive, GyroError> {
 
 /// Way of a vehicle in order among reflectors, m, and how often it was alarmed.
 fn sound_drive(vehicle: VehicleKind, has_gyro: bool, seed: u64) -> Result<(f64, usize), GyroError> {
-    let kind = Kind { vehicle, before: Before::Drives, way: Way::Curve, has_gyro };
+    let kind = Kind { vehicle, before: Before::Drives, way: Way::Curve, has_gyro, scale_error: None };
     let scenario = scenario(kind, seed);
     let (_, end) = times(&scenario, Before::Drives);
     let simulation = simulate(&scenario)?;
@@ -458,7 +462,7 @@ fn slipping_drive(
     seed: u64,
 ) -> Result<(Option<f64>, bool), GyroError> {
     let has_gyro = shown_by == ShownBy::Gyro;
-    let mut scenario = scenario(Kind { vehicle, before: Before::Stands, way, has_gyro }, seed);
+    let mut scenario = scenario(Kind { vehicle, before: Before::Stands, way, has_gyro, scale_error: None }, seed);
     // In the middle of the curve or of the line.
     let lead = 0.5 * scenario.drive.speed / scenario.drive.acceleration;
     let from = BEFORE + lead + 7.5 / scenario.drive.speed;

@@ -22,6 +22,10 @@ pub struct Calibration {
     /// Only this row of K table 5.1, from 1; 11 is the one with eight half circles a phase.
     #[arg(long)]
     row: Option<usize>,
+    /// Fits each path on the very drives that are checked, too, as the method hindsight: what the model of the wheels leaves; optiodom
+    /// only.
+    #[arg(long)]
+    hindsight: bool,
     /// One JSON array instead of a table.
     #[arg(long)]
     json: bool,
@@ -71,7 +75,7 @@ impl Calibration {
 
     fn optiodom(&self) -> anyhow::Result<()> {
         let folder = data::folder().context("the recordings are not there: set AGV_DATA to their folder")?;
-        let outcome = optiodom::run(&folder.join("optiodom"))?;
+        let outcome = optiodom::run(&folder.join("optiodom"), self.hindsight)?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&outcome.cells)?);
             return Ok(());

@@ -1,6 +1,6 @@
 //! `agv evaluate gyro`.
 
-use agv_lab::equipment::VehicleKind;
+use agv_lab::equipment::{VehicleKind, scale_error};
 use agv_lab::evaluate::gyro::{self, GyroOptions, HeadingRow, SlipRow, SoundRow};
 
 use super::super::progress;
@@ -12,6 +12,7 @@ Examples:
   agv evaluate gyro --runs 3 --only slips
   agv evaluate gyro --runs 400 --only sound
   agv evaluate gyro --vehicle differential --runs 40 --json
+  agv evaluate gyro --runs 40 --only headings --scale-error 0
 
 Keys of --json: headings [vehicle, before, way, has_gyro, drives, median_deg, mark_95_deg, worst_deg, worst_seed, beyond_level,
 false_alarms], slips [vehicle, way, shown_by, drives, told, longest_m, worst_seed, beyond_level],
@@ -41,6 +42,10 @@ pub struct Gyro {
     /// This vehicle alone. [default: tricycle, differential, bi-steerable and omni4]
     #[arg(long)]
     vehicle: Option<VehicleKind>,
+    /// True error of the gyro's scale where headings are measured, share; the seed chooses its sign, and what is stated of it stays
+    /// [default: 0.002].
+    #[arg(long, value_name = "SHARE", value_parser = scale_error)]
+    scale_error: Option<f64>,
 }
 
 /// Drives of each kind if nothing is said.
@@ -61,6 +66,7 @@ impl Gyro {
             slips: self.only.is_none_or(|only| only == Part::Slips),
             sound: self.only.is_none_or(|only| only == Part::Sound),
             only: self.vehicle,
+            scale_error: self.scale_error,
         };
         let bar = progress::bar("driving", options.count());
         let outcome = gyro::run(&options, || bar.inc(1))?;

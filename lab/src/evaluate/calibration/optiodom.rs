@@ -37,7 +37,8 @@ pub struct Cell {
     pub path: String,
     /// Drives.
     pub drives: usize,
-    /// "nominal", "closed_form" or "joint".
+    /// "nominal", "closed_form", "joint", or "hindsight": the joint fit on these very drives, which no calibration can know before. It
+    /// tells what the model of the wheels leaves.
     pub method: &'static str,
     /// Position at the end, m.
     pub end_m: f64,
@@ -84,21 +85,26 @@ struct Check {
     drive: WheelDrive,
 }
 
-/// Fits and checks all kinds.
+/// Fits and checks all kinds; `with_hindsight` says whether each path is fitted on its own checks as well.
 ///
 /// # Errors
 /// If the data are not there, or a fit gives nothing.
-pub fn run(folder: &Path) -> anyhow::Result<Outcome> {
+pub fn run(folder: &Path, with_hindsight: bool) -> anyhow::Result<Outcome> {
     let mut outcome = Outcome { fits: Vec::new(), cells: Vec::new() };
     for (kind, name, fitted_on) in FITTED {
-        let (fits, cells) = of_kind(kind, &folder.join(name), fitted_on).with_context(|| kind.to_owned())?;
+        let (fits, cells) = of_kind(kind, &folder.join(name), fitted_on, with_hindsight).with_context(|| kind.to_owned())?;
         outcome.fits.push(fits);
         outcome.cells.extend(cells);
     }
     Ok(outcome)
 }
 
-fn of_kind(kind: &'static str, folder: &Path, fitted_on: &[&str]) -> anyhow::Result<(Calibrated, Vec<Cell>)> {
+fn of_kind(
+    kind: &'static str,
+    folder: &Path,
+    fitted_on: &[&str],
+    with_hindsight: bool,
+) -> anyhow::Result<(Calibrated, Vec<Cell>)> {
     let sessions =
         fitted_on.iter().map(|name| Ok(optiodom::read(&folder.join(name))?)).collect::<anyhow::Result<Vec<_>>>()?;
     let first = sessions.first().context("no session to fit")?;
@@ -116,6 +122,12 @@ fn of_kind(kind: &'static str, folder: &Path, fitted_on: &[&str]) -> anyhow::Res
         for (method, model) in methods.iter().filter(|_| !checks.is_empty()) {
             let open = if *method == "joint" { fit.fitted.as_slice() } else { &[] };
             cells.push(cell(kind, &path, method, model, open, &checks)?);
+        }
+        if with_hindsight && !checks.is_empty() {
+            let drives: Vec<WheelDrive> =
+                checks.iter().map(|check| check.drive.clone()).collect();
+            let fit = calibrate(first, &drives)?;
+            cells.push(cell(kind, &path, "hindsight", &fit.model, &fit.fitted, &checks)?);
         }
     }
     let fitted_on = sessions.iter().flat_map(|session| session.runs.iter().map(|(name, _)| name.clone())).collect();
@@ -167,7 +179,7 @@ fn cell(
     fitted: &[Fitted],
     checks: &[Check],
 ) -> anyhow::Result<Cell> {
-    let is_joint = method == "joint";
+    let is_joint = ["joint", "hindsight"].contains(&method);
     let error = |check: &Check, clock: &Clock| {
         TrajectoryError::of(&check.drive, model, clock).with_context(|| format!("{}: no motion", check.name))
     };
