@@ -93,11 +93,12 @@ impl<'a> Seen<'a> {
         };
         let named = |observation| {
             let place = place(observation)?;
-            let distance = |known: &&IdentifiedLandmark| {
-                libm::hypot(known.landmark.x.metres() - place.x, known.landmark.y.metres() - place.y)
+            let beside = |known: &IdentifiedLandmark| {
+                (known.landmark.x.metres() - place.x).powi(2) + (known.landmark.y.metres() - place.y).powi(2)
             };
-            let nearest = self.sensor.layout().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-            (distance(&nearest) <= NEAR).then_some(nearest.id)
+            let known = self.sensor.layout().iter().map(|known| (beside(known), known.id));
+            let (square, id) = known.min_by(|(one, _), (other, _)| one.total_cmp(other))?;
+            (square <= NEAR * NEAR).then_some(id)
         };
         self.turn.reflectors.iter().map(named).collect()
     }
