@@ -1,9 +1,9 @@
 //! Whether the laser has moved as the odometry says, held against the history of each place.
 #![allow(clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_core::geometry::Point;
+use agv_core::geometry::{Point, Pose};
 use agv_core::integrity::SlipCheck;
-use agv_core::measurement::Time;
+use agv_core::measurement::{LaserId, Scan, Time};
 
 use super::falko::scene::Random;
 
@@ -173,5 +173,74 @@ fn a_fifth_of_the_landmarks_is_enough() {
             }
             assert_eq!(check.disagrees(), expected && revolution == 4, "{seen} {revolution}");
         }
+    }
+}
+
+/// Places around a laser at the origin.
+fn around(index: usize, count: usize) -> Point {
+    let angle = 0.4 + std::f64::consts::TAU * index as f64 / count as f64;
+    Point::new(5.0 * angle.cos(), 5.0 * angle.sin())
+}
+
+/// Whether a check tells that landmarks are gone: so many were seen three times, and then none; every beam of the scans ends at `range`, m.
+/// Which of the revolutions without any tells it first.
+fn told_gone(count: usize, range: f32, has_scan: impl Fn(usize) -> bool) -> Option<usize> {
+    let ranges = vec![range; 720];
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: time(0),
+        beam_interval: 0.0,
+        first_bearing: -std::f64::consts::PI,
+        bearing_step: std::f64::consts::TAU / 720.0,
+        ranges: &ranges,
+        intensities: &[],
+    };
+    let mut check = SlipCheck::new();
+    (0..7).find_map(|revolution| {
+        check.begin(time(revolution));
+        for index in (0..count).filter(|_| revolution < 3) {
+            check.see(&around(index, count), 5.0);
+        }
+        assert!(!check.disagrees());
+        let misses = has_scan(revolution) && check.misses(&scan, &Pose::default());
+        assert!(!(misses && revolution < 3));
+        misses.then(|| revolution - 3)
+    })
+}
+
+/// A vehicle that was carried to where there is no reflector sees none, although nothing hides them.
+#[test]
+fn landmarks_that_nothing_hides_and_that_are_all_gone_tell_a_move() {
+    let always = |_: usize| true;
+    for (count, told) in [(6, Some(0)), (4, Some(0)), (3, Some(1)), (2, None), (0, None)] {
+        assert_eq!(told_gone(count, 8.0, always), told, "{count}");
+    }
+    // What ends at a post whose foil is gone has nothing before it.
+    assert_eq!(told_gone(4, 4.9, always), Some(0));
+    // Something stands before them, or nobody knows what does.
+    assert_eq!(told_gone(6, 4.5, always), None);
+    assert_eq!(told_gone(6, 0.0, always), None);
+    assert_eq!(told_gone(6, f32::INFINITY, always), None);
+    // Two revolutions with scans that do not follow each other are not two in a row.
+    assert_eq!(told_gone(3, 8.0, |revolution| revolution != 4), None);
+}
+
+#[test]
+fn one_landmark_that_is_seen_again_is_enough_against_a_move() {
+    let ranges = [8.0; 720];
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: time(0),
+        beam_interval: 0.0,
+        first_bearing: 0.0,
+        bearing_step: std::f64::consts::TAU / 720.0,
+        ranges: &ranges,
+        intensities: &[],
+    };
+    let mut check = SlipCheck::new();
+    for revolution in 0..8 {
+        check.begin(time(revolution));
+        (0..6).filter(|index| revolution < 3 || *index == 0).for_each(|index| check.see(&around(index, 6), 5.0));
+        assert!(!check.misses(&scan, &Pose::default()), "{revolution}");
     }
 }

@@ -34,7 +34,7 @@ pub use turn_check::{GyroFault, LastingErrors, TurnCheck};
 
 use crate::geometry::{Point, Pose};
 use crate::maps::{LandmarkKind, Verdict};
-use crate::measurement::{LASERS, LaserId, Time};
+use crate::measurement::{LASERS, LaserId, Scan, Time};
 pub use crate::state::ProtectionLevel;
 use crate::state::{LandmarkSource, LandmarkUse};
 
@@ -112,6 +112,18 @@ impl Integrity {
             slip.see(&place, libm::hypot(x, y));
         }
         slip.disagrees()
+    }
+
+    /// Whether a scan of that laser is awaited, because none of the reflectors was seen again that should be.
+    #[must_use]
+    pub fn sees_none_again(&self, laser: LaserId) -> bool {
+        self.slip.get(laser.index()).is_some_and(SlipCheck::sees_none_again)
+    }
+
+    /// Takes a scan of a laser whose reflectors of that revolution were taken just before; `sensor` is where the laser was in the middle of
+    /// it, in the frame of the odometry. True if those that should be seen again are gone.
+    pub fn see_scan(&mut self, scan: &Scan, sensor: &Pose) -> bool {
+        self.slip.get_mut(scan.laser.index()).is_some_and(|slip| slip.misses(scan, sensor))
     }
 
     /// Takes what the landmarks of a fixed map have made of the estimate, up to `now`, if there are enough of them.

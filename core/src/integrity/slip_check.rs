@@ -3,12 +3,13 @@
 //! Landmarks are remembered for a moment in the frame of the odometry. If the vehicle moves as its odometry says, those
 //! seen a revolution ago are seen again where they were. If hardly one of them is, and most of what is seen instead is new,
 //! the laser has moved otherwise: the vehicle has slid or was carried, its wheel has spun, or the laser was knocked.
+//! The same is true if none of them is seen again although the scan shows nothing before their places.
 //! No map is needed, so that a wrong place that looks right does not hide it.
 
 use heapless::Vec;
 
-use crate::geometry::{Point, ScanPoint};
-use crate::measurement::Time;
+use crate::geometry::{Point, Pose, ScanPoint};
+use crate::measurement::{Scan, Time};
 
 /// Landmarks that are remembered.
 const REMEMBERED: usize = 32;
@@ -26,6 +27,14 @@ const TOO_FEW: f64 = 0.2;
 const IN_A_ROW: u8 = 2;
 /// How far from its place one may be seen again, m, and by how much more for each metre of its distance.
 const GATE: (f64, f64) = (0.05, 0.006);
+/// Nothing stands before a landmark if the beams toward it, within this distance, m, and this turn, rad, end no nearer than it by so
+/// much, m, at most; landmarks between these ranges are looked for.
+const BESIDE: (f64, f64) = (0.2, 0.02);
+const BEFORE: f64 = 0.3;
+const RANGES: (f64, f64) = (1.0, 15.0);
+/// Landmarks that are gone, with none seen again, in one revolution, and in each of two in a row: a laser misses a landmark that it sees
+/// well less than once in fifty revolutions, and flat ones may turn out of its sight, two at once on both sides of an aisle.
+const GONE: [usize; 2] = [4, 3];
 
 #[derive(Clone, Copy, Debug)]
 struct Remembered {
@@ -58,6 +67,10 @@ pub struct SlipCheck {
     seen: u8,
     new: u8,
     contradictions: u8,
+    /// Revolutions in a row in which landmarks were gone.
+    gone: u8,
+    /// Whether the scan of the revolution is still to come.
+    awaits_scan: bool,
 }
 
 impl SlipCheck {
@@ -65,13 +78,24 @@ impl SlipCheck {
     #[must_use]
     pub const fn new() -> Self {
         let last = Time::from_micros(0);
-        Self { remembered: Vec::new(), last, expected: 0, seen_again: 0, seen: 0, new: 0, contradictions: 0 }
+        Self {
+            remembered: Vec::new(),
+            last,
+            expected: 0,
+            seen_again: 0,
+            seen: 0,
+            new: 0,
+            contradictions: 0,
+            gone: 0,
+            awaits_scan: false,
+        }
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.remembered.clear();
         self.contradictions = 0;
+        self.gone = 0;
     }
 
     /// Begins a revolution that ends at `now`.
@@ -87,6 +111,9 @@ impl SlipCheck {
         }
         self.remembered.retain(|one| one.age <= MEMORY);
         (self.seen_again, self.seen, self.new) = (0, 0, 0);
+        // Without a scan nobody knows what hides them.
+        self.gone = if self.awaits_scan { 0 } else { self.gone };
+        self.awaits_scan = true;
     }
 
     /// Takes a landmark of the revolution: where it is in the frame of the odometry, m, and how far from the laser, m.
@@ -125,11 +152,34 @@ impl SlipCheck {
     /// Ends the revolution. True if the laser has moved otherwise than the odometry says.
     pub fn disagrees(&mut self) -> bool {
         let can_tell = usize::from(self.expected.min(self.seen)) >= LEAST;
+        self.gone = if self.sees_none_again() { self.gone } else { 0 };
         let is_contradicted = can_tell
             && f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
             && self.new >= self.seen.saturating_sub(self.new);
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
         self.contradictions >= IN_A_ROW
+    }
+
+    /// Whether a scan is awaited because no landmark was seen again of those that should be.
+    #[must_use]
+    pub fn sees_none_again(&self) -> bool {
+        let [_, fewest] = GONE;
+        self.awaits_scan && self.seen_again == 0 && usize::from(self.expected) >= fewest
+    }
+
+    /// Takes the scan of the revolution that has ended, whose laser was at `sensor` in the frame of the odometry. True if landmarks that
+    /// should be seen again are gone, though nothing hides them, and none is there.
+    pub fn misses(&mut self, scan: &Scan, sensor: &Pose) -> bool {
+        let is_gone = |one: &&Remembered| {
+            let place = sensor.inverse_transform(&one.position.cast());
+            let is_near = (RANGES.0..=RANGES.1).contains(&libm::hypot(place.x, place.y));
+            one.is_expected() && one.age > 0 && is_near && scan.passes(&place, BESIDE, -BEFORE)
+        };
+        let [at_once, in_a_row] = GONE;
+        let gone = if self.sees_none_again() { self.remembered.iter().filter(is_gone).count() } else { 0 };
+        self.awaits_scan = false;
+        self.gone = if gone >= in_a_row { self.gone.saturating_add(1) } else { 0 };
+        gone >= at_once || self.gone >= IN_A_ROW
     }
 }
 

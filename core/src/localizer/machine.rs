@@ -237,6 +237,9 @@ impl<C: Capacities> Localizer<C> {
         }
         if let Some(before) = before {
             self.check(&before, revolution_of);
+            if let Event::Scan(scan) = event {
+                self.look_for_landmarks(scan);
+            }
             self.separate(event.laser());
         }
         self.publish(sees);
@@ -317,6 +320,20 @@ impl<C: Capacities> Localizer<C> {
             if is_right && !self.parameters.maps.slam {
                 self.integrity.judge_traction(before, &after, uses, self.timeline.now());
             }
+        }
+    }
+
+    /// Lets the checks compare a scan with the reflectors of its revolution, which were taken just before.
+    fn look_for_landmarks(&mut self, scan: &Scan) {
+        let is_awaited = self.lost.is_none() && self.integrity.sees_none_again(scan.laser);
+        let Some(timeline) = self.timeline.begun().filter(|_| is_awaited) else { return };
+        let Some(mount) = self.parameters.lasers.mount(scan.laser) else { return };
+        let middle = scan.start.offset(0.5 * scan.end().since(scan.start));
+        let motions = timeline.motions(middle, timeline.now());
+        let since = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
+        let sensor = timeline.odometry_pose().compose(&since.inverse()).compose(mount);
+        if self.integrity.see_scan(scan, &sensor) {
+            self.lost = Some(Reason::MotionDisagrees);
         }
     }
 

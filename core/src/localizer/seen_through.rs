@@ -1,8 +1,6 @@
 //! Places of mapped reflectors through which the beams of scans have passed: no reflector stands there, or it would have stopped
 //! them.
 
-use core::f64::consts::TAU;
-
 use heapless::Vec;
 
 use crate::geometry::{Point, Pose};
@@ -69,20 +67,5 @@ impl SeenThrough {
 
 /// Whether all beams toward a place in S end behind it.
 fn passes(scan: &Scan, place: &Point) -> bool {
-    let range = libm::hypot(place.x, place.y);
-    let step = libm::fabs(scan.bearing_step);
-    if !(RANGES.0..=RANGES.1).contains(&range) || step <= 0.0 {
-        return false;
-    }
-    let reach = BESIDE.0 / range + BESIDE.1;
-    let from_first = (libm::atan2(place.y, place.x) - scan.first_bearing) * libm::copysign(1.0, scan.bearing_step);
-    let beams = libm::ceil(2.0 * reach / step) as usize + 1;
-    let turn = libm::round(TAU / step) as usize;
-    (0..beams.min(scan.ranges.len())).all(|beam| {
-        let angle = (from_first - reach + beam as f64 * step) % TAU;
-        let angle = if angle < 0.0 { angle + TAU } else { angle };
-        // Past the last beam of a whole turn is the first one.
-        let end = (libm::round(angle / step) as usize).checked_rem(turn).and_then(|index| scan.ranges.get(index));
-        end.is_some_and(|end| end.is_finite() && f64::from(*end) > range + BEHIND)
-    })
+    (RANGES.0..=RANGES.1).contains(&libm::hypot(place.x, place.y)) && scan.passes(place, BESIDE, BEHIND)
 }

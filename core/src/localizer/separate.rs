@@ -83,7 +83,7 @@ impl<C: Capacities> Localizer<C> {
             (Some(landmark), Verdict::Gated) if is_reflector => {
                 let [x, y] = seen.located;
                 let place = landmark.position();
-                self.separation.contradict(libm::hypot(place.x - x, place.y - y), range);
+                self.separation.displace([place.x - x, place.y - y], range);
             }
             (None, Verdict::Unknown) if is_reflector && self.has_reflectors() => {
                 self.separation.contradict(radius, range);

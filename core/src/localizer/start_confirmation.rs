@@ -13,7 +13,9 @@ pub struct StartRule {
     pub revolutions: u16,
     /// Reflectors that the map explains,
     pub reflectors: usize,
-    /// or the distance between two looks that find the same place, m.
+    /// and so many more for each that it does not;
+    pub for_unexplained: usize,
+    /// or, if it explains all, the distance between two looks that find the same place, m.
     pub apart: f64,
     /// Reflectors count that were seen in so many revolutions.
     pub times: u8,
@@ -23,14 +25,15 @@ pub struct StartRule {
 
 impl StartRule {
     /// One look is believed.
-    pub const ONE_LOOK: Self = Self { revolutions: 1, reflectors: 0, apart: 0.0, times: 1, explained: 0.0 };
+    pub const ONE_LOOK: Self =
+        Self { revolutions: 1, reflectors: 0, for_unexplained: 0, apart: 0.0, times: 1, explained: 0.0 };
 }
 
 impl Default for StartRule {
-    /// Eight revolutions, and five reflectors or two looks 2 m apart; three in four reflectors fit, and none is missing whose
-    /// place the scans pass through.
+    /// Eight revolutions, and five reflectors, with three more for each that does not fit, or two looks 2 m apart at which all fit; three
+    /// in four reflectors fit, and none is missing whose place the scans pass through.
     fn default() -> Self {
-        Self { revolutions: 8, reflectors: 5, apart: 2.0, times: 2, explained: 0.75 }
+        Self { revolutions: 8, reflectors: 5, for_unexplained: 3, apart: 2.0, times: 2, explained: 0.75 }
     }
 }
 
@@ -115,7 +118,7 @@ impl StartConfirmation {
             *look
         });
         self.first = Some(first);
-        let StartRule { revolutions, reflectors: enough, apart, times, explained } = self.rule;
+        let StartRule { revolutions, reflectors: enough, for_unexplained, apart, times, explained } = self.rule;
         let between = first.odometry.between(&look.odometry);
         let is_long = look.revolutions.saturating_sub(first.revolutions).saturating_add(1) >= revolutions;
         let pose = look.moved_to(odometry);
@@ -126,7 +129,9 @@ impl StartConfirmation {
         {
             return Belief::Contradicted;
         }
-        if is_long && (fitting >= enough || libm::hypot(between.x, between.y) >= apart) {
+        let unexplained = seen.saturating_sub(fitting);
+        let is_apart = unexplained == 0 && libm::hypot(between.x, between.y) >= apart;
+        if is_long && (is_apart || fitting >= enough + for_unexplained * unexplained) {
             Belief::Confirmed
         } else {
             Belief::Open

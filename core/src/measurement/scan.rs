@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use super::{LaserId, Time};
+use crate::geometry::Point;
 
 /// Ranges of one sweep. Beam `i` was measured at `start + i * beam_interval` in the direction
 /// `first_bearing + i * bearing_step` of S, from wherever S was then: motion is not corrected.
@@ -74,6 +75,28 @@ impl Scan<'_> {
     #[must_use]
     pub fn end(&self) -> Time {
         self.beam_time(self.ranges.len().saturating_sub(1))
+    }
+
+    /// Whether all beams that pass a place in S within so many m and so many rad end further away than it, by `behind`, m, at least. A
+    /// beam without a return says nothing of what it has passed.
+    #[must_use]
+    pub fn passes(&self, place: &Point, (beside, turn): (f64, f64), behind: f64) -> bool {
+        let range = libm::hypot(place.x, place.y);
+        let step = libm::fabs(self.bearing_step);
+        if range <= 0.0 || step <= 0.0 {
+            return false;
+        }
+        let reach = beside / range + turn;
+        let from_first = (libm::atan2(place.y, place.x) - self.first_bearing) * libm::copysign(1.0, self.bearing_step);
+        let beams = libm::ceil(2.0 * reach / step) as usize + 1;
+        let whole = libm::round(TAU / step) as usize;
+        (0..beams.min(self.ranges.len())).all(|beam| {
+            let angle = (from_first - reach + beam as f64 * step) % TAU;
+            let angle = if angle < 0.0 { angle + TAU } else { angle };
+            // Past the last beam of a whole turn is the first one.
+            let end = (libm::round(angle / step) as usize).checked_rem(whole).and_then(|index| self.ranges.get(index));
+            end.is_some_and(|end| end.is_finite() && *end > 0.0 && f64::from(*end) > range + behind)
+        })
     }
 
     /// Whether the last beam and the first one are neighbours, as in a full revolution.

@@ -2,7 +2,8 @@
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::integrity::separation::{
-    AssumedDeviations, FAULT_FREE, Laser, ONE_FAULT, Seen, Solution, SolutionSeparation, Step, fault_free,
+    AssumedDeviations, FAULT_FREE, LandmarkKey, Laser, ONE_FAULT, Seen, SensorInformation, Solution,
+    SolutionSeparation, Step, fault_free,
 };
 use agv_core::measurement::Time;
 use agv_core::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion};
@@ -229,6 +230,46 @@ fn what_contradicts_widens_the_bound_by_its_size() {
     let level = drive.monitor.level();
     assert!((level.position - before.position - 0.4).abs() < 0.01, "{level:?} {before:?}");
     assert!((level.heading - before.heading - 0.05).abs() < 0.005, "{level:?} {before:?}");
+}
+
+/// Half of the reflectors was moved, and most of what is seen belongs to that half: the few that contradict agree with each other.
+#[test]
+fn two_that_are_elsewhere_by_the_same_widen_the_bound_even_among_many() {
+    let widened = |fitting: u32, displaced: &[[f64; 2]]| {
+        let mut drive = Drive::new(6);
+        (0..12).for_each(|_| drive.revolve(&Pose::new(0.125, 0.0, 0.0)));
+        let before = drive.monitor.level();
+        let laser = drive.monitor.laser(&drive.mount, &drive.published);
+        drive.monitor.begin_event();
+        for _ in 0..fitting {
+            drive.monitor.take(LandmarkKey::Features, SensorInformation::NONE);
+        }
+        displaced.iter().for_each(|by| drive.monitor.displace(*by, 8.0));
+        drive.monitor.end_event(&drive.published, &laser, 1.0);
+        drive.monitor.level().position - before.position
+    };
+    assert!((widened(12, &[[0.3, 0.0], [0.28, 0.03]]) - 0.29).abs() < 0.01);
+    assert!((widened(12, &[[0.1, 0.2], [0.3, 0.0], [0.3, 0.04]]) - 0.28).abs() < 0.01);
+    // As far, but elsewhere; one alone; two among more than one in ten can be.
+    assert!(widened(12, &[[0.3, 0.0], [0.0, 0.3]]) < 0.01);
+    assert!(widened(12, &[[0.3, 0.0]]) < 0.01);
+    assert!(widened(20, &[[0.3, 0.0], [0.3, 0.0]]) < 0.01);
+}
+
+/// While the heading is hardly known, what seems to be learnt of the place of the laser is not.
+#[test]
+fn a_vehicle_that_does_not_know_its_heading_bounds_no_position() {
+    let mut drive = Drive::new(3);
+    (0..44).for_each(|_| drive.revolve(&Pose::new(0.125, 0.0, 0.0)));
+    drive.begin_doubting();
+    let mut is_open = true;
+    for number in 0..200 {
+        drive.revolve(&if number < 60 { Pose::new(0.125, 0.0, 0.0) } else { Pose::new(0.1, 0.002, 0.04) });
+        let level = drive.monitor.level();
+        assert!(level.position > 5.0 || level.heading < 0.02 || !is_open, "{number}: {level:?}");
+        is_open &= level.position > 5.0;
+    }
+    assert!(!is_open);
 }
 
 /// As long as the corrections say that the laser moves, a laser that creeps fast may be where nothing has shown it yet.

@@ -190,7 +190,9 @@ impl GyroOptions {
 
     fn kinds(&self) -> impl Iterator<Item = Kind> {
         let scale_error = self.scale_error;
-        let of = move |vehicle| kinds().map(move |(before, way, has_gyro)| Kind { vehicle, before, way, has_gyro, scale_error });
+        let of = move |vehicle| {
+            kinds().map(move |(before, way, has_gyro)| Kind { vehicle, before, way, has_gyro, scale_error })
+        };
         self.vehicles().filter(|_| self.headings).flat_map(of)
     }
 

@@ -1,10 +1,19 @@
 //! What of the landmarks contradicts the pose, and by how much that widens its bound: nobody can tell which of them are right.
 
+use heapless::Vec;
+
 use crate::state::ProtectionLevel;
 
 /// More than this share of what is seen contradicts the pose, if it is so many at least; fewer may be false reflectors.
 const CONTRADICTED: f64 = 0.25;
 const LEAST_CONTRADICTING: f64 = 2.5;
+/// Landmarks that are elsewhere by the same, within this distance, m, were moved together, or the vehicle was with the others: so many of
+/// them contradict the pose if they are more than this share of what is seen.
+const ALIKE_WITHIN: f64 = 0.05;
+const LEAST_ALIKE: usize = 2;
+const ALIKE: f64 = 0.1;
+/// Displacements that are compared in an event.
+const COMPARED: usize = 8;
 /// What they count from one event to the next.
 const FADING: f64 = 0.8;
 /// Over this distance, m, the widening is forgotten by 1/e.
@@ -46,6 +55,8 @@ impl Evidence {
 #[derive(Clone, Debug)]
 pub struct Contradiction {
     event: Evidence,
+    /// By how much landmarks of the event are elsewhere in W, m.
+    displaced: Vec<[f64; 2], COMPARED>,
     lately: Evidence,
     widening: ProtectionLevel,
 }
@@ -54,7 +65,7 @@ impl Contradiction {
     /// Nothing contradicts the pose.
     #[must_use]
     pub const fn new() -> Self {
-        Self { event: Evidence::NONE, lately: Evidence::NONE, widening: ProtectionLevel::NONE }
+        Self { event: Evidence::NONE, displaced: Vec::new(), lately: Evidence::NONE, widening: ProtectionLevel::NONE }
     }
 
     /// Takes a distance, m, over which contradictions are forgotten.
@@ -67,6 +78,7 @@ impl Contradiction {
     /// Begins to take what one event tells.
     pub fn begin_event(&mut self) {
         self.event = Evidence::NONE;
+        self.displaced.clear();
     }
 
     /// Takes a landmark that fits.
@@ -74,7 +86,15 @@ impl Contradiction {
         self.event.fitting += 1.0;
     }
 
-    /// Takes one that is so far from where it should be, m, and so far from the laser, m.
+    /// Takes one that is elsewhere by so much in W, m, and so far from the laser, m.
+    pub fn displace(&mut self, by: [f64; 2], range: f64) {
+        // What exceeds the room counts all the same, but is not compared.
+        let _ = self.displaced.push(by);
+        let [x, y] = by;
+        self.contradict(libm::hypot(x, y), range);
+    }
+
+    /// Takes one that belongs to none of the map within so many m, and is so far from the laser, m.
     pub fn contradict(&mut self, by: f64, range: f64) {
         self.event.contradicting += 1.0;
         self.event.by.0 += by;
@@ -89,7 +109,20 @@ impl Contradiction {
                 self.widening = self.widening.or(&evidence.mean());
             }
         }
+        if self.are_alike() && self.event.share() > ALIKE {
+            self.widening = self.widening.or(&self.event.mean());
+        }
         self.event.share() > CONTRADICTED
+    }
+
+    /// Whether enough landmarks are elsewhere by the same.
+    fn are_alike(&self) -> bool {
+        let near = |one: &[f64; 2], other: &[f64; 2]| {
+            let [[x, y], [other_x, other_y]] = [*one, *other];
+            libm::hypot(x - other_x, y - other_y) <= ALIKE_WITHIN
+        };
+        let count = |one: &[f64; 2]| self.displaced.iter().filter(|other| near(one, other)).count();
+        self.displaced.iter().any(|one| count(one) >= LEAST_ALIKE)
     }
 
     /// By how much the bound is wider.

@@ -2,9 +2,12 @@
 
 use heapless::Vec;
 
+use super::assumed::Factors;
 use super::sensor_information::SensorInformation;
-use super::solution::{Laser, Solution};
+use super::solution::{FREE_POSITION, Laser, Solution};
+use crate::geometry::Pose;
 use crate::measurement::Time;
+use crate::state::ProtectionLevel;
 
 /// Landmarks that one solution leaves out.
 pub const TOGETHER: usize = 8;
@@ -142,6 +145,15 @@ impl FreeSince {
     #[must_use]
     pub fn counts(&self) -> bool {
         self.is_needed || self.has_found_mounting() || self.is_well_known()
+    }
+
+    /// How far a pose may be off if this solution is right; see [`Solution::bound`]. What is said of places while the heading was hardly
+    /// known does not count.
+    #[must_use]
+    pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> ProtectionLevel {
+        let level = self.solution.bound(pose, factors, map_variances);
+        let least = if self.awaits_heading { factors.position * FREE_POSITION } else { 0.0 };
+        ProtectionLevel { position: level.position.max(least), ..level }
     }
 
     /// Whether a free yaw of the laser has been found.

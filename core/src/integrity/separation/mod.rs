@@ -364,7 +364,12 @@ impl SolutionSeparation {
         }
     }
 
-    /// Takes one that is so far from where it should be, m, and so far from the laser, m.
+    /// Takes one that is elsewhere by so much in W, m, and so far from the laser, m.
+    pub fn displace(&mut self, by: [f64; 2], range: f64) {
+        self.contradiction.displace(by, range);
+    }
+
+    /// Takes one that belongs to none of the map within so many m, and is so far from the laser, m.
     pub fn contradict(&mut self, by: f64, range: f64) {
         self.contradiction.contradict(by, range);
     }
@@ -520,10 +525,11 @@ impl SolutionSeparation {
             .chain(self.leave_outs.iter().map(|one| &one.solution))
             .chain(self.knocks.iter().map(|one| &one.solution))
             .chain(self.gyro.as_ref().map(GyroSeparation::alone))
-            .chain(found_mounting.into_iter().chain(found_yaw).map(|one| &one.solution))
             .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
                 level.or(&solution.bound(pose, &one_fault, self.map_variances))
             });
+        let free = found_mounting.into_iter().chain(found_yaw);
+        let level = free.fold(level, |level, one| level.or(&one.bound(pose, &one_fault, self.map_variances)));
         let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
         ProtectionLevel {
             position: level.position + contradiction.position + misfit.position,

@@ -92,7 +92,8 @@ struct Check {
 pub fn run(folder: &Path, with_hindsight: bool) -> anyhow::Result<Outcome> {
     let mut outcome = Outcome { fits: Vec::new(), cells: Vec::new() };
     for (kind, name, fitted_on) in FITTED {
-        let (fits, cells) = of_kind(kind, &folder.join(name), fitted_on, with_hindsight).with_context(|| kind.to_owned())?;
+        let (fits, cells) =
+            of_kind(kind, &folder.join(name), fitted_on, with_hindsight).with_context(|| kind.to_owned())?;
         outcome.fits.push(fits);
         outcome.cells.extend(cells);
     }
@@ -124,8 +125,7 @@ fn of_kind(
             cells.push(cell(kind, &path, method, model, open, &checks)?);
         }
         if with_hindsight && !checks.is_empty() {
-            let drives: Vec<WheelDrive> =
-                checks.iter().map(|check| check.drive.clone()).collect();
+            let drives: Vec<WheelDrive> = checks.iter().map(|check| check.drive.clone()).collect();
             let fit = calibrate(first, &drives)?;
             cells.push(cell(kind, &path, "hindsight", &fit.model, &fit.fitted, &checks)?);
         }
