@@ -103,12 +103,24 @@ pub struct Kind {
     pub knock: Option<toml::Table>,
     /// How the vehicle is lifted and set down.
     pub carry: Option<toml::Table>,
-    /// What reveals it; until then the fault is of class C.
+    /// What reveals it once it is all there: before the drive, or when a laser that creeps has come to its end. Until then the fault is
+    /// of class C.
     #[serde(default)]
     pub revealed: Option<Revealed>,
     /// Whether the start is told, as it is what is tested.
     #[serde(default)]
     pub tells_start: bool,
+}
+
+/// A fault that no sensor of the vehicle can tell before something reveals it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hidden {
+    /// When it begins, and from when on it is all there, s since the drive began.
+    pub from: f64,
+    /// See [`Self::from`].
+    pub since: f64,
+    /// What reveals it then.
+    pub by: Revealed,
 }
 
 /// What goes wrong in one run.
@@ -240,6 +252,13 @@ impl Kind {
             return Ok(Drawn::Nothing);
         }
         Ok(Drawn::Fault(Fault { name: self.name.clone(), from, until, what, can_recover: until.is_some() }))
+    }
+
+    /// Until what it is hidden, if it was drawn to begin at `from`, s since the drive began; none of what any sensor can tell at once.
+    #[must_use]
+    pub fn hidden(&self, from: f64, drawn: &Drawn) -> Option<Hidden> {
+        let lasts = if let Drawn::Knock(knock) = drawn { knock.lasts } else { 0.0 };
+        self.revealed.map(|by| Hidden { from, since: from + lasts, by })
     }
 
     /// Whether a vehicle can have it.

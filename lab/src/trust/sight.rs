@@ -100,15 +100,16 @@ impl Sight {
             && lately.last().is_some_and(|look| look.turned >= TURNED)
     }
 
-    /// Whether what was wrong before the drive is revealed `time` s after it began.
+    /// Whether what was wrong from `since` on is revealed at `time`, s since the drive began.
     #[must_use]
-    pub fn reveals(&self, by: Revealed, time: f64) -> bool {
+    pub fn reveals(&self, by: Revealed, since: f64, time: f64) -> bool {
         let measure = |look: &Look| match by {
             Revealed::Turn => look.turned / TURNED,
             Revealed::Drive => look.driven / DRIVEN,
         };
-        let shown: f64 = self
-            .until(time)
+        let looks = self.until(time);
+        let wrong = looks.get(self.until(since).len().saturating_sub(1)..).unwrap_or_default();
+        let shown: f64 = wrong
             .windows(2)
             .filter(|pair| pair[1].seen >= RECOVERY_SIGHT)
             .map(|pair| measure(&pair[1]) - measure(&pair[0]))

@@ -9,7 +9,7 @@ use agv_host_sim::simulate::{START, simulate};
 
 use super::hall::{Hall, draw};
 use super::judge::{Judge, Moment};
-use super::kinds::{Drawn, Kind, Revealed};
+use super::kinds::{Drawn, Hidden, Kind};
 use super::outcome::Outcome;
 use super::sight::Sight;
 use crate::campaign::CampaignError;
@@ -81,13 +81,14 @@ impl Trial<'_> {
         let begins = begins.fold(f64::INFINITY, f64::min);
         let mut judge = Judge::new(AlertLimits::default());
         let mut here = None;
-        let mut hidden: Vec<Revealed> = self.kinds().filter_map(|(kind, _)| kind.revealed).collect();
+        let of_drawn = self.kinds().zip(&drawn);
+        let mut hidden: Vec<Hidden> = of_drawn.filter_map(|((kind, _), (from, drawn))| kind.hidden(*from, drawn)).collect();
         let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
         let options = RigOptions { seconds, seed: self.seed, is_told };
         rig::drive(&recording, &faults, &options, |heard| {
             let before = here;
             here = (heard.truth)(heard.now).or(before);
-            hidden.retain(|by| !sight.reveals(*by, heard.time));
+            hidden.retain(|one| !sight.reveals(one.by, one.since, heard.time));
             judge.hear(&Moment {
                 now: heard.now,
                 heard: heard.published,
@@ -97,7 +98,7 @@ impl Trial<'_> {
                 is_nominal: sight.is_nominal(heard.time),
                 is_bare: here.is_some_and(|here| is_within(&bare, &here)),
                 has_begun: heard.time >= begins,
-                is_hidden: !hidden.is_empty(),
+                is_hidden: hidden.iter().any(|one| heard.time >= one.from),
             });
         })?;
         let ends = |fault: &&Fault| fault.until.is_some_and(|until| sight.can_recover(until));

@@ -1,7 +1,7 @@
 //! Whether an encoder is to be believed.
 //!
-//! A counter cannot say that it is wrong, but a vehicle cannot do everything: it is no faster than its drive and cannot
-//! stop at once. What contradicts that, and silence, is a fault. With readings every 10 ms every fault is known at most
+//! A counter cannot say that it is wrong, but a vehicle cannot do everything: it is no faster than its drive, and can neither
+//! stop nor go back at once. What contradicts that, and silence, is a fault. With readings every 10 ms every fault is known at most
 //! 50 ms after it began, if [`PlausibilityMonitor::check`] is called at least every 5 ms.
 //!
 //! A counter that freezes is found by itself only while the vehicle is so fast that it could not have stopped within the
@@ -55,6 +55,10 @@ const FRAME_DELAY_PERIODS: f64 = 2.0;
 /// Ticks by which a step may exceed the fastest one: the rounding of its two ends.
 const JUMP_MARGIN: f64 = 2.0;
 
+/// A counter that should still go on as fast as brakes leave it, and goes back by more than this share of that, is reversed: a vehicle
+/// that rolls back when it has braked hard is slower.
+const REVERSED: f64 = 0.5;
+
 #[derive(Clone, Copy, Debug)]
 struct Reading {
     time: Time,
@@ -75,6 +79,8 @@ pub struct PlausibilityMonitor {
     moved: Option<Time>,
     /// The counter was at least so fast at that time, ticks/s.
     speed: Option<(Time, f64)>,
+    /// Whether it counted down then.
+    was_down: bool,
     expected_speed: f64,
     fault: Option<(EncoderFault, Time)>,
 }
@@ -92,6 +98,7 @@ impl PlausibilityMonitor {
             anchor: None,
             moved: None,
             speed: None,
+            was_down: false,
             expected_speed: 0.0,
             fault: None,
         }
@@ -139,9 +146,10 @@ impl PlausibilityMonitor {
             self.anchor = Some(reading);
             return None;
         };
-        let step = libm::fabs(self.range.step(last.position, position) as f64);
+        let signed_step = self.range.step(last.position, position) as f64;
+        let step = libm::fabs(signed_step);
         let longest = time.since(last.time).max(0.0) + FRAME_DELAY_PERIODS * self.limits.period;
-        if step > self.limits.fastest * longest + JUMP_MARGIN {
+        if self.is_reversed(signed_step, last.time, time) || step > self.limits.fastest * longest + JUMP_MARGIN {
             self.anchor = Some(reading);
             self.moved = None;
             self.speed = None;
@@ -154,6 +162,14 @@ impl PlausibilityMonitor {
             return Some(EncoderFault::Frozen);
         }
         None
+    }
+
+    /// Whether a step, in ticks, goes back from where the vehicle cannot but go on.
+    fn is_reversed(&self, step: f64, from: Time, to: Time) -> bool {
+        let going = self.speed_at(to);
+        let back = if self.was_down { step } else { -step };
+        let duration = to.since(from).max(self.limits.period);
+        going > 0.0 && back > REVERSED * going * duration + JUMP_MARGIN
     }
 
     fn measure_speed(&mut self, last: Reading, reading: Reading) {
@@ -171,6 +187,7 @@ impl PlausibilityMonitor {
             // What was known before still says how fast the vehicle was when the counter moved last.
             if least > self.speed_at(reading.time) {
                 self.speed = Some((reading.time, least));
+                self.was_down = self.range.step(anchor.position, reading.position) < 0;
             }
             self.anchor = Some(reading);
         }

@@ -161,3 +161,39 @@ fn a_fault_is_withdrawn_after_sound_readings_only() {
     monitor.reading(at(220.0), 100_000);
     assert_eq!(monitor.check(at(220.0)), None);
 }
+
+/// Readings every 10 ms of a counter at these places, m; the first fault that they show, and after how many readings.
+fn first_fault(places: impl Iterator<Item = f64>) -> Option<(EncoderFault, usize)> {
+    let mut monitor = PlausibilityMonitor::new(limits(), RANGE, at(0.0));
+    places.enumerate().find_map(|(index, place)| {
+        let fault = monitor.reading(at(10.0 * index as f64), counter(place, 5_000_000.0));
+        fault.map(|fault| (fault, index))
+    })
+}
+
+/// At any speed from which the vehicle could not have stopped, in either direction: the first reading that goes back shows it.
+#[test]
+fn a_counter_that_is_reversed_while_it_counts_has_jumped() {
+    for speed in [0.2, 0.5, 1.0, 1.9, -0.4, -1.5] {
+        let turned = |index: usize| 0.01 * speed * (50.0 - (index as f64 - 50.0).abs());
+        assert_eq!(first_fault((0..100).map(turned)), Some((EncoderFault::Jumped, 51)), "{speed}");
+    }
+}
+
+/// It stops by brakes that are harder than is stated, and rolls back by some millimetres; or turns round as brakes allow.
+#[test]
+fn a_vehicle_that_rolls_back_or_turns_round_has_not_jumped() {
+    let stop = |index: usize| {
+        let time = 0.01 * index as f64 - 0.5;
+        let (speed, brakes) = (1.5, 5.0);
+        let braking = time.clamp(0.0, speed / brakes);
+        let back = 0.005 * ((time - speed / brakes) / 0.1).clamp(0.0, 1.0);
+        speed * (time.min(0.0) + braking) - 0.5 * brakes * braking * braking - back
+    };
+    assert_eq!(first_fault((0..100).map(stop)), None);
+    let round = |index: usize| {
+        let time = 0.01 * index as f64 - 0.5;
+        1.0 * time - 0.5 * 2.0 * time.max(0.0).powi(2)
+    };
+    assert_eq!(first_fault((0..150).map(round)), None);
+}
