@@ -30,10 +30,10 @@ impl StartRule {
 }
 
 impl Default for StartRule {
-    /// Eight revolutions, and five reflectors, with three more for each that does not fit, or two looks 2 m apart at which all fit; three
+    /// Eight revolutions, and five reflectors, with four more for each that does not fit, or two looks 2 m apart at which all fit; three
     /// in four reflectors fit, and none is missing whose place the scans pass through.
     fn default() -> Self {
-        Self { revolutions: 8, reflectors: 5, for_unexplained: 3, apart: 2.0, times: 2, explained: 0.75 }
+        Self { revolutions: 8, reflectors: 5, for_unexplained: 4, apart: 2.0, times: 2, explained: 0.75 }
     }
 }
 
