@@ -82,7 +82,8 @@ impl Trial<'_> {
         let mut judge = Judge::new(AlertLimits::default());
         let mut here = None;
         let of_drawn = self.kinds().zip(&drawn);
-        let mut hidden: Vec<Hidden> = of_drawn.filter_map(|((kind, _), (from, drawn))| kind.hidden(*from, drawn)).collect();
+        let mut hidden: Vec<Hidden> =
+            of_drawn.filter_map(|((kind, _), (from, drawn))| kind.hidden(*from, drawn)).collect();
         let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
         let options = RigOptions { seconds, seed: self.seed, is_told };
         rig::drive(&recording, &faults, &options, |heard| {

@@ -7,6 +7,7 @@
 
 mod assumed;
 mod contradiction;
+mod creep;
 mod gyro;
 mod hypothesis;
 mod misfit;
@@ -18,6 +19,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, fault_free};
 use contradiction::Contradiction;
+use creep::Creeps;
 use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
@@ -38,16 +40,8 @@ const KNOCKS: usize = 12;
 const INTERVAL: f64 = 0.1;
 /// A solution without a landmark is kept for this distance after it was seen, m.
 const REMEMBERED: f64 = 10.0;
-/// The solution with a laser that creeps so fast that it is found: its place, m, and yaw, rad, for a square root of a metre, or of
-/// two seconds.
-const FAST_CREEP: (f64, f64) = (3e-2, 1.7e-2);
-/// It is found where the solutions lie further apart than so many deviations of what lies between them, in position and heading
-/// together. They drift apart over some ten metres, so there are 1e4 looks in 100 km: without a fault it is found once in 1000 km.
-const FOUND: f64 = 5.1;
 /// A laser is not knocked further than this, m, or turned by more, rad: it is the vehicle that was carried.
 const FURTHEST_KNOCK: (f64, f64) = (1.5, 0.6);
-/// The solution with a laser that creeps: its place, m, and yaw, rad, for a square root of a metre, or of two seconds.
-const CREEP: (f64, f64) = (1e-3, 5.2e-4);
 /// What all others allow for wear.
 const WEAR: (f64, f64) = (6e-5, 1e-5);
 /// The solution with an odometry that changes: scale, steering and turn for a square root of a metre.
@@ -89,10 +83,7 @@ pub struct SolutionSeparation {
     mounting: Option<FreeSince>,
     next_mounting: Option<FreeSince>,
     yaw: Option<FreeSince>,
-    creeping: Solution,
-    fast_creeping: Solution,
-    /// Whether the laser was found to creep fast.
-    creeps_fast: bool,
+    creeps: Creeps,
     /// Whether the corrections say that the laser has moved.
     is_laser_doubted: bool,
     odometry: Solution,
@@ -134,9 +125,7 @@ impl SolutionSeparation {
             mounting: None,
             next_mounting: None,
             yaw: None,
-            creeping: nowhere.clone(),
-            fast_creeping: nowhere.clone(),
-            creeps_fast: false,
+            creeps: Creeps::new(&nowhere),
             is_laser_doubted: false,
             odometry: nowhere,
             told: SensorInformation::NONE,
@@ -192,10 +181,7 @@ impl SolutionSeparation {
         if let Some(gyro) = &mut self.gyro {
             gyro.begin(pose, covariance, &self.assumed);
         }
-        self.creeping = self.all.clone();
-        if !self.creeps_fast {
-            self.fast_creeping = self.all.clone();
-        }
+        self.creeps.begin(&self.all);
         self.restart_odometry();
         self.leave_outs.clear();
         if self.mounting.is_none() {
@@ -282,7 +268,6 @@ impl SolutionSeparation {
         let passed = now.since(self.time);
         let lasted = distance.max(0.5 * now.since(self.time).max(0.0));
         let wear = [WEAR.0, WEAR.1].map(|deviation| deviation * deviation * lasted);
-        let creep = [CREEP.0, CREEP.1].map(|deviation| deviation * deviation * lasted);
         for solution in self.solutions() {
             solution.predict(&step);
             let [place, yaw] = wear;
@@ -296,10 +281,7 @@ impl SolutionSeparation {
                 solution.loosen_odometry(&[0.0, drift, 0.0]);
             }
         }
-        let [place, yaw] = creep;
-        self.creeping.loosen_mounting(place, yaw);
-        let [place, yaw] = [FAST_CREEP.0, FAST_CREEP.1].map(|deviation| deviation * deviation * lasted);
-        self.fast_creeping.loosen_mounting(place, yaw);
+        self.creeps.creep(lasted);
         self.contradiction.travel(distance);
         for one in &mut self.leave_outs {
             one.unseen += distance;
@@ -315,8 +297,9 @@ impl SolutionSeparation {
     /// All solutions.
     fn solutions(&mut self) -> impl Iterator<Item = &mut Solution> {
         let free = [&mut self.mounting, &mut self.next_mounting, &mut self.yaw];
-        [&mut self.all, &mut self.creeping, &mut self.fast_creeping, &mut self.odometry]
+        [&mut self.all, &mut self.odometry]
             .into_iter()
+            .chain(self.creeps.solutions())
             .chain(self.leave_outs.iter_mut().map(|one| &mut one.solution))
             .chain(self.knocks.iter_mut().map(|one| &mut one.solution))
             .chain(free.into_iter().flatten().map(|one| &mut one.solution))
@@ -422,8 +405,7 @@ impl SolutionSeparation {
                 one.solution = all_before.clone();
             }
         }
-        self.creeping.correct(&told, laser);
-        self.correct_fast_creeping(&told, laser);
+        self.creeps.correct(&told, laser, &self.all);
         let [scale, steering, turn] = CHANGE.map(|deviation| deviation * deviation * self.unseen.0);
         let change = if self.gyro.is_some() { [scale, 0.0, 0.0] } else { [scale, steering, turn] };
         self.odometry.loosen_odometry(&change);
@@ -470,14 +452,6 @@ impl SolutionSeparation {
         }
     }
 
-    fn correct_fast_creeping(&mut self, told: &SensorInformation, laser: &Laser) {
-        if is_refuted(self.fast_creeping.correct(told, laser)) {
-            self.fast_creeping = self.all.clone();
-        }
-        let apart = self.fast_creeping.separation(&self.all);
-        self.creeps_fast = apart > if self.creeps_fast { 0.5 * FOUND } else { FOUND };
-    }
-
     fn correct_free(&mut self, told: &SensorInformation, laser: &Laser) {
         let now = self.time;
         let (driven, turned) = if self.unseen.0 <= 1.0 { self.unseen } else { (0.0, 0.0) };
@@ -513,21 +487,19 @@ impl SolutionSeparation {
 
     /// The largest of all bounds of a pose, widened by what contradicts it.
     fn bound(&self, pose: &Pose, surprise: f64) -> ProtectionLevel {
-        let larger =
-            |factors: &Factors| Factors { position: surprise * factors.position, heading: surprise * factors.heading };
-        let (fault_free, one_fault) = (larger(&FAULT_FREE), larger(&ONE_FAULT));
-        let fast_creep = (self.creeps_fast || self.is_laser_doubted).then_some(&self.fast_creeping);
+        let (fault_free, one_fault) = (FAULT_FREE.times(surprise), ONE_FAULT.times(surprise));
+        let creeps = self.creeps.bound(pose, surprise, self.map_variances, self.is_laser_doubted);
         let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
-        let level = [&self.creeping, &self.odometry]
+        let level = [&self.odometry]
             .into_iter()
-            .chain(fast_creep)
             .chain(self.leave_outs.iter().map(|one| &one.solution))
             .chain(self.knocks.iter().map(|one| &one.solution))
             .chain(self.gyro.as_ref().map(GyroSeparation::alone))
             .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
                 level.or(&solution.bound(pose, &one_fault, self.map_variances))
             });
+        let level = level.or(&creeps);
         let free = found_mounting.into_iter().chain(found_yaw);
         let level = free.fold(level, |level, one| level.or(&one.bound(pose, &one_fault, self.map_variances)));
         let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
