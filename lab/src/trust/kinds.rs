@@ -258,7 +258,8 @@ impl Kind {
     #[must_use]
     pub fn hidden(&self, from: f64, drawn: &Drawn) -> Option<Hidden> {
         let lasts = if let Drawn::Knock(knock) = drawn { knock.lasts } else { 0.0 };
-        self.revealed.map(|by| Hidden { from, since: from + lasts, by })
+        let begins = if self.begins == Begin::Before { f64::NEG_INFINITY } else { from };
+        self.revealed.map(|by| Hidden { from: begins, since: from + lasts, by })
     }
 
     /// Whether a vehicle can have it.

@@ -99,7 +99,7 @@ impl Fit {
 /// What a turn shows of the place of the laser, and a drive of its yaw, is enough from here on, rad and m.
 const ENOUGH: (f64, f64) = (core::f64::consts::FRAC_PI_2, 5.0);
 /// A pose is well known if it has no larger deviations than these, m and rad.
-const WELL_KNOWN: (f64, f64) = (0.01, 1.75e-3);
+const WELL_KNOWN: (f64, f64) = (0.007, 1.4e-3);
 
 impl FreeSince {
     /// Begins at `since`.
