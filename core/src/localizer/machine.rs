@@ -236,10 +236,7 @@ impl<C: Capacities> Localizer<C> {
             self.teach_gyro(&known, is_corrected);
         }
         if let Some(before) = before {
-            self.check(&before, revolution_of);
-            if let Event::Scan(scan) = event {
-                self.look_for_landmarks(scan);
-            }
+            self.check(&before, revolution_of, event);
             self.separate(event.laser());
         }
         self.publish(sees);
@@ -303,7 +300,7 @@ impl<C: Capacities> Localizer<C> {
     /// used, and `revolution_of` is the laser whose reflectors of a revolution the event tells, if it does: one that tells
     /// none contradicts none.
     #[inline(never)]
-    fn check(&mut self, before: &Estimate, revolution_of: Option<LaserId>) {
+    fn check(&mut self, before: &Estimate, revolution_of: Option<LaserId>, event: &Event) {
         let Some(after) = self.estimate() else { return };
         let uses = &self.outputs.uses;
         if let Some(laser) = revolution_of {
@@ -320,6 +317,9 @@ impl<C: Capacities> Localizer<C> {
             if is_right && !self.parameters.maps.slam {
                 self.integrity.judge_traction(before, &after, uses, self.timeline.now());
             }
+        }
+        if let Event::Scan(scan) = event {
+            self.look_for_landmarks(scan);
         }
     }
 

@@ -97,6 +97,8 @@ pub struct SolutionSeparation {
     pose: Pose,
     surprise: f64,
     level: ProtectionLevel,
+    /// Variances of the solution from all then: of the position's larger axis, m^2, and of the heading, rad^2.
+    variances: (f64, f64),
 }
 
 impl SolutionSeparation {
@@ -135,6 +137,7 @@ impl SolutionSeparation {
             pose: Pose::default(),
             surprise: 1.0,
             level: ProtectionLevel::UNBOUNDED,
+            variances: (0.0, 0.0),
         }
     }
 
@@ -393,6 +396,7 @@ impl SolutionSeparation {
         self.pose = *pose;
         self.surprise = surprise;
         self.level = self.bound(pose, surprise);
+        self.variances = self.all.variances();
     }
 
     fn correct(&mut self, laser: &Laser) {
@@ -515,7 +519,7 @@ impl SolutionSeparation {
         let Pending { covariance, distance, .. } = &self.pending;
         let AssumedDeviations { scale, steering, turn, .. } = self.assumed;
         let grown = |variance: f64, by: f64| libm::sqrt(variance + by) - libm::sqrt(variance);
-        let (position, heading) = self.all.variances();
+        let (position, heading) = self.variances;
         let along = scale * distance;
         let by_turn = steering.max(turn) * distance;
         let larger = larger_axis(covariance.m11, covariance.m12, covariance.m22);
