@@ -38,3 +38,17 @@ fn rows_of_another_run_take_no_settings() {
         assert!(text(&output.stderr).contains("--set"), "{more:?}: {}", text(&output.stderr));
     }
 }
+
+/// A run of an hour must not end in that.
+#[test]
+fn what_cannot_be_written_is_said_before_the_runs() {
+    let files = Files::new();
+    let nowhere = format!("{}/nowhere", files.folder());
+    let page = format!("{nowhere}/page.html");
+    for more in [["--diagrams", nowhere.as_str()], ["--report", page.as_str()]] {
+        let output = agv(&[&["evaluate", "trust", "--first-seed", "1"], &more[..]].concat());
+        assert!(!output.status.success(), "{more:?}");
+        let said = text(&output.stderr);
+        assert!(said.contains("there is no folder") && said.lines().count() == 1, "{said}");
+    }
+}

@@ -107,6 +107,18 @@ impl Seek for OutputFile {
     }
 }
 
+/// Whether a file can be written there, so that a long run does not find out at its end. Nothing is left, and an older file stays.
+///
+/// # Errors
+/// As [`OutputFile::create`].
+pub fn check(path: &Path) -> io::Result<()> {
+    match path.metadata() {
+        // Whoever opens a pipe waits for its reader.
+        Ok(old) if !old.is_file() && !old.is_dir() => Ok(()),
+        _ => OutputFile::create(path).map(drop),
+    }
+}
+
 /// A file beside `path` with the rights of the older one, or those of any new file.
 fn beside(path: &Path, old: Option<Permissions>) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

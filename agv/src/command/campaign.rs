@@ -7,6 +7,7 @@ use agv_lab::campaign::table::table;
 use agv_lab::campaign::{Campaign as Plan, Shard};
 use anyhow::Context as _;
 
+use crate::command::output::check_files;
 use crate::command::progress;
 
 /// Let things go wrong in simulated drives, through the controller's wire code, and say how it takes them.
@@ -52,6 +53,7 @@ Examples:
 impl Campaign {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.output)?;
         if self.output.is_some() {
             results::TABLES.check()?;
         }

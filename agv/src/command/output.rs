@@ -1,6 +1,10 @@
 //! Results on standard output, and what is said beside them.
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use agv_host_sim::output_file;
+use anyhow::Context;
 
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 
@@ -19,6 +23,11 @@ pub fn note(text: &str) {
     if !is_quiet() {
         eprintln!("{text}");
     }
+}
+
+/// Refuses a file that could not be written at the end of a long run.
+pub fn check_files<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> anyhow::Result<()> {
+    paths.into_iter().try_for_each(|path| output_file::check(path).with_context(|| path.display().to_string()))
 }
 
 /// Prints names and values in two columns.

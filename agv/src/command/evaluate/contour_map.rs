@@ -7,6 +7,7 @@ use agv_lab::evaluate::contour_map::localise;
 
 use super::office_drive::DriveChoice;
 use super::trajectory;
+use crate::command::output::check_files;
 use crate::command::progress;
 
 const HELP: &str = "\
@@ -41,6 +42,7 @@ pub struct ContourMap {
 impl ContourMap {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.trajectory)?;
         anyhow::ensure!(self.length > 0.0, "--length must be more than 0 m");
         anyhow::ensure!(self.cell >= 0.02 && self.cell <= 1.0, "--cell must be from 0.02 to 1 m");
         let drive = self.drive.read()?;

@@ -6,6 +6,7 @@ use agv_lab::evaluate::features::{DetectorKind, Disturbance, Outcome, page, run}
 use agv_lab::evaluate::{falko, repeatability};
 use anyhow::Context;
 
+use crate::command::output::check_files;
 use crate::command::progress;
 
 const HELP: &str = "\
@@ -32,6 +33,7 @@ pub struct Features {
 impl Features {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.report)?;
         let scans = falko::Set::from(self.set).scans()?;
         let kinds = [DetectorKind::Falko, DetectorKind::Oc];
         let bar = progress::bar("measuring", (kinds.len() * (Disturbance::ALL.len() + 2)) as u64);

@@ -6,6 +6,7 @@ use agv_lab::evaluate::falko;
 use agv_lab::evaluate::places::{CANDIDATES, Combination, Experiment, Method, Mode, Protocol, page};
 use anyhow::Context;
 
+use crate::command::output::check_files;
 use crate::command::{posed_scans, progress};
 
 const HELP: &str = "\
@@ -45,6 +46,7 @@ pub struct Places {
 impl Places {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.report)?;
         let scans = match (self.set, &self.log) {
             (Some(set), _) => falko::Set::from(set).scans()?,
             (None, Some(log)) => posed_scans::read(log)?,

@@ -7,6 +7,7 @@ use agv_host_sim::mapping::slam::SlamParameters;
 use agv_lab::evaluate::slam::{OfficeDrive, page, run};
 use anyhow::Context;
 
+use crate::command::output::check_files;
 use crate::command::progress;
 
 const HELP: &str = "\
@@ -33,6 +34,7 @@ pub struct Slam {
 impl Slam {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.report)?;
         let folder = || {
             Ok::<_, anyhow::Error>(data::folder().context("set AGV_DATA to the folder of recordings")?.join("scans2d"))
         };

@@ -15,7 +15,7 @@ use agv_lab::trust::trial::Trial;
 use agv_settings::Settings;
 use anyhow::{Context as _, ensure};
 
-use crate::command::output::note;
+use crate::command::output::{check_files, note};
 use crate::command::progress;
 use crate::command::setting_arguments::SettingArguments;
 
@@ -100,11 +100,17 @@ continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_sh
 [95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
 pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
-and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro, slip [if --slip].";
+and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro, slip [if --slip],
+gyro_scale_error [if --gyro-scale-error].";
+
+/// The Stanford diagrams: without faults, and with them.
+const DIAGRAMS: [&str; 2] = ["stanford_nominal.svg", "stanford_faults.svg"];
 
 impl Trust {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        let diagrams = self.diagrams.iter().flat_map(|folder| DIAGRAMS.map(|name| folder.join(name)));
+        check_files(&diagrams.chain(self.report.clone()).chain(self.output.clone()).collect::<Vec<_>>())?;
         let mut catalogue = kinds::read(&self.kinds)?;
         self.leave_out(&mut catalogue)?;
         let all = &catalogue.kinds;
@@ -175,7 +181,7 @@ impl Trust {
             page(&figures)?.write(report).with_context(|| report.display().to_string())?;
         }
         if let Some(folder) = &self.diagrams {
-            for (name, diagram) in ["stanford_nominal.svg", "stanford_faults.svg"].iter().zip(diagrams(&figures)?) {
+            for (name, diagram) in DIAGRAMS.iter().zip(diagrams(&figures)?) {
                 let path = folder.join(name);
                 output_file::write(&path, diagram.one_line()).with_context(|| path.display().to_string())?;
             }
@@ -185,8 +191,11 @@ impl Trust {
             told["settings"] = self.settings.texts().into();
             told["vehicle"] = serde_json::to_value(self.equipment.vehicle)?;
             told["gyro"] = self.equipment.gyro.into();
-            if let Some(slip) = self.equipment.slip {
-                told["slip"] = slip.into();
+            for (name, value) in [("slip", self.equipment.slip), ("gyro_scale_error", self.equipment.gyro_scale_error)]
+            {
+                if let Some(value) = value {
+                    told[name] = value.into();
+                }
             }
             println!("{}", serde_json::to_string_pretty(&told)?);
         } else {

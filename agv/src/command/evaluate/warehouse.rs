@@ -9,6 +9,7 @@ use agv_lab::evaluate::warehouse_page::page;
 use anyhow::Context as _;
 use clap::ValueEnum as _;
 
+use crate::command::output::check_files;
 use crate::command::progress;
 
 /// How precisely a vehicle ends its way in the standard block storage: paths P1 to P4, each with each kind of map.
@@ -45,6 +46,7 @@ pub struct Warehouse {
 impl Warehouse {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.report)?;
         anyhow::ensure!(self.runs > 0, "--runs must be at least 1");
         let seeds = self.first_seed..self.first_seed.saturating_add(self.runs);
         let disturbances = if self.disturb_all { Disturbance::ALL.to_vec() } else { self.disturb };

@@ -6,6 +6,7 @@ use agv_lab::evaluate::windows::{Candidate, Worsening, contour_drift, drift, veh
 
 use super::office_drive::DriveChoice;
 use super::trajectory;
+use crate::command::output::check_files;
 use crate::command::progress;
 
 const HELP: &str = "\
@@ -37,6 +38,7 @@ pub struct Windows {
 impl Windows {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
+        check_files(&self.trajectory)?;
         anyhow::ensure!(self.length > 0.0, "--length must be more than 0 m");
         let drive = self.drive.read()?;
         let bar = progress::bar("driving", ((Candidate::ALL.len() + 2) * Worsening::ALL.len()) as u64);
