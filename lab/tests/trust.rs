@@ -357,3 +357,18 @@ fn rows_of_parts_are_those_of_the_whole() {
     assert!(matches!(row::read(&[two], &kinds), Err(RowsError::Line { line: 1, .. })));
     assert!(matches!(row::read(&[folder.path().join("2")], &kinds), Err(RowsError::File { .. })));
 }
+
+/// What was wrong before the drive is hidden from its first moment on; a laser that creeps, until something shows it behind its end.
+#[test]
+fn a_fault_is_hidden_from_when_it_begins() {
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../host-sim/scenarios/trust.toml")).unwrap();
+    let catalogue = agv_lab::trust::kinds::parse(&text).unwrap();
+    let hidden = |name: &str, from: f64| {
+        let kind = catalogue.kinds.iter().find(|kind| kind.name == name).unwrap();
+        kind.hidden(from, &kind.at(0.1, from).unwrap()).map(|hidden| (hidden.from, hidden.since))
+    };
+    assert_eq!(hidden("mounting wrong forward", 0.0), Some((f64::NEG_INFINITY, 0.0)));
+    assert_eq!(hidden("laser shifts slowly", 30.0), Some((30.0, 50.0)));
+    assert_eq!(hidden("laser shifted forward", 30.0), None);
+}
