@@ -1,7 +1,7 @@
 //! Whether the laser has moved as the odometry says.
 //!
 //! Landmarks are remembered for a moment in the frame of the odometry. If the vehicle moves as its odometry says, those
-//! seen a revolution ago are seen again where they were. If hardly one of them is, and most of what is seen instead is new,
+//! seen a revolution ago are seen again where they were. If hardly one of them is, and more than half of what is seen is new,
 //! the laser has moved otherwise: the vehicle has slid or was carried, its wheel has spun, or the laser was knocked.
 //! The same is true if none of them is seen again although the scan shows nothing before their places.
 //! No map is needed, so that a wrong place that looks right does not hide it.
@@ -155,7 +155,7 @@ impl SlipCheck {
         self.gone = if self.sees_none_again() { self.gone } else { 0 };
         let is_contradicted = can_tell
             && f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
-            && self.new >= self.seen.saturating_sub(self.new);
+            && self.new > self.seen.saturating_sub(self.new);
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
         self.contradictions >= IN_A_ROW
     }
