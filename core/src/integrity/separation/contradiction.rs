@@ -1,4 +1,5 @@
-//! What of the landmarks contradicts the pose, and by how much that widens its bound: nobody can tell which of them are right.
+//! What of the landmarks contradicts the pose, and by how much that widens its bound: nobody can tell which of them are right. What a
+//! minority contradicts in one event alone is no more than false reflectors are.
 
 use heapless::Vec;
 
@@ -16,7 +17,7 @@ const ALIKE: f64 = 0.1;
 const COMPARED: usize = 8;
 /// What they count from one event to the next.
 const FADING: f64 = 0.8;
-/// Over this distance, m, the widening is forgotten by 1/e.
+/// Over this distance, m, a widening that lasts is forgotten by 1/e.
 const MEMORY: f64 = 5.0;
 
 /// What fits the pose and what contradicts it.
@@ -58,21 +59,32 @@ pub struct Contradiction {
     /// By how much landmarks of the event are elsewhere in W, m.
     displaced: Vec<[f64; 2], COMPARED>,
     lately: Evidence,
-    widening: ProtectionLevel,
+    /// What the last event that saw anything has found, and whether more of it contradicted the pose than fitted.
+    found: ProtectionLevel,
+    is_outnumbered: bool,
+    /// What two events in a row have found: false reflectors are not seen again.
+    lasting: ProtectionLevel,
 }
 
 impl Contradiction {
     /// Nothing contradicts the pose.
     #[must_use]
     pub const fn new() -> Self {
-        Self { event: Evidence::NONE, displaced: Vec::new(), lately: Evidence::NONE, widening: ProtectionLevel::NONE }
+        Self {
+            event: Evidence::NONE,
+            displaced: Vec::new(),
+            lately: Evidence::NONE,
+            found: ProtectionLevel::NONE,
+            is_outnumbered: false,
+            lasting: ProtectionLevel::NONE,
+        }
     }
 
     /// Takes a distance, m, over which contradictions are forgotten.
     pub fn travel(&mut self, distance: f64) {
         let remaining = libm::exp(-distance / MEMORY);
-        self.widening.position *= remaining;
-        self.widening.heading *= remaining;
+        self.lasting.position *= remaining;
+        self.lasting.heading *= remaining;
     }
 
     /// Begins to take what one event tells.
@@ -104,15 +116,28 @@ impl Contradiction {
     /// Ends the event; true if it contradicts the pose.
     pub fn end_event(&mut self) -> bool {
         self.lately.add(&self.event);
+        if self.event.fitting + self.event.contradicting > 0.0 {
+            let before = self.found;
+            self.found = self.find();
+            self.is_outnumbered = self.event.contradicting > self.event.fitting;
+            if [before, self.found].iter().all(|found| *found != ProtectionLevel::NONE) {
+                self.lasting = self.lasting.or(&before).or(&self.found);
+            }
+        }
+        self.event.share() > CONTRADICTED
+    }
+
+    fn find(&self) -> ProtectionLevel {
+        let mut level = ProtectionLevel::NONE;
         for evidence in [&self.event, &self.lately] {
             if evidence.share() > CONTRADICTED && evidence.contradicting >= LEAST_CONTRADICTING {
-                self.widening = self.widening.or(&evidence.mean());
+                level = level.or(&evidence.mean());
             }
         }
         if self.are_alike() && self.event.share() > ALIKE {
-            self.widening = self.widening.or(&self.event.mean());
+            level = level.or(&self.event.mean());
         }
-        self.event.share() > CONTRADICTED
+        level
     }
 
     /// Whether enough landmarks are elsewhere by the same.
@@ -128,6 +153,6 @@ impl Contradiction {
     /// By how much the bound is wider.
     #[must_use]
     pub fn widening(&self) -> ProtectionLevel {
-        self.widening
+        if self.is_outnumbered { self.lasting.or(&self.found) } else { self.lasting }
     }
 }
