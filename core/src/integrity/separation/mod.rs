@@ -44,9 +44,9 @@ const REMEMBERED: f64 = 10.0;
 const FURTHEST_KNOCK: (f64, f64) = (1.5, 0.6);
 /// What all others allow for wear.
 const WEAR: (f64, f64) = (6e-5, 1e-5);
-/// The solution with an odometry that changes: scale, steering and turn for a square root of a metre. A load changes a tyre's radius by
-/// about 1 %.
-const CHANGE: [f64; 3] = [0.01, 0.01, 0.02];
+/// The solution with an odometry that changes: scale, steering and turn for a square root of a metre. Larger
+/// changes contradict the landmarks before they are out of sight for long.
+const CHANGE: [f64; 3] = [0.007, 0.005, 0.02];
 /// The errors of the map are found from events that tell the position this well, m; others hardly move the solutions.
 const WELL_SEEN: f64 = 0.03;
 /// Covariance of a pose of which it is known only about where it is, within [`FREE_POSITION`] and 20 deg.
