@@ -17,7 +17,7 @@ mod solution;
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
-pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, fault_free};
+pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, ONE_KNOCK, fault_free};
 use contradiction::Contradiction;
 use creep::Creeps;
 use gyro::GyroSeparation;
@@ -451,7 +451,7 @@ impl SolutionSeparation {
         }
         // The one that says least makes room.
         let pose = *self.all.pose();
-        let position = |knock: &Knock| knock.solution.bound(&pose, &ONE_FAULT, (0.0, 0.0)).position;
+        let position = |knock: &Knock| knock.solution.bound(&pose, &ONE_KNOCK, (0.0, 0.0)).position;
         if let Some(least) = self.knocks.iter_mut().min_by(|a, b| position(a).total_cmp(&position(b))) {
             *least = knock;
         }
@@ -492,19 +492,20 @@ impl SolutionSeparation {
 
     /// The largest of all bounds of a pose, widened by what contradicts it.
     fn bound(&self, pose: &Pose, surprise: f64) -> ProtectionLevel {
-        let (fault_free, one_fault) = (FAULT_FREE.times(surprise), ONE_FAULT.times(surprise));
+        let [fault_free, one_fault, one_knock] =
+            [FAULT_FREE, ONE_FAULT, ONE_KNOCK].map(|factors| factors.times(surprise));
         let creeps = self.creeps.bound(pose, surprise, self.map_variances, self.is_laser_doubted);
         let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
         let level = [&self.odometry]
             .into_iter()
             .chain(self.leave_outs.iter().map(|one| &one.solution))
-            .chain(self.knocks.iter().map(|one| &one.solution))
             .chain(self.gyro.as_ref().map(GyroSeparation::alone))
             .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
                 level.or(&solution.bound(pose, &one_fault, self.map_variances))
             });
-        let level = level.or(&creeps);
+        let knocks = self.knocks.iter().map(|one| one.solution.bound(pose, &one_knock, self.map_variances));
+        let level = knocks.fold(level.or(&creeps), |level, knock| level.or(&knock));
         let free = found_mounting.into_iter().chain(found_yaw);
         let level = free.fold(level, |level, one| level.or(&one.bound(pose, &one_fault, self.map_variances)));
         let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
