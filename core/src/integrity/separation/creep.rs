@@ -8,7 +8,7 @@ use crate::geometry::Pose;
 use crate::state::ProtectionLevel;
 
 /// A laser that creeps: its place, m, and yaw, rad, for a square root of a metre, or of two seconds.
-const SLOW: (f64, f64) = (1e-3, 5.2e-4);
+const SLOW: (f64, f64) = (5e-4, 2.6e-4);
 /// The same of one that creeps so fast that it is found.
 const FAST: (f64, f64) = (3e-2, 1.7e-2);
 /// The same of one that only turns: its place is where it was, so that the way driven tells the heading.
