@@ -11,8 +11,8 @@ use crate::state::ProtectionLevel;
 const SLOW: (f64, f64) = (5e-4, 2.6e-4);
 /// The same of one that creeps so fast that it is found.
 const FAST: (f64, f64) = (3e-2, 1.7e-2);
-/// The same of one that only turns: its place is where it was, so that the way driven tells the heading.
-const TURNING: (f64, f64) = (0.0, 1.7e-2);
+/// One that only turns, by 0.6 deg: its place is where it was, so that the way driven tells the heading.
+const TURNING: (f64, f64) = (0.0, 1e-2);
 /// A fast one is found where the solutions lie further apart than so many deviations of what lies between them, in position and heading
 /// together. They drift apart over some ten metres, so there are 1e4 looks in 100 km: without a fault it is found once in 1000 km.
 const FOUND: f64 = 5.1;
