@@ -7,6 +7,7 @@ mod event_fuzz;
 mod faults;
 mod features;
 mod loops;
+mod sight;
 mod slip;
 mod tape;
 mod trust;

@@ -2,6 +2,7 @@
 //! truth is known.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
+mod creep;
 mod drive;
 mod level;
 mod sensor_information;
