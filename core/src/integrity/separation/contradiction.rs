@@ -1,5 +1,5 @@
 //! What of the landmarks contradicts the pose, and by how much that widens its bound: nobody can tell which of them are right. What a
-//! minority contradicts in one event alone is no more than false reflectors are.
+//! minority contradicts in one event alone, and none of the map, is no more than false reflectors are.
 
 use heapless::Vec;
 
@@ -59,9 +59,9 @@ pub struct Contradiction {
     /// By how much landmarks of the event are elsewhere in W, m.
     displaced: Vec<[f64; 2], COMPARED>,
     lately: Evidence,
-    /// What the last event that saw anything has found, and whether more of it contradicted the pose than fitted.
+    /// What the last event that saw anything has found, and whether that is no work of false reflectors.
     found: ProtectionLevel,
-    is_outnumbered: bool,
+    is_sure: bool,
     /// What two events in a row have found: false reflectors are not seen again.
     lasting: ProtectionLevel,
 }
@@ -75,7 +75,7 @@ impl Contradiction {
             displaced: Vec::new(),
             lately: Evidence::NONE,
             found: ProtectionLevel::NONE,
-            is_outnumbered: false,
+            is_sure: false,
             lasting: ProtectionLevel::NONE,
         }
     }
@@ -119,7 +119,8 @@ impl Contradiction {
         if self.event.fitting + self.event.contradicting > 0.0 {
             let before = self.found;
             self.found = self.find();
-            self.is_outnumbered = self.event.contradicting > self.event.fitting;
+            let is_moved = self.are_alike() || self.displaced.len() as f64 >= LEAST_CONTRADICTING;
+            self.is_sure = is_moved || self.event.contradicting > self.event.fitting;
             if [before, self.found].iter().all(|found| *found != ProtectionLevel::NONE) {
                 self.lasting = self.lasting.or(&before).or(&self.found);
             }
@@ -153,6 +154,6 @@ impl Contradiction {
     /// By how much the bound is wider.
     #[must_use]
     pub fn widening(&self) -> ProtectionLevel {
-        if self.is_outnumbered { self.lasting.or(&self.found) } else { self.lasting }
+        if self.is_sure { self.lasting.or(&self.found) } else { self.lasting }
     }
 }
