@@ -3,8 +3,8 @@
 
 use agv_core::geometry::{Pose, Twist};
 use agv_core::odometry::{
-    AngleEncoder, Contact, CounterRange, Differential, DrivenWheel, Mecanum, Omnidirectional, Wheel, WheelBased,
-    WheelMotion,
+    AckermannWheels, AngleEncoder, Contact, CounterRange, Differential, DrivenWheel, Mecanum, Omnidirectional, Wheel,
+    WheelBased, WheelMotion,
 };
 use agv_host_sim::calibrate::wheeled::drive::{WheelDrive, WheelStep};
 use agv_host_sim::calibrate::wheeled::fit::{WheeledFit, WheeledFitError, fit};
@@ -43,15 +43,17 @@ fn steered(x: f64) -> Wheel {
 }
 
 fn kinds() -> Vec<(&'static str, Kind, Vec<Wheel>)> {
-    let rear = Wheel { turn: None, ..DRIVEN.at(0.0, 0.0, 0.0, Contact::Tyre) };
+    let dragged = Wheel { turn: None, ..DRIVEN.at(0.0, 0.0, 0.0, Contact::Tyre) };
     let differential = Differential { track: 0.5, left: DRIVEN, right: DRIVEN };
+    let car = AckermannWheels { rear: differential, wheelbase: 1.0, steering: ENCODER, steering_offset: 0.0 };
     let three = Omnidirectional { arm: 0.2, first: 1.0, driven: [DRIVEN; 3] };
     let four = Omnidirectional { arm: 0.2, first: 0.7, driven: [DRIVEN; 4] };
     let mecanum = Mecanum { wheelbase: 0.4, track: 0.5, driven: [DRIVEN; 4] };
     vec![
-        ("tricycle", Kind::Tricycle, vec![steered(1.0), rear]),
+        ("tricycle", Kind::Tricycle, vec![steered(1.0), dragged]),
         ("differential", Kind::Differential, differential.wheels().as_ref().to_vec()),
         ("bi-steerable", Kind::BiSteerable, vec![steered(0.6), steered(-0.6)]),
+        ("car", Kind::Ackermann, car.wheels().as_ref().to_vec()),
         ("three omnidirectional wheels", Kind::Omnidirectional, three.wheels().as_ref().to_vec()),
         ("four omnidirectional wheels", Kind::Omnidirectional, four.wheels().as_ref().to_vec()),
         ("mecanum", Kind::Omnidirectional, mecanum.wheels().as_ref().to_vec()),
@@ -106,7 +108,8 @@ fn drive(model: &WheeledModel, is_holonomic: bool, noise: &Noise, random: &mut R
             let motions = model.wheels.iter().map(|wheel| {
                 let mut motion = wheel_motion(wheel, &twist);
                 let way = (motion.turn * wheel.radius).abs();
-                motion.turn += noise.slip * way.sqrt() * random.normal() / wheel.radius;
+                let slip = noise.slip * way.sqrt() * random.normal();
+                motion.turn += if wheel.turn.is_some() { slip / wheel.radius } else { 0.0 };
                 motion
             });
             steps.push(WheelStep { end, motions: motions.collect() });
@@ -136,7 +139,7 @@ fn fitted(
     let nominal = WheeledModel { wheels: wheels.to_vec(), sensor: Pose::new(0.3, 0.1, 0.2) };
     let unknowns = Unknown::of(kind, wheels, true);
     let (model, changes) = true_model(&nominal, &unknowns, &mut Random(ChaCha8Rng::seed_from_u64(truth)));
-    let is_holonomic = !matches!(kind, Kind::Tricycle | Kind::Differential);
+    let is_holonomic = !matches!(kind, Kind::Tricycle | Kind::Differential | Kind::Ackermann);
     let drive = drive(&model, is_holonomic, noise, &mut Random(ChaCha8Rng::seed_from_u64(seed)));
     (changes, fit(&[drive], &nominal, &unknowns, true))
 }
