@@ -44,8 +44,11 @@ impl<F: Fn(&[f64]) -> Linearised> LeastSquaresProblem<f64, Dyn, Dyn> for Fit<F> 
 
 /// Parameters with the least squared residuals, from `start`. None if the solver fails.
 pub fn minimise(start: &[f64], evaluate: impl Fn(&[f64]) -> Linearised) -> Option<Vec<f64>> {
-    solve(start, evaluate, TerminationReason::was_successful)
+    solve(LevenbergMarquardt::new(), start, evaluate, TerminationReason::was_successful)
 }
+
+/// Share of the squared residuals by which a step makes them less that is none.
+const NO_IMPROVEMENT: f64 = 1e-12;
 
 /// The same for residuals with kinks, of which the least one has no slope that a solver could find to be zero: where no step makes
 /// them less is the solution.
@@ -53,16 +56,17 @@ pub fn minimise_kinked(start: &[f64], evaluate: impl Fn(&[f64]) -> Linearised) -
     let is_found = |reason: &TerminationReason| {
         reason.was_successful() || matches!(reason, TerminationReason::NoImprovementPossible(_))
     };
-    solve(start, evaluate, is_found)
+    solve(LevenbergMarquardt::new().with_ftol(NO_IMPROVEMENT), start, evaluate, is_found)
 }
 
 fn solve(
+    solver: LevenbergMarquardt<f64>,
     start: &[f64],
     evaluate: impl Fn(&[f64]) -> Linearised,
     is_found: impl Fn(&TerminationReason) -> bool,
 ) -> Option<Vec<f64>> {
     let linearised = evaluate(start);
     let fit = Fit { parameters: DVector::from_column_slice(start), linearised, evaluate };
-    let (fit, report) = LevenbergMarquardt::new().minimize(fit);
+    let (fit, report) = solver.minimize(fit);
     is_found(&report.termination).then(|| fit.parameters.as_slice().to_vec())
 }

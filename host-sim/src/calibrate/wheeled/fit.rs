@@ -222,9 +222,12 @@ impl Problem<'_> {
                 }
             }
         }
-        // Every unknown that was fitted took its share of the scatter away.
-        let independent = self.windows.len() as f64 * STRIDE / MEMORY;
-        let correction = independent / (independent - count as f64 / 3.0).max(1.0);
+        // Every unknown that was fitted took its share of the scatter away, and so did the mean of each memory.
+        let seconds = self.windows.len() as f64 * STRIDE;
+        let independent = 3.0 * seconds / SECONDS;
+        let share = (MEMORY / seconds).min(1.0);
+        let seen = (1.0 - share + share * share / 3.0) * (1.0 - count as f64 / independent).max(0.1);
+        let correction = 1.0 / seen;
         Ok((&inverse * scatter * &inverse * correction, inverse))
     }
 }
