@@ -47,8 +47,9 @@ pub fn minimise(start: &[f64], evaluate: impl Fn(&[f64]) -> Linearised) -> Optio
     solve(LevenbergMarquardt::new(), start, evaluate, TerminationReason::was_successful)
 }
 
-/// Share of the squared residuals by which a step makes them less that is none.
-const NO_IMPROVEMENT: f64 = 1e-12;
+/// A step that makes the squared residuals less by a smaller share is none: along a kink there are hundreds of such steps, and all of
+/// them together move no parameter by a hundredth of its deviation.
+const NO_IMPROVEMENT: f64 = 1e-6;
 
 /// The same for residuals with kinks, of which the least one has no slope that a solver could find to be zero: where no step makes
 /// them less is the solution.
