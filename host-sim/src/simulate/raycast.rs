@@ -50,6 +50,8 @@ pub struct RayCaster {
     segments: Vec<Segment>,
     round_starts: Vec<u32>,
     rounds: Vec<Round>,
+    /// How many cells a ray passes from each cell on, that one included, in which nothing is; 0 where something is.
+    clearance: Vec<u8>,
 }
 
 impl RayCaster {
@@ -74,7 +76,9 @@ impl RayCaster {
         let (segment_starts, segments) =
             list_by_cell(&world.segments, low, columns, rows, segment_extent, line_meets_cell);
         let (round_starts, rounds) = list_by_cell(&rounds, low, columns, rows, round_extent, circle_meets_cell);
-        Self { low, columns, rows, segment_starts, segments, round_starts, rounds }
+        let is_empty = |cell: usize| range(&segment_starts, cell).is_empty() && range(&round_starts, cell).is_empty();
+        let clearance = clearance(columns, rows, is_empty);
+        Self { low, columns, rows, segment_starts, segments, round_starts, rounds, clearance }
     }
 
     /// The first surface on the ray from `origin` (W, m) in `direction` (W, of length one), not farther than `farthest`
@@ -88,8 +92,16 @@ impl RayCaster {
         let (column_step, mut next_column, column_way) = traversal(origin.x - self.low.x, direction.x, column);
         let (row_step, mut next_row, row_way) = traversal(origin.y - self.low.y, direction.y, row);
         let mut best: Option<Hit> = None;
+        let mut empty_cells = 0;
         loop {
-            self.nearest_in_cell(row * self.columns + column, origin, direction, &mut best);
+            if empty_cells == 0 {
+                let cell = row * self.columns + column;
+                empty_cells = self.clearance[cell];
+                if empty_cells == 0 {
+                    self.nearest_in_cell(cell, origin, direction, &mut best);
+                }
+            }
+            empty_cells = empty_cells.saturating_sub(1);
             let cell_end = next_column.min(next_row);
             if let Some(hit) = best
                 && hit.distance <= cell_end
@@ -241,6 +253,32 @@ fn line_meets_cell(segment: &Segment, centre: &Point) -> bool {
 fn circle_meets_cell(round: &Round, centre: &Point) -> bool {
     let beside = (round.circle.centre - centre).abs().add_scalar(-0.5 * CELL).sup(&Point::zeros());
     beside.norm() <= round.circle.radius + MARGIN
+}
+
+/// For each cell 0 if something is in it, else the distance to the nearest cell in which something is, where a step to any of eight
+/// neighbours is one (two passes of a chamfer; A. Rosenfeld and J. Pfaltz, "Sequential operations in digital picture processing", 1966).
+fn clearance(columns: usize, rows: usize, is_empty: impl Fn(usize) -> bool) -> Vec<u8> {
+    let mut distances: Vec<u8> = (0..columns * rows).map(|cell| if is_empty(cell) { u8::MAX } else { 0 }).collect();
+    let mut pass = |cells: &mut dyn Iterator<Item = (usize, usize)>, senses: [(isize, isize); 4]| {
+        for (row, column) in cells {
+            let neighbours = senses.iter().filter_map(|(down, right)| {
+                let (row, column) = (row.checked_add_signed(*down)?, column.checked_add_signed(*right)?);
+                (row < rows && column < columns).then(|| distances[row * columns + column].saturating_add(1))
+            });
+            let nearest = neighbours.min().unwrap_or(u8::MAX);
+            let own = &mut distances[row * columns + column];
+            *own = (*own).min(nearest);
+        }
+    };
+    pass(
+        &mut (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))),
+        [(0, -1), (-1, -1), (-1, 0), (-1, 1)],
+    );
+    pass(
+        &mut (0..rows).rev().flat_map(|row| (0..columns).rev().map(move |column| (row, column))),
+        [(0, 1), (1, 1), (1, 0), (1, -1)],
+    );
+    distances
 }
 
 /// Copies of the items, cell after cell; `extent` gives an item's bounding box, `meets(item, centre)` whether it meets a
