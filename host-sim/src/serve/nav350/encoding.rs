@@ -9,13 +9,18 @@ pub(super) fn zero(dialect: Dialect, name: &str) -> Vec<u8> {
     encode(dialect, &Answer::Value(Value::Other(name, Raw { dialect, bytes: zero })))
 }
 
+/// Bytes of most answers, and of any: zeros cost time.
+const ROOM: [usize; 2] = [1 << 14, 1 << 17];
+
 pub(super) fn encode(dialect: Dialect, answer: &Answer) -> Vec<u8> {
-    let mut buffer = vec![0; 1 << 17];
-    match answer.encode(dialect, &mut buffer) {
-        Ok(length) => buffer.truncate(length),
-        Err(_) => return refuse(dialect, Fault(0x07)),
+    for room in ROOM {
+        let mut buffer = vec![0; room];
+        if let Ok(length) = answer.encode(dialect, &mut buffer) {
+            buffer.truncate(length);
+            return buffer;
+        }
     }
-    buffer
+    refuse(dialect, Fault(0x07))
 }
 
 pub(super) fn refuse(dialect: Dialect, fault: Fault) -> Vec<u8> {
