@@ -14,6 +14,7 @@ use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
 use agv_lab::trust::outcome::Outcome;
 use agv_lab::trust::row::{self, Row, RowsError};
+use agv_lab::trust::trial::Trial;
 use agv_lab::trust::{hall, pair, sweep};
 use agv_wire::can::controller::{Health, PublishedPose};
 
@@ -371,4 +372,17 @@ fn a_fault_is_hidden_from_when_it_begins() {
     assert_eq!(hidden("mounting wrong forward", 0.0), Some((f64::NEG_INFINITY, 0.0)));
     assert_eq!(hidden("laser shifts slowly", 30.0), Some((30.0, 50.0)));
     assert_eq!(hidden("laser shifted forward", 30.0), None);
+}
+
+/// The laser was knocked between two events, of which the first had ended an interval; the vehicle was lost for 13 m, and found itself by the
+/// knocked laser: no solution allowed for that knock.
+#[test]
+fn a_knock_by_which_the_vehicle_was_lost_is_held_once_it_has_found_itself() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    for (name, size, seed) in [("laser shifted to the left", 0.3, 20), ("laser shifted forward", 0.6, 50_209)] {
+        let kind = catalogue.kinds.iter().find(|kind| kind.name == name).unwrap();
+        let tried = Trial { kind, size, with: None, seed }.run(Equipment::default(), &|_| {}).unwrap();
+        assert_eq!(tried.outcome.failures, 0, "{name}: {} s", tried.outcome.worst_hazard_s);
+        assert!(tried.outcome.found.is_some(), "{name}");
+    }
 }

@@ -55,6 +55,28 @@ fn a_knock_of_any_size_is_held_at_once_and_after_a_turn() {
     }
 }
 
+/// One event that shows something else than the landmarks makes no doubt of the mounting, which would last for 20 s; two in a row do.
+#[test]
+fn one_event_alone_refutes_no_mounting() {
+    let straight = Pose::new(0.125, 0.0, 0.0);
+    let bend = Pose::new(0.1, 0.002, 0.04);
+    for (events, is_doubted) in [(1, false), (2, true)] {
+        let mut drive = Drive::new(9);
+        for (count, step) in [(40, straight), (60, bend), (40, straight)] {
+            (0..count).for_each(|_| drive.revolve(&step));
+        }
+        let true_mount = drive.true_mount;
+        for _ in 0..events {
+            drive.true_mount.x += 0.06;
+            drive.revolve(&straight);
+        }
+        drive.true_mount = true_mount;
+        (0..8).for_each(|_| drive.revolve(&straight));
+        let level = drive.monitor.level();
+        assert_eq!(level.position > 0.5, is_doubted, "{events}: {level:?}");
+    }
+}
+
 /// What a drive of 5 m shows of a turned laser, and a turn by 90 deg of a shifted one, the level holds from then on.
 #[test]
 fn a_mounting_that_was_changed_while_the_vehicle_was_off_is_held_once_it_can_be_told() {

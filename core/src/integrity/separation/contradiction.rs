@@ -59,10 +59,10 @@ pub struct Contradiction {
     /// By how much landmarks of the event are elsewhere in W, m.
     displaced: Vec<[f64; 2], COMPARED>,
     lately: Evidence,
-    /// What the last event that saw anything has found, and whether that is no work of false reflectors.
+    /// What the last event that saw anything has found, and whether more of it contradicted the pose than fitted.
     found: ProtectionLevel,
-    is_sure: bool,
-    /// What two events in a row have found: false reflectors are not seen again.
+    is_outnumbered: bool,
+    /// What landmarks of the map have shown, or two events in a row: false reflectors are of none, and are not seen again.
     lasting: ProtectionLevel,
 }
 
@@ -75,7 +75,7 @@ impl Contradiction {
             displaced: Vec::new(),
             lately: Evidence::NONE,
             found: ProtectionLevel::NONE,
-            is_sure: false,
+            is_outnumbered: false,
             lasting: ProtectionLevel::NONE,
         }
     }
@@ -119,10 +119,10 @@ impl Contradiction {
         if self.event.fitting + self.event.contradicting > 0.0 {
             let before = self.found;
             self.found = self.find();
+            self.is_outnumbered = self.event.contradicting > self.event.fitting;
             let is_moved = self.are_alike() || self.displaced.len() as f64 >= LEAST_CONTRADICTING;
-            self.is_sure = is_moved || self.event.contradicting > self.event.fitting;
-            if [before, self.found].iter().all(|found| *found != ProtectionLevel::NONE) {
-                self.lasting = self.lasting.or(&before).or(&self.found);
+            if is_moved || before != ProtectionLevel::NONE {
+                self.lasting = self.lasting.or(&self.found);
             }
         }
         self.event.share() > CONTRADICTED
@@ -154,6 +154,6 @@ impl Contradiction {
     /// By how much the bound is wider.
     #[must_use]
     pub fn widening(&self) -> ProtectionLevel {
-        if self.is_sure { self.lasting.or(&self.found) } else { self.lasting }
+        if self.is_outnumbered { self.lasting.or(&self.found) } else { self.lasting }
     }
 }

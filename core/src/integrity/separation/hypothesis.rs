@@ -63,6 +63,8 @@ pub struct FreeSince {
     pub fit: Fit,
     /// Whether the place of the laser is free and the heading has not been found yet.
     pub awaits_heading: bool,
+    /// Whether the last event refuted it, which was not taken then.
+    pub is_surprised: bool,
     /// The solution.
     pub solution: Solution,
 }
@@ -112,15 +114,23 @@ impl FreeSince {
             is_needed: false,
             fit: Fit { mean: 0.0 },
             awaits_heading: false,
+            is_surprised: false,
             solution,
         }
     }
 
-    /// Takes what landmarks say; true if the solution does not hold. While the heading was hardly known, the arm to the laser pointed
+    /// Takes what landmarks say; true if the solution does not hold. One event alone that refutes it may have seen something else than
+    /// landmarks: it is not taken, and only the next one decides. While the heading was hardly known, the arm to the laser pointed
     /// elsewhere in each step, which looks like a turn and tells a place of the laser that nothing has shown: what was learned of
     /// places until then is forgotten.
     pub fn correct(&mut self, told: &SensorInformation, laser: &Laser) -> bool {
+        let before = self.solution.clone();
         let square = self.solution.correct(told, laser);
+        let was_surprised = core::mem::replace(&mut self.is_surprised, is_refuted(square));
+        if self.is_surprised && !was_surprised {
+            self.solution = before;
+            return false;
+        }
         if self.awaits_heading && self.solution.is_heading_sure() {
             self.awaits_heading = false;
             self.solution.forget_places();

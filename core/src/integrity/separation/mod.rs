@@ -181,6 +181,10 @@ impl SolutionSeparation {
     /// it, but if the laser was knocked instead, the solutions that allow for a knock still hold. `odometry_pose` is where the
     /// odometry has the vehicle now.
     pub fn begin(&mut self, time: Time, pose: &Pose, covariance: &[f64; 6], odometry_pose: &Pose) {
+        if self.mounting.is_some() {
+            // The laser may have been knocked since the last event.
+            self.begin_knock(self.time);
+        }
         self.all = Solution::new(*pose, covariance, self.assumed());
         if let Some(gyro) = &mut self.gyro {
             gyro.begin(pose, covariance, &self.assumed);
