@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::assumed::Factors;
 use super::sensor_information::SensorInformation;
-use super::solution::{FREE_POSITION, Laser, Solution};
+use super::solution::{FREE_POSITION, FREE_YAW, Laser, Solution};
 use crate::geometry::Pose;
 use crate::measurement::Time;
 use crate::state::ProtectionLevel;
@@ -151,19 +151,20 @@ impl FreeSince {
         position <= WELL_KNOWN.0 * WELL_KNOWN.0 && heading <= WELL_KNOWN.1 * WELL_KNOWN.1
     }
 
-    /// Whether its bound counts: it is needed, or it has found the place of the laser, or knows its pose well without.
+    /// Whether its bound counts: it is needed, or refuted for the moment, or it has found the place of the laser, or knows its pose well without.
     #[must_use]
     pub fn counts(&self) -> bool {
-        self.is_needed || self.has_found_mounting() || self.is_well_known()
+        self.is_needed || self.is_surprised || self.has_found_mounting() || self.is_well_known()
     }
 
     /// How far a pose may be off if this solution is right; see [`Solution::bound`]. What is said of places while the heading was hardly
-    /// known does not count.
+    /// known does not count, and until the next event nothing does if the last one has refuted it.
     #[must_use]
     pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> ProtectionLevel {
         let level = self.solution.bound(pose, factors, map_variances);
-        let least = if self.awaits_heading { factors.position * FREE_POSITION } else { 0.0 };
-        ProtectionLevel { position: level.position.max(least), ..level }
+        let position = if self.awaits_heading || self.is_surprised { factors.position * FREE_POSITION } else { 0.0 };
+        let heading = if self.is_surprised { factors.heading * FREE_YAW } else { 0.0 };
+        level.or(&ProtectionLevel { position, heading })
     }
 
     /// Whether a free yaw of the laser has been found.

@@ -67,7 +67,7 @@ const STEERING: usize = 8;
 /// Deviations of what is free: position of R, m; place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
 pub const FREE_POSITION: f64 = 1.0;
 const FREE_PLACE: f64 = 0.6;
-const FREE_YAW: f64 = 0.175;
+pub const FREE_YAW: f64 = 0.175;
 const FREE_CLOCK: f64 = 0.2;
 const FREE_ODOMETRY: [f64; 3] = [0.2, 0.1, 0.2];
 
