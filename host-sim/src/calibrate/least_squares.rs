@@ -47,8 +47,8 @@ pub fn minimise(start: &[f64], evaluate: impl Fn(&[f64]) -> Linearised) -> Optio
     solve(LevenbergMarquardt::new(), start, evaluate, TerminationReason::was_successful)
 }
 
-/// A step that makes the squared residuals less by a smaller share is none: along a kink there are hundreds of such steps, and all of
-/// them together move no parameter by a hundredth of its deviation.
+/// A step that makes the squared residuals less by a smaller share is none: along a kink there are hundreds of such steps, each of
+/// which moves the parameters by about a hundredth of their deviations.
 const NO_IMPROVEMENT: f64 = 1e-6;
 
 /// The same for residuals with kinks, of which the least one has no slope that a solver could find to be zero: where no step makes

@@ -222,7 +222,9 @@ impl Problem<'_> {
                 }
             }
         }
-        // Every unknown that was fitted took its share of the scatter away, and so did the mean of each memory.
+        // The scatter is seen about what was fitted: of products within the memory, a share `b` of the drive, that leaves `1 - b + b^2 / 3`
+        // (N. Kiefer and T. Vogelsang, "A new asymptotic theory for heteroskedasticity-autocorrelation robust tests", 2005), and every unknown
+        // takes one independent residual away.
         let seconds = self.windows.len() as f64 * STRIDE;
         let independent = 3.0 * seconds / SECONDS;
         let share = (MEMORY / seconds).min(1.0);
