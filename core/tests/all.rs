@@ -52,6 +52,7 @@ mod start_finder;
 mod start_search;
 mod state_slots;
 mod support;
+mod surface_check;
 mod timeline;
 mod traction_check;
 mod tricycle_speed;

@@ -386,3 +386,12 @@ fn a_knock_by_which_the_vehicle_was_lost_is_held_once_it_has_found_itself() {
         assert!(tried.outcome.found.is_some(), "{name}");
     }
 }
+
+/// The vehicle was carried to where its laser sees no reflector: what it then sees of surfaces tells.
+#[test]
+fn a_vehicle_that_is_carried_to_where_no_reflector_is_says_so() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kind = catalogue.kinds.iter().find(|kind| kind.name == "carried on").unwrap();
+    let tried = Trial { kind, size: 9.0, with: None, seed: 50_216 }.run(Equipment::default(), &|_| {}).unwrap();
+    assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
+}

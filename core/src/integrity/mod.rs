@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | [`InnovationMonitor`] | how many observations fit, and how well | a wrong pose, or a map that looks alike |
 //! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
+//! | [`SurfaceCheck`] | where surfaces are in the frame of the odometry | a vehicle that is carried where no landmark is |
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
 //! | [`RedundancyCheck`] | what redundant wheels say differently | a wheel that slips |
 //! | [`TractionCheck`] | the estimate before and after each correction | a wheel that slips |
@@ -20,6 +21,7 @@ mod mounting_check;
 mod redundancy_check;
 pub mod separation;
 mod slip_check;
+mod surface_check;
 mod traction_check;
 mod turn_check;
 
@@ -29,6 +31,7 @@ pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
 pub use mounting_check::{MountingCheck, Suspect};
 pub use redundancy_check::{RedundancyCheck, WheelErrors};
 pub use slip_check::SlipCheck;
+pub use surface_check::SurfaceCheck;
 pub use traction_check::TractionCheck;
 pub use turn_check::{GyroFault, LastingErrors, TurnCheck};
 
@@ -45,6 +48,7 @@ pub struct Integrity {
     pub innovations: InnovationMonitor,
     /// One for each laser: they see the same landmarks at other times.
     slip: [SlipCheck; LASERS],
+    surfaces: [SurfaceCheck; LASERS],
     jumps: JumpCheck,
     mounting: MountingCheck,
     /// Of a vehicle with a gyro.
@@ -73,6 +77,7 @@ impl Integrity {
         Self {
             innovations: InnovationMonitor::new(parameters),
             slip: [const { SlipCheck::new() }; LASERS],
+            surfaces: [const { SurfaceCheck::new() }; LASERS],
             jumps: JumpCheck::new(),
             mounting: MountingCheck::new(),
             turns: TurnCheck::new(),
@@ -89,6 +94,9 @@ impl Integrity {
         self.innovations = InnovationMonitor::new(parameters);
         for slip in &mut self.slip {
             slip.clear();
+        }
+        for surfaces in &mut self.surfaces {
+            surfaces.clear();
         }
         self.mounting.restart();
         self.jumps.forget();
@@ -114,16 +122,14 @@ impl Integrity {
         slip.disagrees()
     }
 
-    /// Whether a scan of that laser is awaited, because none of the reflectors was seen again that should be.
-    #[must_use]
-    pub fn sees_none_again(&self, laser: LaserId) -> bool {
-        self.slip.get(laser.index()).is_some_and(SlipCheck::sees_none_again)
-    }
-
-    /// Takes a scan of a laser whose reflectors of that revolution were taken just before; `sensor` is where the laser was in the middle of
-    /// it, in the frame of the odometry. True if those that should be seen again are gone.
-    pub fn see_scan(&mut self, scan: &Scan, sensor: &Pose) -> bool {
-        self.slip.get_mut(scan.laser.index()).is_some_and(|slip| slip.misses(scan, sensor))
+    /// Takes a scan of a laser whose reflectors of that revolution were taken just before; `sensor` is where the laser was so many seconds
+    /// after the first beam, in the frame of the odometry. True if the laser has moved otherwise than the odometry says.
+    pub fn see_scan(&mut self, scan: &Scan, sensor: impl Fn(f64) -> Pose) -> bool {
+        let laser = scan.laser.index();
+        let middle = sensor(0.5 * scan.end().since(scan.start));
+        let are_gone = self.slip.get_mut(laser).is_some_and(|slip| slip.misses(scan, &middle));
+        let are_elsewhere = self.surfaces.get_mut(laser).is_some_and(|surfaces| surfaces.disagrees(scan, sensor));
+        are_gone || are_elsewhere
     }
 
     /// Takes what the landmarks of a fixed map have made of the estimate, up to `now`, if there are enough of them.

@@ -319,20 +319,21 @@ impl<C: Capacities> Localizer<C> {
             }
         }
         if let Event::Scan(scan) = event {
-            self.look_for_landmarks(scan);
+            self.compare_surfaces(scan);
         }
     }
 
-    /// Lets the checks compare a scan with the reflectors of its revolution, which were taken just before.
-    fn look_for_landmarks(&mut self, scan: &Scan) {
-        let is_awaited = self.lost.is_none() && self.integrity.sees_none_again(scan.laser);
-        let Some(timeline) = self.timeline.begun().filter(|_| is_awaited) else { return };
+    /// Lets the checks compare a scan with the reflectors of its revolution, which were taken just before, and with the scan before it.
+    fn compare_surfaces(&mut self, scan: &Scan) {
+        let is_asked = self.lost.is_none() && self.parameters.uses_reflectors() && self.has_reflectors();
+        let Some(timeline) = self.timeline.begun().filter(|_| is_asked) else { return };
         let Some(mount) = self.parameters.lasers.mount(scan.laser) else { return };
-        let middle = scan.start.offset(0.5 * scan.end().since(scan.start));
-        let motions = timeline.motions(middle, timeline.now());
-        let since = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
-        let sensor = timeline.odometry_pose().compose(&since.inverse()).compose(mount);
-        if self.integrity.see_scan(scan, &sensor) {
+        let since = timeline.motions(scan.start, timeline.now());
+        let since = since.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
+        let first = timeline.odometry_pose().compose(&since.inverse()).compose(mount);
+        let path = &mut self.workspace.path;
+        path.set(scan.start, mount, timeline.relative_path(scan.start, scan.end()));
+        if self.integrity.see_scan(scan, |after| first.compose(&path.place(after))) {
             self.lost = Some(Reason::MotionDisagrees);
         }
     }

@@ -92,7 +92,7 @@ impl<C: Capacities> Localizer<C> {
         }
     }
 
-    fn has_reflectors(&self) -> bool {
+    pub(super) fn has_reflectors(&self) -> bool {
         !self.maps.reflectors().landmarks().is_empty()
     }
 

@@ -77,26 +77,53 @@ impl Scan<'_> {
         self.beam_time(self.ranges.len().saturating_sub(1))
     }
 
-    /// Whether all beams that pass a place in S within so many m and so many rad end further away than it, by `behind`, m, at least. A
-    /// beam without a return says nothing of what it has passed.
+    /// The beam whose direction is nearest to that of a place in S; none if no beam looks there.
     #[must_use]
-    pub fn passes(&self, place: &Point, (beside, turn): (f64, f64), behind: f64) -> bool {
+    pub fn beam_toward(&self, place: &Point) -> Option<usize> {
+        let step = libm::fabs(self.bearing_step);
+        if step <= 0.0 {
+            return None;
+        }
+        self.beam_at(self.from_first(place), step).filter(|index| *index < self.ranges.len())
+    }
+
+    /// Angle from the first beam to a place in S, rad, in the sense in which the beams follow each other.
+    fn from_first(&self, place: &Point) -> f64 {
+        (libm::atan2(place.y, place.x) - self.first_bearing) * libm::copysign(1.0, self.bearing_step)
+    }
+
+    /// The number of a beam at an angle from the first one; past the last beam of a whole turn is the first one.
+    fn beam_at(&self, from_first: f64, step: f64) -> Option<usize> {
+        let angle = from_first % TAU;
+        let angle = if angle < 0.0 { angle + TAU } else { angle };
+        (libm::round(angle / step) as usize).checked_rem(libm::round(TAU / step) as usize)
+    }
+
+    /// Where beams end that pass a place in S within so many m and so many rad: the nearest and the farthest range, m. None if one of
+    /// them has no return, which says nothing of what it has passed, or none is there.
+    #[must_use]
+    pub fn ends_toward(&self, place: &Point, (beside, turn): (f64, f64)) -> Option<(f64, f64)> {
         let range = libm::hypot(place.x, place.y);
         let step = libm::fabs(self.bearing_step);
         if range <= 0.0 || step <= 0.0 {
-            return false;
+            return None;
         }
         let reach = beside / range + turn;
-        let from_first = (libm::atan2(place.y, place.x) - self.first_bearing) * libm::copysign(1.0, self.bearing_step);
+        let first = self.from_first(place) - reach;
         let beams = libm::ceil(2.0 * reach / step) as usize + 1;
-        let whole = libm::round(TAU / step) as usize;
-        (0..beams.min(self.ranges.len())).all(|beam| {
-            let angle = (from_first - reach + beam as f64 * step) % TAU;
-            let angle = if angle < 0.0 { angle + TAU } else { angle };
-            // Past the last beam of a whole turn is the first one.
-            let end = (libm::round(angle / step) as usize).checked_rem(whole).and_then(|index| self.ranges.get(index));
-            end.is_some_and(|end| end.is_finite() && *end > 0.0 && f64::from(*end) > range + behind)
+        (0..beams.min(self.ranges.len())).try_fold((f64::INFINITY, 0.0), |(nearest, farthest), beam| {
+            let index = self.beam_at(first + beam as f64 * step, step)?;
+            let end = self.ranges.get(index).copied().map(f64::from).filter(|end| end.is_finite() && *end > 0.0)?;
+            Some((libm::fmin(nearest, end), libm::fmax(farthest, end)))
         })
+    }
+
+    /// Whether all beams that pass a place in S within so many m and so many rad end further away than it, by `behind`, m, at least. A
+    /// beam without a return says nothing of what it has passed.
+    #[must_use]
+    pub fn passes(&self, place: &Point, around: (f64, f64), behind: f64) -> bool {
+        let range = libm::hypot(place.x, place.y);
+        self.ends_toward(place, around).is_some_and(|(nearest, _)| nearest > range + behind)
     }
 
     /// Whether the last beam and the first one are neighbours, as in a full revolution.

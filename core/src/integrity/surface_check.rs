@@ -1,0 +1,103 @@
+//! Whether the surfaces around the laser stay where they are while it moves as the odometry says.
+//!
+//! Some points of a scan are remembered in the frame of the odometry, wherever no landmark is. If the vehicle moves as its odometry says,
+//! the next scan sees nearly all of them again: a beam toward one ends there. If a large share is seen through, or hidden by what was not
+//! there, the laser has moved otherwise: the vehicle was carried or has slid. A corridor or a plain wall looks the same along itself;
+//! what moves there is not told.
+
+use heapless::Vec;
+
+use crate::geometry::{Point, Pose, ScanPoint};
+use crate::measurement::{Scan, Time};
+
+/// Points that are remembered, spread over all beams.
+const POINTS: usize = 48;
+/// Fewer that can be looked for tell nothing: in a narrow view one thing that is passed hides a large share.
+const LEAST: usize = 24;
+/// After a longer pause between two scans, s, nothing is compared: the view has changed.
+const LONGEST_PAUSE: f64 = 0.3;
+/// Points between these ranges, m, are remembered: the nearer ones may be the vehicle's own, the farther ones are struck at grazing angles.
+const RANGES: (f64, f64) = (0.5, 12.0);
+/// A point is elsewhere if all beams toward it, within this distance, m, and this turn, rad, end so much nearer or farther, m.
+const BESIDE: (f64, f64) = (0.1, 0.01);
+const ELSEWHERE: f64 = 0.4;
+/// Shares of the points that are elsewhere in one scan, and in each of two in a row.
+const SHARES: [f64; 2] = [0.6, 0.4];
+/// Scans in a row that must disagree.
+const IN_A_ROW: u8 = 2;
+
+/// The points of an earlier scan, and how often they were contradicted.
+#[derive(Clone, Debug)]
+pub struct SurfaceCheck {
+    points: Vec<ScanPoint, POINTS>,
+    last: Time,
+    contradictions: u8,
+}
+
+impl SurfaceCheck {
+    /// A check that has seen nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { points: Vec::new(), last: Time::from_micros(0), contradictions: 0 }
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.contradictions = 0;
+    }
+
+    /// Takes a scan; `sensor` is where the laser was in the frame of the odometry so many seconds after the first beam. True if the
+    /// laser has moved otherwise than the odometry says.
+    pub fn disagrees(&mut self, scan: &Scan, sensor: impl Fn(f64) -> Pose) -> bool {
+        if scan.start.since(self.last) > LONGEST_PAUSE {
+            self.clear();
+        }
+        self.last = scan.start;
+        let (mut asked, mut elsewhere) = (0_u8, 0_u8);
+        let middle = 0.5 * scan.end().since(scan.start);
+        for point in &self.points {
+            let Some(is_elsewhere) = is_elsewhere(scan, &point.cast(), middle, &sensor) else { continue };
+            asked = asked.saturating_add(1);
+            elsewhere = elsewhere.saturating_add(u8::from(is_elsewhere));
+        }
+        let [at_once, in_a_row] =
+            SHARES.map(|share| usize::from(asked) >= LEAST && f64::from(elsewhere) > share * f64::from(asked));
+        // What contradicts is compared with the same points once more.
+        if !in_a_row || self.contradictions > 0 {
+            self.remember(scan, &sensor);
+        }
+        self.contradictions = if in_a_row { self.contradictions.saturating_add(1) } else { 0 };
+        at_once || self.contradictions >= IN_A_ROW
+    }
+
+    fn remember(&mut self, scan: &Scan, sensor: &impl Fn(f64) -> Pose) {
+        self.points.clear();
+        let every = scan.ranges.len().div_ceil(POINTS).max(1);
+        for (index, range) in scan.ranges.iter().enumerate().step_by(every) {
+            let range = f64::from(*range);
+            if (RANGES.0..=RANGES.1).contains(&range) {
+                let (sin, cos) = libm::sincos(scan.bearing(index));
+                let place = sensor(index as f64 * scan.beam_interval).transform(&Point::new(range * cos, range * sin));
+                // The points are no more than there is room for.
+                let _ = self.points.push(place.cast());
+            }
+        }
+    }
+}
+
+impl Default for SurfaceCheck {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Whether no beam toward a place in the frame of the odometry ends there; none if some of them ended nowhere, or none looked there.
+fn is_elsewhere(scan: &Scan, place: &Point, middle: f64, sensor: &impl Fn(f64) -> Pose) -> Option<bool> {
+    let from_middle = sensor(middle).inverse_transform(place);
+    let beam = scan.beam_toward(&from_middle)?;
+    let seen = sensor(beam as f64 * scan.beam_interval).inverse_transform(place);
+    let range = libm::hypot(seen.x, seen.y);
+    let (nearest, farthest) = scan.ends_toward(&seen, BESIDE)?;
+    Some(nearest > range + ELSEWHERE || farthest < range - ELSEWHERE)
+}
