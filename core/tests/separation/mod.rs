@@ -4,6 +4,7 @@
 
 mod creep;
 mod drive;
+mod envelope;
 mod level;
 mod sensor_information;
 mod solution;

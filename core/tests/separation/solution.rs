@@ -151,7 +151,7 @@ fn a_solution_that_is_not_a_number_bounds_nothing() {
     let assumed = AssumedDeviations::default();
     for covariance in [[f64::NAN, 0.0, 1e-4, 0.0, 0.0, 1e-5], [1e-4, 0.0, 1e-4, 0.0, 0.0, f64::NAN]] {
         let solution = Solution::new(Pose::default(), &covariance, &assumed);
-        let level = solution.bound(&Pose::default(), &FAULT_FREE, (0.0, 0.0));
+        let level = solution.bound(&Pose::default(), &FAULT_FREE, (0.0, 0.0)).level();
         assert!(level.position > 1e6 && level.heading > 1e6, "{level:?}");
     }
 }
@@ -189,5 +189,30 @@ fn a_solution_says_the_covariance_that_it_was_given() {
     let solution = Solution::new(Pose::new(1.0, 2.0, 0.5), &entries, &AssumedDeviations::default());
     for (said, given) in solution.entries().iter().zip(entries) {
         assert!((said - given).abs() < 1e-15, "{said} {given}");
+    }
+}
+
+/// What a free odometry may do on the next metres is what the prediction makes of it, if nothing is correlated yet.
+#[test]
+fn the_drift_of_a_solution_is_what_its_prediction_adds() {
+    for lever in [None, Some(1.2)] {
+        let mut solution =
+            Solution::new(Pose::default(), &[1e-8, 0.0, 1e-8, 0.0, 0.0, 1e-10], &AssumedDeviations::default());
+        solution.free_odometry();
+        for (distance, turned) in [(0.2, 0.0), (0.2, 0.05)] {
+            let displacement = Pose::new(distance, 0.0, turned);
+            let drift = solution.drift(distance, turned, lever);
+            let mut moved = solution.clone();
+            let by_bias = BiasJacobian::of(&displacement, lever);
+            moved.predict(&Step { displacement, covariance: Matrix3::zeros(), by_bias });
+            let [before, after] = [&solution, &moved].map(Solution::variances);
+            let added = [(after.0 - before.0).sqrt(), (after.1 - before.1).sqrt()];
+            let told = [drift.deviations.0, drift.deviations.1];
+            // Deviations of several errors are added up, not their squares.
+            for (told, added) in told.into_iter().zip(added) {
+                assert!(told >= 0.99 * added && told <= 1.8 * added, "{lever:?} {turned}: {told} {added}");
+            }
+            assert_eq!(drift.expected, (0.0, 0.0));
+        }
     }
 }

@@ -1,11 +1,11 @@
 //! A laser that creeps on its mounting: slowly at any time, or so fast that it is found.
 
 use super::assumed::{Factors, ONE_FAULT, ONE_RARE_FAULT};
+use super::envelope::Envelope;
 use super::hypothesis::is_refuted;
 use super::sensor_information::SensorInformation;
 use super::solution::{Laser, Solution};
 use crate::geometry::Pose;
-use crate::state::ProtectionLevel;
 
 /// A laser that creeps: its place, m, and yaw, rad, for a square root of a metre, or of two seconds.
 const SLOW: (f64, f64) = (5e-4, 2.6e-4);
@@ -92,18 +92,23 @@ impl Creeps {
         self.turning.correct(told, laser, all);
     }
 
-    /// The largest of their bounds of a pose; see [`Solution::bound`]. A fast creep counts once it is found, or `is_doubted` says that the
+    /// Adds their bounds of a pose; see [`Solution::bound`]. A fast creep counts once it is found, or `is_doubted` says that the
     /// laser moves.
-    #[must_use]
-    pub fn bound(&self, pose: &Pose, surprise: f64, map_variances: (f64, f64), is_doubted: bool) -> ProtectionLevel {
-        let bound =
-            |solution: &Solution, factors: &Factors| solution.bound(pose, &factors.times(surprise), map_variances);
-        let mut level = bound(&self.slow, &ONE_FAULT);
-        let turning = if self.turning.is_found { &ONE_FAULT } else { &ONE_RARE_FAULT };
-        level = level.or(&bound(&self.turning.solution, turning));
+    pub fn add_to(
+        &self,
+        envelope: &mut Envelope,
+        pose: &Pose,
+        surprise: f64,
+        map_variances: (f64, f64),
+        is_doubted: bool,
+    ) {
+        let mut add = |solution: &Solution, factors: &Factors| {
+            envelope.add(&solution.bound(pose, &factors.times(surprise), map_variances));
+        };
+        add(&self.slow, &ONE_FAULT);
+        add(&self.turning.solution, if self.turning.is_found { &ONE_FAULT } else { &ONE_RARE_FAULT });
         if self.fast.is_found || is_doubted {
-            level = level.or(&bound(&self.fast.solution, &ONE_FAULT));
+            add(&self.fast.solution, &ONE_FAULT);
         }
-        level
     }
 }

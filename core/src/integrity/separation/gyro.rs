@@ -58,6 +58,13 @@ impl GyroSeparation {
         &mut self.alone
     }
 
+    /// What the wheels alone have told since the solutions went on: its covariance.
+    #[must_use]
+    pub const fn wheels_covariance(&self) -> &Matrix3<f64> {
+        let (_, covariance) = &self.wheels;
+        covariance
+    }
+
     /// The bias is known to so much, rad/s, by what does not rest on landmarks or has been corrected by them.
     pub fn know(&mut self, bias: f64, prior: f64) {
         self.assumed.steering = bias.min(prior);

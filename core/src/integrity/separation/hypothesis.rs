@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use super::assumed::Factors;
+use super::envelope::{Envelope, SolutionBound};
 use super::sensor_information::SensorInformation;
 use super::solution::{FREE_POSITION, FREE_YAW, Laser, Solution};
 use crate::geometry::Pose;
@@ -157,14 +158,13 @@ impl FreeSince {
         self.is_needed || self.is_surprised || self.has_found_mounting() || self.is_well_known()
     }
 
-    /// How far a pose may be off if this solution is right; see [`Solution::bound`]. What is said of places while the heading was hardly
+    /// Adds how far a pose may be off if this solution is right; see [`Solution::bound`]. What is said of places while the heading was hardly
     /// known does not count, and until the next event nothing does if the last one has refuted it.
-    #[must_use]
-    pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> ProtectionLevel {
-        let level = self.solution.bound(pose, factors, map_variances);
+    pub fn add_to(&self, envelope: &mut Envelope, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) {
         let position = if self.awaits_heading || self.is_surprised { factors.position * FREE_POSITION } else { 0.0 };
         let heading = if self.is_surprised { factors.heading * FREE_YAW } else { 0.0 };
-        level.or(&ProtectionLevel { position, heading })
+        envelope.add(&SolutionBound::fixed(&ProtectionLevel { position, heading }));
+        envelope.add(&self.solution.bound(pose, factors, map_variances));
     }
 
     /// Whether a free yaw of the laser has been found.

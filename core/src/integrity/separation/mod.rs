@@ -8,6 +8,7 @@
 mod assumed;
 mod contradiction;
 mod creep;
+mod envelope;
 mod gyro;
 mod hypothesis;
 mod misfit;
@@ -20,13 +21,14 @@ use nalgebra::{Matrix3, Vector3};
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, ONE_KNOCK, fault_free};
 use contradiction::Contradiction;
 use creep::Creeps;
+pub use envelope::{Bound, Envelope, Growth, SolutionBound};
 use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
-pub use solution::{Laser, Solution, Step};
+pub use solution::{Drift, Laser, Solution, Step};
 
 use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
@@ -59,13 +61,18 @@ const LONGEST_STEP: f64 = 0.3;
 struct Pending {
     covariance: Matrix3<f64>,
     distance: f64,
+    turned: f64,
     /// The last motion, which tells the velocity.
     last: Option<Motion>,
 }
 
 impl Pending {
-    const NONE: Self =
-        Self { covariance: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), distance: 0.0, last: None };
+    const NONE: Self = Self {
+        covariance: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        distance: 0.0,
+        turned: 0.0,
+        last: None,
+    };
 }
 
 /// The solutions, and the protection level that they give.
@@ -94,12 +101,32 @@ pub struct SolutionSeparation {
     contradiction: Contradiction,
     misfit: Misfit,
     map_variances: (f64, f64),
-    /// The pose that is bounded, how much larger innovations are than expected, and the bound, all at the last step.
+    /// The pose that is bounded, how much larger innovations are than expected, and the bounds, all at the last step.
     pose: Pose,
     surprise: f64,
-    level: ProtectionLevel,
-    /// Variances of the solution from all then: of the position's larger axis, m^2, and of the heading, rad^2.
-    variances: (f64, f64),
+    bounds: Bounds,
+}
+
+/// The bounds that make up the protection level.
+#[derive(Clone, Debug)]
+struct Bounds {
+    /// Of all solutions but the next two.
+    envelope: Envelope,
+    /// Of the one whose odometry is wrong, which may soon lead the pose away.
+    odometry: SolutionBound,
+    /// Of the one that rests on the wheels alone; nothing without a gyro.
+    wheels: SolutionBound,
+    /// By what contradicts.
+    widening: ProtectionLevel,
+}
+
+impl Bounds {
+    const NONE: Self = Self {
+        envelope: Envelope::new(),
+        odometry: SolutionBound::UNBOUNDED,
+        wheels: SolutionBound::fixed(&ProtectionLevel::NONE),
+        widening: ProtectionLevel::NONE,
+    };
 }
 
 impl SolutionSeparation {
@@ -137,8 +164,7 @@ impl SolutionSeparation {
             map_variances: (0.0, 0.0),
             pose: Pose::default(),
             surprise: 1.0,
-            level: ProtectionLevel::UNBOUNDED,
-            variances: (0.0, 0.0),
+            bounds: Bounds::NONE,
         }
     }
 
@@ -253,6 +279,7 @@ impl SolutionSeparation {
         }
         self.pending.covariance += motion.covariance;
         self.pending.distance += motion.distance;
+        self.pending.turned += libm::fabs(motion.displacement.theta);
         self.pending.last = Some(*motion);
         if self.pending.distance > LONGEST_STEP {
             self.step(motion.end, odometry_pose);
@@ -400,8 +427,7 @@ impl SolutionSeparation {
     fn rest_on(&mut self, pose: &Pose, surprise: f64) {
         self.pose = *pose;
         self.surprise = surprise;
-        self.level = self.bound(pose, surprise);
-        self.variances = self.all.variances();
+        self.bounds = self.bounds_of(pose, surprise);
     }
 
     fn correct(&mut self, laser: &Laser) {
@@ -455,7 +481,7 @@ impl SolutionSeparation {
         }
         // The one that says least makes room.
         let pose = *self.all.pose();
-        let position = |knock: &Knock| knock.solution.bound(&pose, &ONE_KNOCK, (0.0, 0.0)).position;
+        let position = |knock: &Knock| knock.solution.bound(&pose, &ONE_KNOCK, (0.0, 0.0)).level().position;
         if let Some(least) = self.knocks.iter_mut().min_by(|a, b| position(a).total_cmp(&position(b))) {
             *least = knock;
         }
@@ -494,47 +520,56 @@ impl SolutionSeparation {
         }
     }
 
-    /// The largest of all bounds of a pose, widened by what contradicts it.
-    fn bound(&self, pose: &Pose, surprise: f64) -> ProtectionLevel {
+    /// The bounds of a pose by all solutions, and by what contradicts it.
+    fn bounds_of(&self, pose: &Pose, surprise: f64) -> Bounds {
         let [fault_free, one_fault, one_knock] =
             [FAULT_FREE, ONE_FAULT, ONE_KNOCK].map(|factors| factors.times(surprise));
-        let creeps = self.creeps.bound(pose, surprise, self.map_variances, self.is_laser_doubted);
+        let map_variances = self.map_variances;
+        let bound = |solution: &Solution, factors: &Factors| solution.bound(pose, factors, map_variances);
+        let mut envelope = Envelope::new();
+        envelope.add(&bound(&self.all, &fault_free));
+        self.leave_outs.iter().for_each(|one| envelope.add(&bound(&one.solution, &one_fault)));
+        self.knocks.iter().for_each(|one| envelope.add(&bound(&one.solution, &one_knock)));
+        self.creeps.add_to(&mut envelope, pose, surprise, map_variances, self.is_laser_doubted);
         let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
-        let level = [&self.odometry]
-            .into_iter()
-            .chain(self.leave_outs.iter().map(|one| &one.solution))
-            .chain(self.gyro.as_ref().map(GyroSeparation::alone))
-            .fold(self.all.bound(pose, &fault_free, self.map_variances), |level, solution| {
-                level.or(&solution.bound(pose, &one_fault, self.map_variances))
-            });
-        let knocks = self.knocks.iter().map(|one| one.solution.bound(pose, &one_knock, self.map_variances));
-        let level = knocks.fold(level.or(&creeps), |level, knock| level.or(&knock));
         let free = found_mounting.into_iter().chain(found_yaw);
-        let level = free.fold(level, |level, one| level.or(&one.bound(pose, &one_fault, self.map_variances)));
+        free.for_each(|one| one.add_to(&mut envelope, pose, &one_fault, map_variances));
         let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
-        ProtectionLevel {
-            position: level.position + contradiction.position + misfit.position,
-            heading: level.heading + contradiction.heading + misfit.heading,
+        Bounds {
+            envelope,
+            odometry: bound(&self.odometry, &one_fault),
+            wheels: self.gyro.as_ref().map_or(Bounds::NONE.wheels, |gyro| bound(gyro.alone(), &one_fault)),
+            widening: ProtectionLevel {
+                position: contradiction.position + misfit.position,
+                heading: contradiction.heading + misfit.heading,
+            },
         }
     }
 
     /// The protection level of the pose that the odometry has led on to since the last step.
     #[must_use]
     pub fn level(&self) -> ProtectionLevel {
-        let Pending { covariance, distance, .. } = &self.pending;
+        let Pending { covariance, distance, turned, .. } = &self.pending;
+        let Bounds { envelope, odometry, wheels, widening } = &self.bounds;
+        let noise = self.growth_by(covariance, *distance);
+        let drift = self.odometry.drift(*distance, *turned, self.steering_lever);
+        let by_wheels =
+            self.gyro.as_ref().map_or(Growth::NONE, |gyro| self.growth_by(gyro.wheels_covariance(), *distance));
+        let level = envelope.after(&noise).or(&odometry.after_drift(&noise, &drift));
+        let level = level.or(&wheels.after(&by_wheels));
+        let heading = level.heading + widening.heading;
+        ProtectionLevel { position: level.position + widening.position + heading.min(1.0) * distance, heading }
+    }
+
+    /// What a motion of so many m, with that noise, adds to the variances of a solution.
+    fn growth_by(&self, noise: &Matrix3<f64>, distance: f64) -> Growth {
         let AssumedDeviations { scale, steering, turn, .. } = self.assumed;
-        let grown = |variance: f64, by: f64| libm::sqrt(variance + by) - libm::sqrt(variance);
-        let (position, heading) = self.variances;
         let along = scale * distance;
         let by_turn = steering.max(turn) * distance;
-        let larger = larger_axis(covariance.m11, covariance.m12, covariance.m22);
-        ProtectionLevel {
-            position: self.level.position
-                + FAULT_FREE.position * grown(position, larger + along * along)
-                + self.level.heading.min(1.0) * distance,
-            heading: self.level.heading
-                + FAULT_FREE.heading * grown(heading, covariance.m33.max(0.0) + by_turn * by_turn),
+        Growth {
+            position: larger_axis(noise.m11, noise.m12, noise.m22) + along * along,
+            heading: noise.m33.max(0.0) + by_turn * by_turn,
         }
     }
 }

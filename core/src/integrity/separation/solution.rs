@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::assumed::{AssumedDeviations, Factors};
+use super::envelope::{Bound, SolutionBound};
 use super::sensor_information::{SensorInformation, Told, not_negative};
 use crate::geometry::{Pose, difference, larger_axis, length};
 use crate::odometry::BiasJacobian;
-use crate::state::ProtectionLevel;
 
 /// The pose, the place and yaw of the laser beside those believed, its clock, and scale, steering and turn of the odometry.
 pub const STATES: usize = 10;
@@ -57,12 +57,22 @@ struct Lasting {
     turn: f64,
 }
 
+/// What lasting errors of the odometry do to a pose: position, m, and heading, rad, at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// As they are known.
+    pub expected: (f64, f64),
+    /// Deviations of that.
+    pub deviations: (f64, f64),
+}
+
 /// The first state of what lasts: of the mounting, its yaw, the clock and the odometry.
 const MOUNTING: usize = 3;
 const YAW: usize = 5;
 const CLOCK: usize = 6;
 const ODOMETRY: usize = 7;
 const STEERING: usize = 8;
+const TURN: usize = 9;
 
 /// Deviations of what is free: position of R, m; place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
 pub const FREE_POSITION: f64 = 1.0;
@@ -414,19 +424,44 @@ impl Solution {
         libm::sqrt(between.unwrap_or(at_most).min(at_most).max(0.0))
     }
 
+    /// How the errors of the odometry that last, as this solution knows them, move a pose that is led on by the odometry, for so many m and
+    /// so much turn, rad; `lever` as in [`BiasJacobian::of`].
+    #[must_use]
+    pub fn drift(&self, distance: f64, turned: f64, lever: Option<f64>) -> Drift {
+        let Lasting { scale, steering, turn, .. } = self.lasting;
+        let deviation =
+            |state: usize| libm::sqrt(not_negative(self.covariance.get((state, state)).copied().unwrap_or(0.0)));
+        let (along, across) = lever.map_or((0.0, 1.0), |lever| (lever, 1.0 / lever));
+        let drift = |[scale, steering, turn]: [f64; 3]| {
+            let position = scale * distance + steering * along * turned;
+            (position, steering * across * distance + (scale + turn) * turned)
+        };
+        Drift {
+            expected: drift([scale, steering, turn].map(libm::fabs)),
+            deviations: drift([ODOMETRY, STEERING, TURN].map(deviation)),
+        }
+    }
+
     /// How far a pose may be off if this solution is right: by what lies between them, and by the solution's own bound.
     /// `map_variances` are what the errors of the map add.
     #[must_use]
-    pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> ProtectionLevel {
+    pub fn bound(&self, pose: &Pose, factors: &Factors, map_variances: (f64, f64)) -> SolutionBound {
         let (position, heading) = self.variances();
         let (by_map, heading_by_map) = map_variances;
-        let level = ProtectionLevel {
-            position: length(pose.x - self.pose.x, pose.y - self.pose.y)
-                + factors.position * libm::sqrt(position + by_map),
-            heading: libm::fabs(difference(pose.theta, self.pose.theta))
-                + factors.heading * libm::sqrt(heading + heading_by_map),
+        let bound = SolutionBound {
+            position: Bound {
+                apart: length(pose.x - self.pose.x, pose.y - self.pose.y),
+                variance: position + by_map,
+                factor: factors.position,
+            },
+            heading: Bound {
+                apart: libm::fabs(difference(pose.theta, self.pose.theta)),
+                variance: heading + heading_by_map,
+                factor: factors.heading,
+            },
         };
         // What is not a number bounds nothing.
-        if level.position.is_finite() && level.heading.is_finite() { level } else { ProtectionLevel::UNBOUNDED }
+        let level = bound.level();
+        if level.position.is_finite() && level.heading.is_finite() { bound } else { SolutionBound::UNBOUNDED }
     }
 }

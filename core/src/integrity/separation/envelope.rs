@@ -1,0 +1,159 @@
+//! The largest of the bounds of many solutions, also after a motion, without all of them.
+//!
+//! A bound is what lies between a solution and the pose, and so many deviations of the solution. A motion adds the same variance to all
+//! solutions: the bound of one that knows the pose well grows most. So those are kept that no other one exceeds, now and from now on.
+
+use heapless::Vec;
+
+use super::solution::Drift;
+use crate::state::ProtectionLevel;
+
+/// Bounds of either kind that are kept; if there are more, one stands for two.
+const KEPT: usize = 8;
+
+/// How far a pose may be off if one solution is right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolutionBound {
+    /// Of the position, m.
+    pub position: Bound,
+    /// Of the heading, rad.
+    pub heading: Bound,
+}
+
+impl SolutionBound {
+    /// Nothing is bounded.
+    pub const UNBOUNDED: Self = Self::fixed(&ProtectionLevel::UNBOUNDED);
+
+    /// A bound that no motion changes.
+    #[must_use]
+    pub const fn fixed(level: &ProtectionLevel) -> Self {
+        Self {
+            position: Bound { apart: level.position, ..Bound::NONE },
+            heading: Bound { apart: level.heading, ..Bound::NONE },
+        }
+    }
+
+    /// As it is.
+    #[must_use]
+    pub fn level(&self) -> ProtectionLevel {
+        self.after(&Growth::NONE)
+    }
+
+    /// After a motion.
+    #[must_use]
+    pub fn after(&self, growth: &Growth) -> ProtectionLevel {
+        ProtectionLevel { position: self.position.after(growth.position), heading: self.heading.after(growth.heading) }
+    }
+
+    /// After one of which the solution knows what leads the pose away.
+    #[must_use]
+    pub fn after_drift(&self, growth: &Growth, drift: &Drift) -> ProtectionLevel {
+        let ProtectionLevel { position, heading } = self.after(growth);
+        let ((by_position, by_heading), (of_position, of_heading)) = (drift.expected, drift.deviations);
+        ProtectionLevel {
+            position: position + by_position + self.position.factor * of_position,
+            heading: heading + by_heading + self.heading.factor * of_heading,
+        }
+    }
+}
+
+/// One component of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    /// What lies between the solution and the pose.
+    pub apart: f64,
+    /// Variance of the solution.
+    pub variance: f64,
+    /// How many deviations of it are added.
+    pub factor: f64,
+}
+
+impl Bound {
+    const NONE: Self = Self { apart: 0.0, variance: 0.0, factor: 0.0 };
+
+    fn after(&self, added: f64) -> f64 {
+        self.apart + self.factor * libm::sqrt(self.variance + added)
+    }
+
+    /// Whether it is no less than another one, whatever variance is added: it is no less now, and never grows more slowly.
+    fn exceeds(&self, other: &Self) -> bool {
+        let [square, other_square] = [self, other].map(|bound| bound.factor * bound.factor);
+        self.after(0.0) >= other.after(0.0)
+            && square >= other_square
+            && square * other.variance >= other_square * self.variance
+    }
+
+    /// One that exceeds both.
+    fn or(&self, other: &Self) -> Self {
+        let factor = self.factor.max(other.factor);
+        let variance = self.variance.min(other.variance);
+        let apart = self.after(0.0).max(other.after(0.0)) - factor * libm::sqrt(variance);
+        Self { apart, variance, factor }
+    }
+}
+
+/// What a motion adds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth {
+    /// Variance of the position, m^2.
+    pub position: f64,
+    /// Variance of the heading, rad^2.
+    pub heading: f64,
+}
+
+impl Growth {
+    /// No motion.
+    pub const NONE: Self = Self { position: 0.0, heading: 0.0 };
+}
+
+/// The largest of the bounds of solutions to which a motion adds the same.
+#[derive(Clone, Debug)]
+pub struct Envelope {
+    positions: Vec<Bound, KEPT>,
+    headings: Vec<Bound, KEPT>,
+}
+
+impl Envelope {
+    /// Of no solution.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { positions: Vec::new(), headings: Vec::new() }
+    }
+
+    /// Takes the bound of one more solution.
+    pub fn add(&mut self, bound: &SolutionBound) {
+        keep(&mut self.positions, bound.position);
+        keep(&mut self.headings, bound.heading);
+    }
+
+    /// The largest after a motion.
+    #[must_use]
+    pub fn after(&self, growth: &Growth) -> ProtectionLevel {
+        let largest = |bounds: &[Bound], added: f64| bounds.iter().map(|bound| bound.after(added)).fold(0.0, f64::max);
+        ProtectionLevel {
+            position: largest(&self.positions, growth.position),
+            heading: largest(&self.headings, growth.heading),
+        }
+    }
+}
+
+fn keep(kept: &mut Vec<Bound, KEPT>, bound: Bound) {
+    if kept.iter().any(|one| one.exceeds(&bound)) {
+        return;
+    }
+    kept.retain(|one| !bound.exceeds(one));
+    if kept.is_full() {
+        // One stands for it and for the one that is most like it.
+        let unlike = |one: &Bound| {
+            let deviations = one.factor * libm::sqrt(one.variance) - bound.factor * libm::sqrt(bound.variance);
+            libm::fabs(one.after(0.0) - bound.after(0.0)) + libm::fabs(deviations)
+        };
+        let nearest = kept.iter_mut().min_by(|a, b| unlike(a).total_cmp(&unlike(b)));
+        if let Some(one) = nearest {
+            *one = one.or(&bound);
+        }
+        return;
+    }
+    // There is room.
+    let _ = kept.push(bound);
+}
