@@ -44,6 +44,14 @@ struct Exchange {
     round_trip: i64,
 }
 
+impl Exchange {
+    /// By how much it may be wrong when the sensor's clock shows `newest`, ms, s.
+    fn uncertainty(&self, newest: i64, unknown_drift: f64) -> f64 {
+        let age = (newest - self.device) as f64 * 1e-3;
+        0.5e-6 * self.round_trip as f64 + libm::fabs(age) * unknown_drift
+    }
+}
+
 /// Local time as a line over the sensor's time.
 #[derive(Clone, Copy, Debug)]
 struct Line {
@@ -64,7 +72,6 @@ struct Line {
 #[derive(Clone, Debug, Default)]
 pub struct SensorClock {
     exchanges: Vec<Exchange, EXCHANGES>,
-    oldest: usize,
     newest: Option<(DeviceTime, i64)>,
     line: Option<Line>,
 }
@@ -73,7 +80,7 @@ impl SensorClock {
     /// A clock of which nothing is known.
     #[must_use]
     pub const fn new() -> Self {
-        Self { exchanges: Vec::new(), oldest: 0, newest: None, line: None }
+        Self { exchanges: Vec::new(), newest: None, line: None }
     }
 
     /// How much faster the vehicle's clock is than the sensor's, as a share.
@@ -113,12 +120,7 @@ impl SensorClock {
             local: middle.micros().cast_signed(),
             round_trip: received.micros().abs_diff(sent.micros()).cast_signed(),
         };
-        if let Err(exchange) = self.exchanges.push(exchange) {
-            if let Some(place) = self.exchanges.get_mut(self.oldest) {
-                *place = exchange;
-            }
-            self.oldest = (self.oldest + 1) % EXCHANGES;
-        }
+        self.remember(exchange);
         self.line = self.fit();
         if is_restarted { Err(ClockError::Restarted) } else { Ok(()) }
     }
@@ -142,6 +144,18 @@ impl SensorClock {
         Some(DeviceTime(extended as u32))
     }
 
+    /// Keeps an exchange. If there is no room, the one goes that is the most uncertain by now: usually the oldest, but where the network has
+    /// become slow, what it told before is better for minutes.
+    fn remember(&mut self, exchange: Exchange) {
+        let Err(exchange) = self.exchanges.push(exchange) else { return };
+        let unknown_drift = self.line.map_or(UNKNOWN_DRIFT, |line| line.unknown_drift);
+        let uncertainty = |one: &Exchange| one.uncertainty(exchange.device, unknown_drift);
+        let worst = self.exchanges.iter_mut().max_by(|a, b| uncertainty(a).total_cmp(&uncertainty(b)));
+        if let Some(worst) = worst.filter(|worst| uncertainty(worst) >= uncertainty(&exchange)) {
+            *worst = exchange;
+        }
+    }
+
     fn extend(&self, device: DeviceTime) -> i64 {
         match self.newest {
             Some((newest, extended)) => extended + i64::from(device.since(newest)),
@@ -161,10 +175,7 @@ impl SensorClock {
         let measured = self.measure_drift(lead);
         let drift = measured.or(self.line.map(|line| line.drift)).unwrap_or(0.0);
         let unknown_drift = if measured.is_some() { FITTED_DRIFT } else { UNKNOWN_DRIFT };
-        let uncertainty = |exchange: &Exchange| {
-            let age = (newest - exchange.device) as f64 * 1e-3;
-            0.5e-6 * exchange.round_trip as f64 + libm::fabs(age) * unknown_drift
-        };
+        let uncertainty = |exchange: &Exchange| exchange.uncertainty(newest, unknown_drift);
         let least = self.exchanges.iter().map(uncertainty).fold(f64::INFINITY, libm::fmin);
         let good = self.exchanges.iter().filter(|exchange| uncertainty(exchange) <= least + SIMILAR);
         let (count, sum) = good.fold((0.0, 0.0), |(count, sum), exchange| {

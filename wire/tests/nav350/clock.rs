@@ -121,3 +121,20 @@ fn jitter_is_not_taken_for_drift() {
         }
     }
 }
+
+/// From some moment on all answers are late: what was known before holds until the clocks may have drifted apart by as much.
+#[test]
+fn a_network_that_becomes_slow_does_not_shift_the_clock() {
+    for (before, drift) in [(5_u64, 0.0), (20, 20e-6), (40, -100e-6), (200, 100e-6)] {
+        let mut clock = SensorClock::new();
+        for second in 0..before + 100 {
+            let sent = 10_000_000 + 1_000_000 * second;
+            let late = if second < before { 0 } else { 50_000 };
+            let received = Time::from_micros(sent + 1000 + late);
+            assert_eq!(clock.record(Time::from_micros(sent), received, device(sent + 500, 77, drift)), Ok(()));
+            let error = clock.to_local(device(sent, 77, drift)).unwrap().since(Time::from_micros(sent));
+            let drifted = if before > 10 { 30e-6 } else { 200e-6 } * second.saturating_sub(before) as f64;
+            assert!(error.abs() < 2.5e-3 + drifted, "{before} s, {second}: {error}");
+        }
+    }
+}
