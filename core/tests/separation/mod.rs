@@ -5,6 +5,7 @@
 mod creep;
 mod drive;
 mod envelope;
+mod late_clock;
 mod level;
 mod sensor_information;
 mod solution;

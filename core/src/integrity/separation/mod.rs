@@ -11,6 +11,7 @@ mod creep;
 mod envelope;
 mod gyro;
 mod hypothesis;
+mod late_clock;
 mod misfit;
 mod sensor_information;
 mod solution;
@@ -25,6 +26,7 @@ pub use envelope::{Bound, Envelope, Growth, SolutionBound};
 use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
+use late_clock::LateClock;
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
@@ -92,6 +94,7 @@ pub struct SolutionSeparation {
     next_mounting: Option<FreeSince>,
     yaw: Option<FreeSince>,
     creeps: Creeps,
+    late_clock: LateClock,
     /// Whether the corrections say that the laser has moved.
     is_laser_doubted: bool,
     odometry: Solution,
@@ -156,6 +159,7 @@ impl SolutionSeparation {
             next_mounting: None,
             yaw: None,
             creeps: Creeps::new(&nowhere),
+            late_clock: LateClock::new(),
             is_laser_doubted: false,
             odometry: nowhere,
             told: SensorInformation::NONE,
@@ -216,6 +220,7 @@ impl SolutionSeparation {
             gyro.begin(pose, covariance, &self.assumed);
         }
         self.creeps.begin(&self.all);
+        self.late_clock = LateClock::new();
         self.restart_odometry();
         self.leave_outs.clear();
         if self.mounting.is_none() {
@@ -335,6 +340,7 @@ impl SolutionSeparation {
         [&mut self.all, &mut self.odometry]
             .into_iter()
             .chain(self.creeps.solutions())
+            .chain(self.late_clock.solution_mut())
             .chain(self.leave_outs.iter_mut().map(|one| &mut one.solution))
             .chain(self.knocks.iter_mut().map(|one| &mut one.solution))
             .chain(free.into_iter().flatten().map(|one| &mut one.solution))
@@ -441,6 +447,7 @@ impl SolutionSeparation {
             }
         }
         self.creeps.correct(&told, laser, &self.all);
+        self.late_clock.correct(&told, laser, &self.all);
         let [scale, steering, turn] = CHANGE.map(|deviation| deviation * deviation * self.unseen.0);
         let change = if self.gyro.is_some() { [scale, 0.0, 0.0] } else { [scale, steering, turn] };
         self.odometry.loosen_odometry(&change);
@@ -531,6 +538,7 @@ impl SolutionSeparation {
         self.leave_outs.iter().for_each(|one| envelope.add(&bound(&one.solution, &one_fault)));
         self.knocks.iter().for_each(|one| envelope.add(&bound(&one.solution, &one_knock)));
         self.creeps.add_to(&mut envelope, pose, surprise, map_variances, self.is_laser_doubted);
+        self.late_clock.solution().into_iter().for_each(|late| envelope.add(&bound(late, &one_fault)));
         let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
         let free = found_mounting.into_iter().chain(found_yaw);

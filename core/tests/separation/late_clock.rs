@@ -1,0 +1,54 @@
+//! A laser that is late since the vehicle was switched on.
+
+use agv_core::geometry::Pose;
+
+use super::drive::Drive;
+
+/// Stands, and drives off at a metre a second, bends and stops; what the laser tells of each revolution is so much older than it says.
+fn drive(seed: u64, late: f64, mut look: impl FnMut(&Drive, f64)) {
+    let mut drive = Drive::new(seed);
+    let mount = drive.mount;
+    let parts = [
+        (20, 0.0, 0.0),
+        (4, 0.06, 0.0),
+        (60, 0.125, 0.0),
+        (20, 0.125, 0.04),
+        (4, 0.06, 0.0),
+        (8, 0.0, 0.0),
+        (30, 0.125, 0.0),
+    ];
+    for (count, along, turn) in parts {
+        for _ in 0..count {
+            let step = Pose::new(along, 0.0, turn);
+            let share = -late / 0.125;
+            drive.true_mount = Pose::new(share * along, 0.0, share * turn).compose(&mount);
+            drive.revolve(&step);
+            look(&drive, along);
+        }
+    }
+}
+
+#[test]
+fn a_laser_that_is_late_from_the_beginning_is_held_from_the_first_metre_on() {
+    for seed in 1..6 {
+        for late in [0.01, 0.02, 0.05, 0.1, -0.05] {
+            let mut wrong: f64 = 0.0;
+            drive(seed, late, |drive, _| {
+                drive.assert_held(format_args!("{late} s"));
+                wrong = wrong.max((drive.published.x - drive.truth.x).hypot(drive.published.y - drive.truth.y));
+            });
+            assert!(wrong > 0.9 * late.abs(), "{wrong}");
+        }
+    }
+}
+
+/// Where the clock is in order, what the first metres have shown costs little.
+#[test]
+fn a_clock_in_order_costs_no_availability() {
+    for seed in 1..6 {
+        drive(seed, 0.0, |drive, _| {
+            let level = drive.monitor.level();
+            assert!(level.position < 0.1, "{level:?}");
+        });
+    }
+}
