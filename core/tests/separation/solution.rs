@@ -192,27 +192,29 @@ fn a_solution_says_the_covariance_that_it_was_given() {
     }
 }
 
-/// What a free odometry may do on the next metres is what the prediction makes of it, if nothing is correlated yet.
+/// What a free odometry may do on the next metres is what the prediction makes of it.
 #[test]
 fn the_drift_of_a_solution_is_what_its_prediction_adds() {
     for lever in [None, Some(1.2)] {
         let mut solution =
             Solution::new(Pose::default(), &[1e-8, 0.0, 1e-8, 0.0, 0.0, 1e-10], &AssumedDeviations::default());
         solution.free_odometry();
-        for (distance, turned) in [(0.2, 0.0), (0.2, 0.05)] {
-            let displacement = Pose::new(distance, 0.0, turned);
-            let drift = solution.drift(distance, turned, lever);
-            let mut moved = solution.clone();
+        for (along, turned) in [(0.2, 0.0), (0.2, 0.05), (-0.1, 0.03)] {
+            let displacement = Pose::new(along, 0.0, turned);
             let by_bias = BiasJacobian::of(&displacement, lever);
+            let drift = solution.drift(&by_bias, turned);
+            let mut moved = solution.clone();
             moved.predict(&Step { displacement, covariance: Matrix3::zeros(), by_bias });
             let [before, after] = [&solution, &moved].map(Solution::variances);
-            let added = [(after.0 - before.0).sqrt(), (after.1 - before.1).sqrt()];
-            let told = [drift.deviations.0, drift.deviations.1];
-            // Deviations of several errors are added up, not their squares.
-            for (told, added) in told.into_iter().zip(added) {
-                assert!(told >= 0.99 * added && told <= 1.8 * added, "{lever:?} {turned}: {told} {added}");
-            }
+            let heading = after.1 - before.1;
+            assert!((drift.heading_variance / heading - 1.0).abs() < 1e-6, "{lever:?} {turned}: {drift:?} {heading}");
+            // Deviations of the position are added up; what moves the vehicle to the side is of second order.
+            let (position, at_most) = (after.0.sqrt(), before.0.sqrt() + drift.deviation);
+            assert!(at_most > 0.99 * position, "{lever:?} {turned}: {drift:?} {position}");
+            assert!(at_most < 1.05 * position || along < 0.0, "{lever:?} {turned}: {drift:?} {position}");
             assert_eq!(drift.expected, (0.0, 0.0));
+            // The second time they are correlated with the heading.
+            solution = moved;
         }
     }
 }

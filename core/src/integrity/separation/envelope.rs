@@ -5,6 +5,7 @@
 
 use heapless::Vec;
 
+use super::sensor_information::not_negative;
 use super::solution::Drift;
 use crate::state::ProtectionLevel;
 
@@ -45,15 +46,13 @@ impl SolutionBound {
         ProtectionLevel { position: self.position.after(growth.position), heading: self.heading.after(growth.heading) }
     }
 
-    /// After one of which the solution knows what leads the pose away.
+    /// After one on which the solution knows what leads the pose away.
     #[must_use]
     pub fn after_drift(&self, growth: &Growth, drift: &Drift) -> ProtectionLevel {
-        let ProtectionLevel { position, heading } = self.after(growth);
-        let ((by_position, by_heading), (of_position, of_heading)) = (drift.expected, drift.deviations);
-        ProtectionLevel {
-            position: position + by_position + self.position.factor * of_position,
-            heading: heading + by_heading + self.heading.factor * of_heading,
-        }
+        let (by_position, by_heading) = drift.expected;
+        let position = self.position.after(growth.position) + self.position.factor * drift.deviation;
+        let heading = self.heading.after(growth.heading + drift.heading_variance);
+        ProtectionLevel { position: position + by_position, heading: heading + by_heading }
     }
 }
 
@@ -72,7 +71,7 @@ impl Bound {
     const NONE: Self = Self { apart: 0.0, variance: 0.0, factor: 0.0 };
 
     fn after(&self, added: f64) -> f64 {
-        self.apart + self.factor * libm::sqrt(self.variance + added)
+        self.apart + self.factor * libm::sqrt(not_negative(self.variance + added))
     }
 
     /// Whether it is no less than another one, whatever variance is added: it is no less now, and never grows more slowly.

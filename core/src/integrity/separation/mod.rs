@@ -63,7 +63,7 @@ const LONGEST_STEP: f64 = 0.3;
 struct Pending {
     covariance: Matrix3<f64>,
     distance: f64,
-    turned: f64,
+    moved: Pose,
     /// The last motion, which tells the velocity.
     last: Option<Motion>,
 }
@@ -72,7 +72,7 @@ impl Pending {
     const NONE: Self = Self {
         covariance: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         distance: 0.0,
-        turned: 0.0,
+        moved: Pose { x: 0.0, y: 0.0, theta: 0.0 },
         last: None,
     };
 }
@@ -284,7 +284,7 @@ impl SolutionSeparation {
         }
         self.pending.covariance += motion.covariance;
         self.pending.distance += motion.distance;
-        self.pending.turned += libm::fabs(motion.displacement.theta);
+        self.pending.moved = self.pending.moved.compose(&motion.displacement);
         self.pending.last = Some(*motion);
         if self.pending.distance > LONGEST_STEP {
             self.step(motion.end, odometry_pose);
@@ -297,14 +297,7 @@ impl SolutionSeparation {
     pub fn step(&mut self, now: Time, odometry_pose: &Pose) {
         let displacement = self.odometry_pose.between(odometry_pose);
         let distance = self.pending.distance;
-        let step = Step {
-            displacement,
-            covariance: self.pending.covariance,
-            by_bias: match &self.gyro {
-                Some(gyro) => gyro.jacobian(&displacement),
-                None => BiasJacobian::of(&displacement, self.steering_lever),
-            },
-        };
+        let step = Step { displacement, covariance: self.pending.covariance, by_bias: self.by_bias(&displacement) };
         let passed = now.since(self.time);
         let lasted = distance.max(0.5 * now.since(self.time).max(0.0));
         let wear = [WEAR.0, WEAR.1].map(|deviation| deviation * deviation * lasted);
@@ -332,6 +325,14 @@ impl SolutionSeparation {
         self.odometry_pose = *odometry_pose;
         self.pending = Pending { last: self.pending.last, ..Pending::NONE };
         self.pose = self.pose.compose(&displacement);
+    }
+
+    /// How a displacement since the last step changes with the errors of the odometry.
+    fn by_bias(&self, displacement: &Pose) -> BiasJacobian {
+        match &self.gyro {
+            Some(gyro) => gyro.jacobian(displacement),
+            None => BiasJacobian::of(displacement, self.steering_lever),
+        }
     }
 
     /// All solutions.
@@ -558,10 +559,10 @@ impl SolutionSeparation {
     /// The protection level of the pose that the odometry has led on to since the last step.
     #[must_use]
     pub fn level(&self) -> ProtectionLevel {
-        let Pending { covariance, distance, turned, .. } = &self.pending;
+        let Pending { covariance, distance, moved, .. } = &self.pending;
         let Bounds { envelope, odometry, wheels, widening } = &self.bounds;
         let noise = self.growth_by(covariance, *distance);
-        let drift = self.odometry.drift(*distance, *turned, self.steering_lever);
+        let drift = self.odometry.drift(&self.by_bias(moved), moved.theta);
         let by_wheels =
             self.gyro.as_ref().map_or(Growth::NONE, |gyro| self.growth_by(gyro.wheels_covariance(), *distance));
         let level = envelope.after(&noise).or(&odometry.after_drift(&noise, &drift));

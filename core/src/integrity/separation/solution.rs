@@ -57,13 +57,15 @@ struct Lasting {
     turn: f64,
 }
 
-/// What lasting errors of the odometry do to a pose: position, m, and heading, rad, at most.
+/// What lasting errors of the odometry do to a pose that it leads on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// As they are known.
+    /// As they are known: of the position, m, and the heading, rad, at most.
     pub expected: (f64, f64),
-    /// Deviations of that.
-    pub deviations: (f64, f64),
+    /// Deviation of the position, m.
+    pub deviation: f64,
+    /// What the variance of the heading grows by, rad^2: less than nothing where the errors make up for that of the heading.
+    pub heading_variance: f64,
 }
 
 /// The first state of what lasts: of the mounting, its yaw, the clock and the odometry.
@@ -72,7 +74,7 @@ const YAW: usize = 5;
 const CLOCK: usize = 6;
 const ODOMETRY: usize = 7;
 const STEERING: usize = 8;
-const TURN: usize = 9;
+const HEADING: usize = 2;
 
 /// Deviations of what is free: position of R, m; place, m, yaw, rad, and clock of the laser, s; scale, steering, rad, and turn of the odometry.
 pub const FREE_POSITION: f64 = 1.0;
@@ -424,21 +426,24 @@ impl Solution {
         libm::sqrt(between.unwrap_or(at_most).min(at_most).max(0.0))
     }
 
-    /// How the errors of the odometry that last, as this solution knows them, move a pose that is led on by the odometry, for so many m and
-    /// so much turn, rad; `lever` as in [`BiasJacobian::of`].
+    /// What the errors of the odometry that last, as this solution knows them, do to a pose that the odometry leads on by a displacement in R;
+    /// `by_bias` is how it changes with them.
     #[must_use]
-    pub fn drift(&self, distance: f64, turned: f64, lever: Option<f64>) -> Drift {
+    pub fn drift(&self, by_bias: &BiasJacobian, turned: f64) -> Drift {
         let Lasting { scale, steering, turn, .. } = self.lasting;
-        let deviation =
-            |state: usize| libm::sqrt(not_negative(self.covariance.get((state, state)).copied().unwrap_or(0.0)));
-        let (along, across) = lever.map_or((0.0, 1.0), |lever| (lever, 1.0 / lever));
-        let drift = |[scale, steering, turn]: [f64; 3]| {
-            let position = scale * distance + steering * along * turned;
-            (position, steering * across * distance + (scale + turn) * turned)
-        };
+        let rows = [0, 2].map(|axis: usize| {
+            let of = |column: &[f64; 3]| column.get(axis).copied().unwrap_or(0.0);
+            Vector3::new(of(&by_bias.scale), of(&by_bias.steering), if axis == HEADING { turned } else { 0.0 })
+        });
+        let at = |row: usize, column: usize| self.covariance.get((row, column)).copied().unwrap_or(0.0);
+        let errors = Matrix3::from_fn(|row, column| at(ODOMETRY + row, ODOMETRY + column));
+        let with_heading = Vector3::from_fn(|row, _| at(ODOMETRY + row, HEADING));
+        let lasting = Vector3::new(scale, steering, turn);
+        let [along, heading] = rows;
         Drift {
-            expected: drift([scale, steering, turn].map(libm::fabs)),
-            deviations: drift([ODOMETRY, STEERING, TURN].map(deviation)),
+            expected: (libm::fabs(along.dot(&lasting)), libm::fabs(heading.dot(&lasting))),
+            deviation: libm::sqrt(not_negative(along.dot(&(errors * along)))),
+            heading_variance: heading.dot(&(errors * heading)) + 2.0 * heading.dot(&with_heading),
         }
     }
 
