@@ -25,6 +25,8 @@ const ELSEWHERE: f64 = 0.4;
 const SHARES: [f64; 2] = [0.6, 0.4];
 /// Scans in a row that must disagree.
 const IN_A_ROW: u8 = 2;
+/// Parts of a scan in each of which the laser is taken to stand still: it moves by a centimetre or two in one.
+const PARTS: usize = 8;
 
 /// The points of an earlier scan, and how often they were contradicted.
 #[derive(Clone, Debug)]
@@ -54,10 +56,10 @@ impl SurfaceCheck {
             self.clear();
         }
         self.last = scan.start;
+        let parts = Parts::of(scan, sensor);
         let (mut asked, mut elsewhere) = (0_u8, 0_u8);
-        let middle = 0.5 * scan.end().since(scan.start);
         for point in &self.points {
-            let Some(is_elsewhere) = is_elsewhere(scan, &point.cast(), middle, &sensor) else { continue };
+            let Some(is_elsewhere) = is_elsewhere(scan, &point.cast(), &parts) else { continue };
             asked = asked.saturating_add(1);
             elsewhere = elsewhere.saturating_add(u8::from(is_elsewhere));
         }
@@ -65,24 +67,77 @@ impl SurfaceCheck {
             SHARES.map(|share| usize::from(asked) >= LEAST && f64::from(elsewhere) > share * f64::from(asked));
         // What contradicts is compared with the same points once more.
         if !in_a_row || self.contradictions > 0 {
-            self.remember(scan, &sensor);
+            self.remember(scan, &parts);
         }
         self.contradictions = if in_a_row { self.contradictions.saturating_add(1) } else { 0 };
         at_once || self.contradictions >= IN_A_ROW
     }
 
-    fn remember(&mut self, scan: &Scan, sensor: &impl Fn(f64) -> Pose) {
+    fn remember(&mut self, scan: &Scan, parts: &Parts) {
         self.points.clear();
         let every = scan.ranges.len().div_ceil(POINTS).max(1);
         for (index, range) in scan.ranges.iter().enumerate().step_by(every) {
             let range = f64::from(*range);
             if (RANGES.0..=RANGES.1).contains(&range) {
                 let (sin, cos) = libm::sincos(scan.bearing(index));
-                let place = sensor(index as f64 * scan.beam_interval).transform(&Point::new(range * cos, range * sin));
+                let place = parts.at(index).to_odometry(&Point::new(range * cos, range * sin));
                 // The points are no more than there is room for.
                 let _ = self.points.push(place.cast());
             }
         }
+    }
+}
+
+/// Where the laser stands in a part of a scan, in the frame of the odometry.
+#[derive(Clone, Copy, Debug)]
+struct Stand {
+    place: Point,
+    /// Of its heading.
+    sine: f64,
+    cosine: f64,
+}
+
+impl Stand {
+    fn to_odometry(self, point: &Point) -> Point {
+        let (x, y) = (point.x, point.y);
+        self.place + Point::new(self.cosine * x - self.sine * y, self.sine * x + self.cosine * y)
+    }
+
+    fn from_odometry(self, place: &Point) -> Point {
+        let (x, y) = (place.x - self.place.x, place.y - self.place.y);
+        Point::new(self.cosine * x + self.sine * y, self.cosine * y - self.sine * x)
+    }
+}
+
+/// Where the laser stands in all parts of a scan.
+struct Parts {
+    stands: [Stand; PARTS],
+    /// Beams of a part.
+    beams: usize,
+}
+
+impl Parts {
+    fn of(scan: &Scan, sensor: impl Fn(f64) -> Pose) -> Self {
+        let beams = scan.ranges.len().div_ceil(PARTS).max(1);
+        let stand = |part: usize| {
+            let pose = sensor((part as f64 + 0.5) * beams as f64 * scan.beam_interval);
+            let (sine, cosine) = libm::sincos(pose.theta);
+            Stand { place: pose.position(), sine, cosine }
+        };
+        Self { stands: core::array::from_fn(stand), beams }
+    }
+
+    fn middle(&self) -> Stand {
+        self.of_part(PARTS / 2)
+    }
+
+    fn at(&self, beam: usize) -> Stand {
+        self.of_part(beam / self.beams)
+    }
+
+    fn of_part(&self, part: usize) -> Stand {
+        let [first, ..] = self.stands;
+        self.stands.get(part).copied().unwrap_or(first)
     }
 }
 
@@ -93,10 +148,9 @@ impl Default for SurfaceCheck {
 }
 
 /// Whether no beam toward a place in the frame of the odometry ends there; none if some of them ended nowhere, or none looked there.
-fn is_elsewhere(scan: &Scan, place: &Point, middle: f64, sensor: &impl Fn(f64) -> Pose) -> Option<bool> {
-    let from_middle = sensor(middle).inverse_transform(place);
-    let beam = scan.beam_toward(&from_middle)?;
-    let seen = sensor(beam as f64 * scan.beam_interval).inverse_transform(place);
+fn is_elsewhere(scan: &Scan, place: &Point, parts: &Parts) -> Option<bool> {
+    let beam = scan.beam_toward(&parts.middle().from_odometry(place))?;
+    let seen = parts.at(beam).from_odometry(place);
     let range = libm::hypot(seen.x, seen.y);
     let (nearest, farthest) = scan.ends_toward(&seen, BESIDE)?;
     Some(nearest > range + ELSEWHERE || farthest < range - ELSEWHERE)

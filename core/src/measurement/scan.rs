@@ -84,19 +84,13 @@ impl Scan<'_> {
         if step <= 0.0 {
             return None;
         }
-        self.beam_at(self.from_first(place), step).filter(|index| *index < self.ranges.len())
+        let index = beam_at(self.from_first(place), step);
+        Some(if index < beams_of_turn(step) { index } else { 0 }).filter(|index| *index < self.ranges.len())
     }
 
     /// Angle from the first beam to a place in S, rad, in the sense in which the beams follow each other.
     fn from_first(&self, place: &Point) -> f64 {
         (libm::atan2(place.y, place.x) - self.first_bearing) * libm::copysign(1.0, self.bearing_step)
-    }
-
-    /// The number of a beam at an angle from the first one; past the last beam of a whole turn is the first one.
-    fn beam_at(&self, from_first: f64, step: f64) -> Option<usize> {
-        let angle = from_first % TAU;
-        let angle = if angle < 0.0 { angle + TAU } else { angle };
-        (libm::round(angle / step) as usize).checked_rem(libm::round(TAU / step) as usize)
     }
 
     /// Where beams end that pass a place in S within so many m and so many rad: the nearest and the farthest range, m. None if one of
@@ -109,13 +103,21 @@ impl Scan<'_> {
             return None;
         }
         let reach = beside / range + turn;
-        let first = self.from_first(place) - reach;
         let beams = libm::ceil(2.0 * reach / step) as usize + 1;
-        (0..beams.min(self.ranges.len())).try_fold((f64::INFINITY, 0.0), |(nearest, farthest), beam| {
-            let index = self.beam_at(first + beam as f64 * step, step)?;
-            let end = self.ranges.get(index).copied().map(f64::from).filter(|end| end.is_finite() && *end > 0.0)?;
-            Some((libm::fmin(nearest, end), libm::fmax(farthest, end)))
-        })
+        let whole = beams_of_turn(step);
+        let mut index = beam_at(self.from_first(place) - reach, step);
+        let mut ends = (f32::INFINITY, 0.0_f32);
+        for _ in 0..beams.min(self.ranges.len()) {
+            // Past the last beam of a whole turn is the first one.
+            index = if index >= whole { 0 } else { index };
+            let end = *self.ranges.get(index)?;
+            if !(end > 0.0 && end < f32::INFINITY) {
+                return None;
+            }
+            ends = (ends.0.min(end), ends.1.max(end));
+            index += 1;
+        }
+        Some((f64::from(ends.0), f64::from(ends.1)))
     }
 
     /// Whether all beams that pass a place in S within so many m and so many rad end further away than it, by `behind`, m, at least. A
@@ -132,4 +134,16 @@ impl Scan<'_> {
         let gap = TAU - libm::fabs(self.bearing_step) * self.ranges.len() as f64;
         libm::fabs(gap) < 0.5 * libm::fabs(self.bearing_step)
     }
+}
+
+/// The number of a beam at an angle from the first one, or the number of beams of a whole turn, which is that of the first one again.
+fn beam_at(from_first: f64, step: f64) -> usize {
+    let angle = from_first % TAU;
+    let angle = if angle < 0.0 { angle + TAU } else { angle };
+    libm::round(angle / step) as usize
+}
+
+/// Beams of a whole turn.
+fn beams_of_turn(step: f64) -> usize {
+    libm::round(TAU / step) as usize
 }

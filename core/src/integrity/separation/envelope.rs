@@ -70,24 +70,55 @@ pub struct Bound {
 impl Bound {
     const NONE: Self = Self { apart: 0.0, variance: 0.0, factor: 0.0 };
 
+    /// Whether it bounds anything.
+    #[must_use]
+    pub const fn is_finite(&self) -> bool {
+        self.apart.is_finite() && self.variance.is_finite() && self.factor.is_finite()
+    }
+
     fn after(&self, added: f64) -> f64 {
         self.apart + self.factor * libm::sqrt(not_negative(self.variance + added))
+    }
+}
+
+/// A bound, and what comparing it takes.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    bound: Bound,
+    /// What it is now.
+    value: f64,
+    /// Square of the factor.
+    square: f64,
+}
+
+impl Kept {
+    fn new(bound: Bound) -> Self {
+        Self { bound, value: bound.after(0.0), square: bound.factor * bound.factor }
     }
 
     /// Whether it is no less than another one, whatever variance is added: it is no less now, and never grows more slowly.
     fn exceeds(&self, other: &Self) -> bool {
-        let [square, other_square] = [self, other].map(|bound| bound.factor * bound.factor);
-        self.after(0.0) >= other.after(0.0)
-            && square >= other_square
-            && square * other.variance >= other_square * self.variance
+        self.value >= other.value
+            && self.square >= other.square
+            && self.square * other.bound.variance >= other.square * self.bound.variance
     }
 
     /// One that exceeds both.
     fn or(&self, other: &Self) -> Self {
-        let factor = self.factor.max(other.factor);
-        let variance = self.variance.min(other.variance);
-        let apart = self.after(0.0).max(other.after(0.0)) - factor * libm::sqrt(variance);
-        Self { apart, variance, factor }
+        let factor = self.bound.factor.max(other.bound.factor);
+        let variance = self.bound.variance.min(other.bound.variance);
+        let value = self.value.max(other.value);
+        Self {
+            bound: Bound { apart: value - factor * libm::sqrt(variance), variance, factor },
+            value,
+            square: factor * factor,
+        }
+    }
+
+    /// How little one stands for both.
+    fn unlike(&self, other: &Self) -> f64 {
+        let deviations = |one: &Self| one.value - one.bound.apart;
+        libm::fabs(self.value - other.value) + libm::fabs(deviations(self) - deviations(other))
     }
 }
 
@@ -108,8 +139,8 @@ impl Growth {
 /// The largest of the bounds of solutions to which a motion adds the same.
 #[derive(Clone, Debug)]
 pub struct Envelope {
-    positions: Vec<Bound, KEPT>,
-    headings: Vec<Bound, KEPT>,
+    positions: Vec<Kept, KEPT>,
+    headings: Vec<Kept, KEPT>,
 }
 
 impl Envelope {
@@ -121,14 +152,14 @@ impl Envelope {
 
     /// Takes the bound of one more solution.
     pub fn add(&mut self, bound: &SolutionBound) {
-        keep(&mut self.positions, bound.position);
-        keep(&mut self.headings, bound.heading);
+        keep(&mut self.positions, &bound.position);
+        keep(&mut self.headings, &bound.heading);
     }
 
     /// The largest after a motion.
     #[must_use]
     pub fn after(&self, growth: &Growth) -> ProtectionLevel {
-        let largest = |bounds: &[Bound], added: f64| bounds.iter().map(|bound| bound.after(added)).fold(0.0, f64::max);
+        let largest = |kept: &[Kept], added: f64| kept.iter().map(|one| one.bound.after(added)).fold(0.0, f64::max);
         ProtectionLevel {
             position: largest(&self.positions, growth.position),
             heading: largest(&self.headings, growth.heading),
@@ -136,18 +167,15 @@ impl Envelope {
     }
 }
 
-fn keep(kept: &mut Vec<Bound, KEPT>, bound: Bound) {
+fn keep(kept: &mut Vec<Kept, KEPT>, bound: &Bound) {
+    let bound = Kept::new(*bound);
     if kept.iter().any(|one| one.exceeds(&bound)) {
         return;
     }
     kept.retain(|one| !bound.exceeds(one));
     if kept.is_full() {
         // One stands for it and for the one that is most like it.
-        let unlike = |one: &Bound| {
-            let deviations = one.factor * libm::sqrt(one.variance) - bound.factor * libm::sqrt(bound.variance);
-            libm::fabs(one.after(0.0) - bound.after(0.0)) + libm::fabs(deviations)
-        };
-        let nearest = kept.iter_mut().min_by(|a, b| unlike(a).total_cmp(&unlike(b)));
+        let nearest = kept.iter_mut().min_by(|a, b| a.unlike(&bound).total_cmp(&b.unlike(&bound)));
         if let Some(one) = nearest {
             *one = one.or(&bound);
         }

@@ -63,6 +63,7 @@ const LONGEST_STEP: f64 = 0.3;
 struct Pending {
     covariance: Matrix3<f64>,
     distance: f64,
+    /// How far it leads in R, m and rad; what turning adds to the side is of second order.
     moved: Pose,
     /// The last motion, which tells the velocity.
     last: Option<Motion>,
@@ -284,7 +285,9 @@ impl SolutionSeparation {
         }
         self.pending.covariance += motion.covariance;
         self.pending.distance += motion.distance;
-        self.pending.moved = self.pending.moved.compose(&motion.displacement);
+        let Pose { x, y, theta } = motion.displacement;
+        let moved = &self.pending.moved;
+        self.pending.moved = Pose { x: moved.x + x, y: moved.y + y, theta: moved.theta + theta };
         self.pending.last = Some(*motion);
         if self.pending.distance > LONGEST_STEP {
             self.step(motion.end, odometry_pose);

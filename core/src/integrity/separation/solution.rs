@@ -466,7 +466,6 @@ impl Solution {
             },
         };
         // What is not a number bounds nothing.
-        let level = bound.level();
-        if level.position.is_finite() && level.heading.is_finite() { bound } else { SolutionBound::UNBOUNDED }
+        if bound.position.is_finite() && bound.heading.is_finite() { bound } else { SolutionBound::UNBOUNDED }
     }
 }
