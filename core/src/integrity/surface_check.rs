@@ -11,9 +11,9 @@ use crate::geometry::{Point, Pose, ScanPoint};
 use crate::measurement::{Scan, Time};
 
 /// Points that are remembered, spread over all beams.
-const POINTS: usize = 48;
+const POINTS: usize = 32;
 /// Fewer that can be looked for tell nothing: in a narrow view one thing that is passed hides a large share.
-const LEAST: usize = 24;
+const LEAST: usize = 16;
 /// After a longer pause between two scans, s, nothing is compared: the view has changed.
 const LONGEST_PAUSE: f64 = 0.3;
 /// Points between these ranges, m, are remembered: the nearer ones may be the vehicle's own, the farther ones are struck at grazing angles.
@@ -132,7 +132,7 @@ impl Parts {
     }
 
     fn at(&self, beam: usize) -> Stand {
-        self.of_part(beam / self.beams)
+        self.of_part(beam.checked_div(self.beams).unwrap_or(0))
     }
 
     fn of_part(&self, part: usize) -> Stand {

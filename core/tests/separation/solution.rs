@@ -202,7 +202,7 @@ fn the_drift_of_a_solution_is_what_its_prediction_adds() {
         for (along, turned) in [(0.2, 0.0), (0.2, 0.05), (-0.1, 0.03)] {
             let displacement = Pose::new(along, 0.0, turned);
             let by_bias = BiasJacobian::of(&displacement, lever);
-            let drift = solution.drift(&by_bias, turned);
+            let drift = solution.odometry_errors().drift(&by_bias, turned);
             let mut moved = solution.clone();
             moved.predict(&Step { displacement, covariance: Matrix3::zeros(), by_bias });
             let [before, after] = [&solution, &moved].map(Solution::variances);

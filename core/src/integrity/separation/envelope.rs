@@ -159,12 +159,21 @@ impl Envelope {
     /// The largest after a motion.
     #[must_use]
     pub fn after(&self, growth: &Growth) -> ProtectionLevel {
-        let largest = |kept: &[Kept], added: f64| kept.iter().map(|one| one.bound.after(added)).fold(0.0, f64::max);
         ProtectionLevel {
             position: largest(&self.positions, growth.position),
             heading: largest(&self.headings, growth.heading),
         }
     }
+}
+
+/// The largest with so much more variance. None is less than now, nor grows by more than a solution that knew the pose exactly.
+fn largest(kept: &[Kept], added: f64) -> f64 {
+    let deviation = libm::sqrt(added);
+    let now = kept.iter().map(|one| one.value).fold(0.0, f64::max);
+    kept.iter().fold(now, |largest, one| {
+        let is_less = one.value + one.bound.factor * deviation <= largest;
+        if is_less { largest } else { largest.max(one.bound.after(added)) }
+    })
 }
 
 fn keep(kept: &mut Vec<Kept, KEPT>, bound: &Bound) {

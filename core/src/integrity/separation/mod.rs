@@ -30,7 +30,7 @@ use late_clock::LateClock;
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
-pub use solution::{Drift, Laser, Solution, Step};
+pub use solution::{Drift, Laser, OdometryErrors, Solution, Step};
 
 use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
@@ -118,6 +118,7 @@ struct Bounds {
     envelope: Envelope,
     /// Of the one whose odometry is wrong, which may soon lead the pose away.
     odometry: SolutionBound,
+    odometry_errors: OdometryErrors,
     /// Of the one that rests on the wheels alone; nothing without a gyro.
     wheels: SolutionBound,
     /// By what contradicts.
@@ -125,13 +126,20 @@ struct Bounds {
 }
 
 impl Bounds {
-    const NONE: Self = Self {
-        envelope: Envelope::new(),
-        odometry: SolutionBound::UNBOUNDED,
-        wheels: SolutionBound::fixed(&ProtectionLevel::NONE),
-        widening: ProtectionLevel::NONE,
-    };
+    /// Nothing is bounded yet.
+    fn unbounded(odometry: &Solution) -> Self {
+        Self {
+            envelope: Envelope::new(),
+            odometry: SolutionBound::UNBOUNDED,
+            odometry_errors: odometry.odometry_errors(),
+            wheels: NO_WHEELS,
+            widening: ProtectionLevel::NONE,
+        }
+    }
 }
+
+/// Without a gyro no solution rests on the wheels alone.
+const NO_WHEELS: SolutionBound = SolutionBound::fixed(&ProtectionLevel::NONE);
 
 impl SolutionSeparation {
     /// Solutions of a vehicle that does not know where it is; its steered wheel stands `steering_lever` before the axle, m, if it has
@@ -162,14 +170,14 @@ impl SolutionSeparation {
             creeps: Creeps::new(&nowhere),
             late_clock: LateClock::new(),
             is_laser_doubted: false,
-            odometry: nowhere,
+            odometry: nowhere.clone(),
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
             misfit: Misfit::NONE,
             map_variances: (0.0, 0.0),
             pose: Pose::default(),
             surprise: 1.0,
-            bounds: Bounds::NONE,
+            bounds: Bounds::unbounded(&nowhere),
         }
     }
 
@@ -551,7 +559,8 @@ impl SolutionSeparation {
         Bounds {
             envelope,
             odometry: bound(&self.odometry, &one_fault),
-            wheels: self.gyro.as_ref().map_or(Bounds::NONE.wheels, |gyro| bound(gyro.alone(), &one_fault)),
+            odometry_errors: self.odometry.odometry_errors(),
+            wheels: self.gyro.as_ref().map_or(NO_WHEELS, |gyro| bound(gyro.alone(), &one_fault)),
             widening: ProtectionLevel {
                 position: contradiction.position + misfit.position,
                 heading: contradiction.heading + misfit.heading,
@@ -563,9 +572,9 @@ impl SolutionSeparation {
     #[must_use]
     pub fn level(&self) -> ProtectionLevel {
         let Pending { covariance, distance, moved, .. } = &self.pending;
-        let Bounds { envelope, odometry, wheels, widening } = &self.bounds;
+        let Bounds { envelope, odometry, odometry_errors, wheels, widening } = &self.bounds;
         let noise = self.growth_by(covariance, *distance);
-        let drift = self.odometry.drift(&self.by_bias(moved), moved.theta);
+        let drift = odometry_errors.drift(&self.by_bias(moved), moved.theta);
         let by_wheels =
             self.gyro.as_ref().map_or(Growth::NONE, |gyro| self.growth_by(gyro.wheels_covariance(), *distance));
         let level = envelope.after(&noise).or(&odometry.after_drift(&noise, &drift));

@@ -57,6 +57,31 @@ struct Lasting {
     turn: f64,
 }
 
+/// Errors of the odometry that last: scale, steering, rad, and turn.
+#[derive(Clone, Debug)]
+pub struct OdometryErrors {
+    errors: Vector3<f64>,
+    covariance: Matrix3<f64>,
+    /// Their covariance with the heading.
+    with_heading: Vector3<f64>,
+}
+
+impl OdometryErrors {
+    /// What they do to a pose that the odometry leads on, `turned` by so many rad; `by_bias` is how that displacement in R changes with them.
+    #[must_use]
+    pub fn drift(&self, by_bias: &BiasJacobian, turned: f64) -> Drift {
+        let ([scale_along, _, scale_heading], [steering_along, _, steering_heading]) =
+            (by_bias.scale, by_bias.steering);
+        let along = Vector3::new(scale_along, steering_along, 0.0);
+        let heading = Vector3::new(scale_heading, steering_heading, turned);
+        Drift {
+            expected: (libm::fabs(along.dot(&self.errors)), libm::fabs(heading.dot(&self.errors))),
+            deviation: libm::sqrt(not_negative(along.dot(&(self.covariance * along)))),
+            heading_variance: heading.dot(&(self.covariance * heading)) + 2.0 * heading.dot(&self.with_heading),
+        }
+    }
+}
+
 /// What lasting errors of the odometry do to a pose that it leads on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
@@ -426,24 +451,15 @@ impl Solution {
         libm::sqrt(between.unwrap_or(at_most).min(at_most).max(0.0))
     }
 
-    /// What the errors of the odometry that last, as this solution knows them, do to a pose that the odometry leads on by a displacement in R;
-    /// `by_bias` is how it changes with them.
+    /// The errors of the odometry that last, as this solution knows them.
     #[must_use]
-    pub fn drift(&self, by_bias: &BiasJacobian, turned: f64) -> Drift {
+    pub fn odometry_errors(&self) -> OdometryErrors {
         let Lasting { scale, steering, turn, .. } = self.lasting;
-        let rows = [0, 2].map(|axis: usize| {
-            let of = |column: &[f64; 3]| column.get(axis).copied().unwrap_or(0.0);
-            Vector3::new(of(&by_bias.scale), of(&by_bias.steering), if axis == HEADING { turned } else { 0.0 })
-        });
         let at = |row: usize, column: usize| self.covariance.get((row, column)).copied().unwrap_or(0.0);
-        let errors = Matrix3::from_fn(|row, column| at(ODOMETRY + row, ODOMETRY + column));
-        let with_heading = Vector3::from_fn(|row, _| at(ODOMETRY + row, HEADING));
-        let lasting = Vector3::new(scale, steering, turn);
-        let [along, heading] = rows;
-        Drift {
-            expected: (libm::fabs(along.dot(&lasting)), libm::fabs(heading.dot(&lasting))),
-            deviation: libm::sqrt(not_negative(along.dot(&(errors * along)))),
-            heading_variance: heading.dot(&(errors * heading)) + 2.0 * heading.dot(&with_heading),
+        OdometryErrors {
+            errors: Vector3::new(scale, steering, turn),
+            covariance: Matrix3::from_fn(|row, column| at(ODOMETRY + row, ODOMETRY + column)),
+            with_heading: Vector3::from_fn(|row, _| at(ODOMETRY + row, HEADING)),
         }
     }
 
