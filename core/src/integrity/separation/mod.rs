@@ -119,8 +119,8 @@ struct Bounds {
     /// Of the one whose odometry is wrong, which may soon lead the pose away.
     odometry: SolutionBound,
     odometry_errors: OdometryErrors,
-    /// Of the one that rests on the wheels alone; nothing without a gyro.
-    wheels: SolutionBound,
+    /// Of the one that rests on the wheels alone; none without a gyro.
+    wheels: Option<SolutionBound>,
     /// By what contradicts.
     widening: ProtectionLevel,
 }
@@ -132,14 +132,11 @@ impl Bounds {
             envelope: Envelope::new(),
             odometry: SolutionBound::UNBOUNDED,
             odometry_errors: odometry.odometry_errors(),
-            wheels: NO_WHEELS,
+            wheels: None,
             widening: ProtectionLevel::NONE,
         }
     }
 }
-
-/// Without a gyro no solution rests on the wheels alone.
-const NO_WHEELS: SolutionBound = SolutionBound::fixed(&ProtectionLevel::NONE);
 
 impl SolutionSeparation {
     /// Solutions of a vehicle that does not know where it is; its steered wheel stands `steering_lever` before the axle, m, if it has
@@ -560,7 +557,7 @@ impl SolutionSeparation {
             envelope,
             odometry: bound(&self.odometry, &one_fault),
             odometry_errors: self.odometry.odometry_errors(),
-            wheels: self.gyro.as_ref().map_or(NO_WHEELS, |gyro| bound(gyro.alone(), &one_fault)),
+            wheels: self.gyro.as_ref().map(|gyro| bound(gyro.alone(), &one_fault)),
             widening: ProtectionLevel {
                 position: contradiction.position + misfit.position,
                 heading: contradiction.heading + misfit.heading,
@@ -573,12 +570,15 @@ impl SolutionSeparation {
     pub fn level(&self) -> ProtectionLevel {
         let Pending { covariance, distance, moved, .. } = &self.pending;
         let Bounds { envelope, odometry, odometry_errors, wheels, widening } = &self.bounds;
+        if *odometry == SolutionBound::UNBOUNDED {
+            return ProtectionLevel::UNBOUNDED;
+        }
         let noise = self.growth_by(covariance, *distance);
         let drift = odometry_errors.drift(&self.by_bias(moved), moved.theta);
-        let by_wheels =
-            self.gyro.as_ref().map_or(Growth::NONE, |gyro| self.growth_by(gyro.wheels_covariance(), *distance));
-        let level = envelope.after(&noise).or(&odometry.after_drift(&noise, &drift));
-        let level = level.or(&wheels.after(&by_wheels));
+        let mut level = envelope.after(&noise).or(&odometry.after_drift(&noise, &drift));
+        if let Some((wheels, gyro)) = wheels.as_ref().zip(self.gyro.as_ref()) {
+            level = level.or(&wheels.after(&self.growth_by(gyro.wheels_covariance(), *distance)));
+        }
         let heading = level.heading + widening.heading;
         ProtectionLevel { position: level.position + widening.position + heading.min(1.0) * distance, heading }
     }
