@@ -103,7 +103,7 @@ impl Scan<'_> {
             return None;
         }
         let reach = beside / range + turn;
-        let beams = libm::ceil(2.0 * reach / step) as usize + 1;
+        let beams = (libm::ceil(2.0 * reach / step) as usize).saturating_add(1);
         let whole = beams_of_turn(step);
         let mut index = beam_at(self.from_first(place) - reach, step);
         let mut ends = (f32::INFINITY, 0.0_f32);
@@ -115,7 +115,7 @@ impl Scan<'_> {
                 return None;
             }
             ends = (ends.0.min(end), ends.1.max(end));
-            index += 1;
+            index = index.saturating_add(1);
         }
         Some((f64::from(ends.0), f64::from(ends.1)))
     }
