@@ -13,6 +13,7 @@ use agv_lab::trust::figures::figures;
 use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
 use agv_lab::trust::outcome::Outcome;
+use agv_lab::trust::recorded;
 use agv_lab::trust::row::{self, Row, RowsError};
 use agv_lab::trust::trial::Trial;
 use agv_lab::trust::{hall, pair, sweep};
@@ -394,4 +395,17 @@ fn a_vehicle_that_is_carried_to_where_no_reflector_is_says_so() {
     let kind = catalogue.kinds.iter().find(|kind| kind.name == "carried on").unwrap();
     let tried = Trial { kind, size: 9.0, with: None, seed: 50_216 }.run(Equipment::default(), &|_| {}).unwrap();
     assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
+}
+
+/// The car park by its reflectors: a real drive whose levels hold.
+#[test]
+fn the_levels_of_the_car_park_hold() {
+    let Some(folder) = agv_host_sim::data::for_test("the_levels_of_the_car_park_hold", "carpark") else { return };
+    let rows = recorded::car_park(&folder).unwrap();
+    assert_eq!(rows.iter().map(|row| row.mode).collect::<Vec<_>>(), ["reflectors", "slam", "slam and contours"]);
+    for row in &rows {
+        assert!(row.claims > 500, "{row:?}");
+        assert!(row.mi_share == 0.0 && row.hazardous == 0, "{}: {}", row.mode, row.mi_share);
+        assert_eq!(row.stanford.cells.iter().map(|(_, _, count)| count).sum::<u64>(), row.claims as u64);
+    }
 }

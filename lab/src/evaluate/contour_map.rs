@@ -68,19 +68,27 @@ struct Seen {
 /// One window that counts.
 struct Run {
     poses: Vec<WindowPose>,
+    outputs: Vec<(PoseOutput, Pose)>,
     by_contours: Vec<Compared>,
     by_odometry: Vec<Compared>,
 }
 
-/// Localises in all windows of `length` (m), with maps of cells of `cell` (m): by odometry and by contours, and the poses of the latter.
+/// What came out of all windows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Localised {
+    /// By odometry and by contours.
+    pub accuracies: Vec<MapAccuracy>,
+    /// The poses by contours.
+    pub poses: Vec<WindowPose>,
+    /// What the vehicle said of each of them, beside the corrected pose.
+    pub outputs: Vec<(PoseOutput, Pose)>,
+}
+
+/// Localises in all windows of `length` (m), with maps of cells of `cell` (m).
 ///
 /// # Errors
 /// If a window cannot be replayed.
-pub fn localise(
-    drive: &OfficeDrive,
-    length: f64,
-    cell: f64,
-) -> Result<(Vec<MapAccuracy>, Vec<WindowPose>), ReplayError> {
+pub fn localise(drive: &OfficeDrive, length: f64, cell: f64) -> Result<Localised, ReplayError> {
     let noise = drive.odometry_noise()?;
     let end_points = (0..drive.scans.len()).map(|scan| end_cells(drive, scan)).collect();
     let seen = Seen { ways: ways(drive), end_points };
@@ -92,7 +100,8 @@ pub fn localise(
     let by_odometry: Vec<_> = runs.iter().map(|run| run.by_odometry.as_slice()).collect();
     let by_contours: Vec<_> = runs.iter().map(|run| run.by_contours.as_slice()).collect();
     let accuracies = vec![accuracy("odometry", &by_odometry, false), accuracy("contours", &by_contours, true)];
-    Ok((accuracies, runs.into_iter().flat_map(|run| run.poses).collect()))
+    let outputs = runs.iter().flat_map(|run| run.outputs.iter().copied()).collect();
+    Ok(Localised { accuracies, poses: runs.into_iter().flat_map(|run| run.poses).collect(), outputs })
 }
 
 fn accuracy(method: &'static str, runs: &[&[Compared]], has_level: bool) -> MapAccuracy {
@@ -172,6 +181,7 @@ fn run(
     let numbered = claims.iter().zip(first..);
     Ok(Some(Run {
         poses: numbered.clone().map(|(claim, scan)| WindowPose { window: number, scan, pose: claim.pose }).collect(),
+        outputs: numbered.clone().map(|(claim, scan)| (*claim, drive.truth[scan])).collect(),
         by_contours: numbered.map(|(claim, scan)| compared(scan, &claim.pose, Some(claim.level))).collect(),
         by_odometry,
     }))

@@ -216,28 +216,28 @@ fn said_by(pose: &PublishedPose) -> Option<&'static str> {
 
 /// How wrong a pose is.
 #[derive(Clone, Copy, Debug)]
-struct Errors {
+pub(super) struct Errors {
     /// m.
-    position: f64,
+    pub(super) position: f64,
     /// rad.
-    heading: f64,
+    pub(super) heading: f64,
 }
 
 impl Errors {
-    fn of(pose: &Pose, truth: &Pose) -> Self {
+    pub(super) fn of(pose: &Pose, truth: &Pose) -> Self {
         Self {
             position: (pose.position() - truth.position()).norm(),
             heading: difference(pose.theta, truth.theta).abs(),
         }
     }
 
-    fn exceed(&self, limit: &AlertLimit) -> bool {
+    pub(super) fn exceed(&self, limit: &AlertLimit) -> bool {
         // What is not a number is not within.
         !(self.position <= limit.position && self.heading <= limit.heading)
     }
 
     /// The larger share of its bound.
-    fn over(&self, level: &ProtectionLevel) -> f64 {
+    pub(super) fn over(&self, level: &ProtectionLevel) -> f64 {
         let share = |error: f64, bound: f64| if error <= 0.0 { 0.0 } else { error / bound };
         let (position, heading) = (share(self.position, level.position), share(self.heading, level.heading));
         if position.is_nan() || heading.is_nan() { f64::INFINITY } else { position.max(heading) }

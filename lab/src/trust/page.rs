@@ -50,7 +50,11 @@ pub fn diagrams(figures: &Figures) -> Result<[Figure; 2], FigureError> {
     Ok([diagram(&figures.stanford_nominal)?, diagram(&figures.stanford_faults)?])
 }
 
-fn diagram(of: &Stanford) -> Result<Figure, FigureError> {
+/// One Stanford diagram.
+///
+/// # Errors
+/// If it cannot be drawn.
+pub fn diagram(of: &Stanford) -> Result<Figure, FigureError> {
     let AlertLimits { travel, docking } = AlertLimits::default();
     let limits = [travel, docking].map(|limit| 1e3 * limit.position);
     stanford_diagram(&StanfordDiagram { cells: &of.cells, cell_mm: of.cell_mm, count: CELLS, limits: &limits })

@@ -22,6 +22,11 @@ pub(super) fn stanford(rows: &[&Row]) -> Stanford {
     for (cell, count) in rows.iter().filter_map(|row| row.outcome.as_ref()).flat_map(|outcome| &outcome.stanford) {
         *counts.entry(*cell).or_default() += count;
     }
+    of_counts(counts)
+}
+
+/// Of claims that were counted as [`super::outcome::Outcome::stanford`] has them.
+pub(super) fn of_counts(counts: BTreeMap<u32, u64>) -> Stanford {
     let cells = counts.into_iter().map(|(cell, count)| (cell / CELLS, cell % CELLS, count)).collect();
     Stanford { cell_mm: CELL_MM, cells }
 }

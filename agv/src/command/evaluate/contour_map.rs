@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use agv_host_sim::mapping::contour_map::CELL;
-use agv_lab::evaluate::contour_map::localise;
+use agv_lab::evaluate::contour_map::{Localised, localise};
 
 use super::office_drive::DriveChoice;
 use super::trajectory;
@@ -48,7 +48,7 @@ impl ContourMap {
         let drive = self.drive.read()?;
         let bar = progress::spinner().with_message("driving");
         bar.tick();
-        let (accuracies, poses) = localise(&drive, self.length, self.cell)?;
+        let Localised { accuracies, poses, .. } = localise(&drive, self.length, self.cell)?;
         bar.finish_and_clear();
         anyhow::ensure!(!poses.is_empty(), "no window of the drive is covered by a map of the rest of it");
         if let Some(path) = &self.trajectory {

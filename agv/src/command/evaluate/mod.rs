@@ -13,6 +13,7 @@ mod features;
 mod gyro;
 mod halting_points;
 mod kidnapping;
+mod levels;
 mod lidar3d_calibration;
 mod lidar3d_places;
 mod lidar3d_sharpness;
@@ -65,6 +66,7 @@ enum Experiment {
     Features(features::Features),
     Gyro(gyro::Gyro),
     Kidnapping(kidnapping::Kidnapping),
+    Levels(levels::Levels),
     Places(places::Places),
     Slam(slam::Slam),
     Soak(soak::Soak),
@@ -92,6 +94,7 @@ impl Evaluate {
             Experiment::Features(experiment) => experiment.run(),
             Experiment::Gyro(experiment) => experiment.run(),
             Experiment::Kidnapping(experiment) => experiment.run(),
+            Experiment::Levels(experiment) => experiment.run(),
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),
             Experiment::Soak(experiment) => experiment.run(),
