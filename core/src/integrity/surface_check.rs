@@ -80,7 +80,7 @@ impl SurfaceCheck {
             let range = f64::from(*range);
             if (RANGES.0..=RANGES.1).contains(&range) {
                 let (sin, cos) = libm::sincos(scan.bearing(index));
-                let place = parts.at(index).to_odometry(&Point::new(range * cos, range * sin));
+                let place = parts.at(index).in_odometry(&Point::new(range * cos, range * sin));
                 // The points are no more than there is room for.
                 let _ = self.points.push(place.cast());
             }
@@ -98,12 +98,12 @@ struct Stand {
 }
 
 impl Stand {
-    fn to_odometry(self, point: &Point) -> Point {
+    fn in_odometry(self, point: &Point) -> Point {
         let (x, y) = (point.x, point.y);
         self.place + Point::new(self.cosine * x - self.sine * y, self.sine * x + self.cosine * y)
     }
 
-    fn from_odometry(self, place: &Point) -> Point {
+    fn seen_from(self, place: &Point) -> Point {
         let (x, y) = (place.x - self.place.x, place.y - self.place.y);
         Point::new(self.cosine * x + self.sine * y, self.cosine * y - self.sine * x)
     }
@@ -149,8 +149,8 @@ impl Default for SurfaceCheck {
 
 /// Whether no beam toward a place in the frame of the odometry ends there; none if some of them ended nowhere, or none looked there.
 fn is_elsewhere(scan: &Scan, place: &Point, parts: &Parts) -> Option<bool> {
-    let beam = scan.beam_toward(&parts.middle().from_odometry(place))?;
-    let seen = parts.at(beam).from_odometry(place);
+    let beam = scan.beam_toward(&parts.middle().seen_from(place))?;
+    let seen = parts.at(beam).seen_from(place);
     let range = libm::hypot(seen.x, seen.y);
     let (nearest, farthest) = scan.ends_toward(&seen, BESIDE)?;
     Some(nearest > range + ELSEWHERE || farthest < range - ELSEWHERE)

@@ -84,12 +84,12 @@ impl Scan<'_> {
         if step <= 0.0 {
             return None;
         }
-        let index = beam_at(self.from_first(place), step);
+        let index = beam_at(self.angle_to(place), step);
         Some(if index < beams_of_turn(step) { index } else { 0 }).filter(|index| *index < self.ranges.len())
     }
 
     /// Angle from the first beam to a place in S, rad, in the sense in which the beams follow each other.
-    fn from_first(&self, place: &Point) -> f64 {
+    fn angle_to(&self, place: &Point) -> f64 {
         (libm::atan2(place.y, place.x) - self.first_bearing) * libm::copysign(1.0, self.bearing_step)
     }
 
@@ -105,7 +105,7 @@ impl Scan<'_> {
         let reach = beside / range + turn;
         let beams = (libm::ceil(2.0 * reach / step) as usize).saturating_add(1);
         let whole = beams_of_turn(step);
-        let mut index = beam_at(self.from_first(place) - reach, step);
+        let mut index = beam_at(self.angle_to(place) - reach, step);
         let mut ends = (f32::INFINITY, 0.0_f32);
         for _ in 0..beams.min(self.ranges.len()) {
             // Past the last beam of a whole turn is the first one.

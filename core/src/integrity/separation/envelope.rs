@@ -166,6 +166,12 @@ impl Envelope {
     }
 }
 
+impl Default for Envelope {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// The largest with so much more variance. None is less than now, nor grows by more than a solution that knew the pose exactly.
 fn largest(kept: &[Kept], added: f64) -> f64 {
     let deviation = libm::sqrt(added);
