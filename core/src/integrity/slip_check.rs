@@ -161,8 +161,7 @@ impl SlipCheck {
     }
 
     /// Whether a scan is awaited because no landmark was seen again of those that should be.
-    #[must_use]
-    pub fn sees_none_again(&self) -> bool {
+    fn sees_none_again(&self) -> bool {
         let [_, fewest] = GONE;
         self.awaits_scan && self.seen_again == 0 && usize::from(self.expected) >= fewest
     }

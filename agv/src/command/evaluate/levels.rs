@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 
 use agv_host_sim::{data, output_file};
-use agv_lab::evaluate::slam::OfficeDrive;
 use agv_lab::trust::page::diagram;
 use agv_lab::trust::recorded::{Recorded, building, car_park};
 use anyhow::Context;
 use clap::ValueEnum;
 
-use super::office_drive::DriveSet;
+use super::office_drive::{self, DriveSet};
 use crate::command::output::check_files;
 use crate::command::progress;
 
@@ -94,7 +93,7 @@ impl Levels {
         let bar = progress::spinner().with_message("driving");
         bar.tick();
         if let Some(log) = &self.log {
-            let drive = OfficeDrive::of_carmen(log)?;
+            let drive = office_drive::read(log)?;
             let name = log.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
             return Ok(vec![building(&name, &drive, self.length)?]);
         }
@@ -102,7 +101,7 @@ impl Levels {
         let mut rows = car_park(&folder.join("carpark"))?;
         for set in DriveSet::value_variants() {
             let (name, log) = set.log()?;
-            rows.push(building(&name, &OfficeDrive::of_carmen(&log)?, self.length)?);
+            rows.push(building(&name, &office_drive::read(&log)?, self.length)?);
         }
         bar.finish_and_clear();
         Ok(rows)

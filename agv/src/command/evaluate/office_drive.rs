@@ -1,6 +1,6 @@
 //! Which drive through an office an experiment is made with.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use agv_host_sim::data;
 use agv_lab::evaluate::slam::OfficeDrive;
@@ -68,10 +68,15 @@ impl DriveChoice {
                 return Ok(OfficeDrive::of_graph(&folder.join("fr079.log"), &carmen_log)?);
             }
         };
-        let drive = OfficeDrive::of_carmen(&log)?;
-        if !drive.defects.is_none() {
-            note(&format!("agv: {}: {}", log.display(), drive.defects));
-        }
-        Ok(drive)
+        read(&log)
     }
+}
+
+/// Reads a log, and says what was wrong with its times.
+pub fn read(log: &Path) -> anyhow::Result<OfficeDrive> {
+    let drive = OfficeDrive::of_carmen(log)?;
+    if !drive.defects.is_none() {
+        note(&format!("agv: {}: {}", log.display(), drive.defects));
+    }
+    Ok(drive)
 }
