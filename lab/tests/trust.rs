@@ -9,11 +9,11 @@ use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_lab::campaign::Shard;
 use agv_lab::equipment::Equipment;
+use agv_lab::evaluate::levels;
 use agv_lab::trust::figures::figures;
 use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
 use agv_lab::trust::outcome::Outcome;
-use agv_lab::trust::recorded;
 use agv_lab::trust::row::{self, Row, RowsError};
 use agv_lab::trust::trial::Trial;
 use agv_lab::trust::{hall, pair, sweep};
@@ -401,7 +401,7 @@ fn a_vehicle_that_is_carried_to_where_no_reflector_is_says_so() {
 #[test]
 fn the_levels_of_the_car_park_hold() {
     let Some(folder) = agv_host_sim::data::for_test("the_levels_of_the_car_park_hold", "carpark") else { return };
-    let rows = recorded::car_park(&folder).unwrap();
+    let rows = levels::car_park(&folder).unwrap();
     assert_eq!(rows.iter().map(|row| row.mode).collect::<Vec<_>>(), ["reflectors", "slam", "slam and contours"]);
     for row in &rows {
         assert!(row.claims > 500, "{row:?}");

@@ -4,6 +4,8 @@
 pub mod busy_board;
 mod programs;
 mod skip;
+#[cfg(target_os = "linux")]
+pub mod user_mode_linux;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

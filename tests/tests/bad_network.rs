@@ -17,6 +17,7 @@ use agv_host_sim::link::nav350::{Happening, Link};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options, Turn};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_tests::user_mode_linux::{self, Kernel, PACKAGES};
 use agv_tests::{is_on_path, skip};
 use agv_wire::nav350::{Configuration, Revolution, SensorFrame};
 
@@ -67,11 +68,10 @@ fn hold_on(network: &str) {
     let output = if has_netem {
         let output = in_namespace(&format!("{network} && {run}; tc -s qdisc show dev lo")).output().unwrap();
         String::from_utf8_lossy(&output.stdout).into_owned()
-    } else if ["linux.uml", "insmod"].into_iter().all(is_on_path) {
+    } else if user_mode_linux::is_there() {
         in_user_mode_linux(network, &run)
     } else {
-        let reason = "the kernel has no netem, and the Debian packages user-mode-linux and kmod are not there";
-        return skip(NAME, reason);
+        return skip(NAME, &format!("the kernel has no netem, and the Debian packages {PACKAGES} are not there"));
     };
     println!("{output}");
     assert!(output.contains("1 passed"), "{output}");
@@ -88,30 +88,12 @@ fn hold_on(network: &str) {
 
 fn in_user_mode_linux(network: &str, run: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let (script, output) = (folder.path().join("init"), folder.path().join("output"));
-    let text = format!(
-        "#!/bin/sh\n\
-         export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin\n\
-         mount -t proc proc /proc\n\
-         mount -t sysfs sys /sys\n\
-         insmod \"$(find /usr/lib/uml/modules -name sch_netem.ko | head -n 1)\"\n\
-         ( {network} && {run}; tc -s qdisc show dev lo ) > '{}' 2>&1\n\
-         sync\n\
-         echo o > /proc/sysrq-trigger\n\
-         sleep 10\n",
-        output.display(),
-    );
-    std::fs::write(&script, text).unwrap();
-    assert!(Command::new("chmod").arg("+x").arg(&script).status().unwrap().success());
-    let kernel = Command::new("timeout")
-        .args(["--kill-after=5", "150", "linux.uml", "mem=512M", "rootfstype=hostfs", "rootflags=/", "rw", "quiet"])
-        .arg(format!("init={}", script.display()))
-        .args(["noreboot", "con=null", "con0=null,fd:1"])
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
+    let output = folder.path().join("output");
+    let lines = format!("( {network} && {run}; tc -s qdisc show dev lo ) > '{}' 2>&1", output.display());
+    let kernel = Kernel { memory: 512, modules: &["sch_netem"], patience: 150, argument: None };
+    let console = kernel.run(folder.path(), &lines);
     let said = std::fs::read_to_string(&output).unwrap_or_default();
-    format!("{said}\n{}", String::from_utf8_lossy(&kernel.stdout))
+    format!("{said}\n{console}")
 }
 
 /// A revolution that has arrived, and its turn of the drive.

@@ -105,7 +105,7 @@ const HOUSES: [House; 8] = [
         ],
     },
     House { folder: "firmware", floors: &[&["app"], &["board"]] },
-    House { folder: "lab", floors: &[&["equipment"], &["campaign"], &["evaluate", "trust"]] },
+    House { folder: "lab", floors: &[&["equipment"], &["campaign"], &["trust"], &["evaluate"]] },
 ];
 
 /// Rust sources under a folder, as paths relative to it.

@@ -16,6 +16,7 @@ use agv_core::odometry::{Counted, CounterRange};
 use agv_host_sim::bus::{Bus, SocketCanBus};
 use agv_host_sim::emulate::encoder::EmulatedEncoder;
 use agv_host_sim::import::candump::{Line, parse_line};
+use agv_tests::user_mode_linux::{self, Kernel, PACKAGES};
 use agv_tests::{is_on_path, skip};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::encoder::EncoderSettings;
@@ -49,47 +50,29 @@ fn the_bus_works_on_a_real_can_stack() {
         let outcome = std::panic::catch_unwind(|| on_interface(&vcan));
         runs("ip", &["link", "delete", &vcan]);
         assert!(is_up && outcome.is_ok());
-    } else if ["linux.uml", "insmod"].into_iter().all(is_on_path) {
+    } else if user_mode_linux::is_there() {
         in_user_mode_linux(NAME);
     } else {
-        skip(NAME, "the kernel has no vcan, and the Debian packages user-mode-linux and kmod are not there");
+        skip(NAME, &format!("the kernel has no vcan, and the Debian packages {PACKAGES} are not there"));
     }
 }
 
 fn in_user_mode_linux(test: &str) {
     let folder = tempfile::tempdir().unwrap();
     let program = std::env::current_exe().unwrap();
-    let (script, status, output) =
-        (folder.path().join("init"), folder.path().join("status"), folder.path().join("output"));
-    let text = format!(
-        "#!/bin/sh\n\
-         export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin\n\
-         mount -t proc proc /proc\n\
-         mount -t sysfs sys /sys\n\
-         for name in can can-raw can-dev vcan; do\n\
-           insmod \"$(find /usr/lib/uml/modules -name $name.ko | head -n 1)\"\n\
-         done\n\
-         ip link add dev vcan0 mtu 72 type vcan && ip link set vcan0 up\n\
+    let (status, output) = (folder.path().join("status"), folder.path().join("output"));
+    let lines = format!(
+        "ip link add dev vcan0 mtu 72 type vcan && ip link set vcan0 up\n\
          {INTERFACE}=vcan0 '{}' --exact {test} --nocapture > '{}' 2>&1\n\
-         echo $? > '{}'\n\
-         sync\n\
-         echo o > /proc/sysrq-trigger\n\
-         sleep 10\n",
+         echo $? > '{}'",
         program.display(),
         output.display(),
         status.display()
     );
-    std::fs::write(&script, text).unwrap();
-    assert!(runs("chmod", &["+x", script.to_str().unwrap()]));
-    let run = Command::new("timeout")
-        .args(["--kill-after=5", "120", "linux.uml", "mem=256M", "rootfstype=hostfs", "rootflags=/", "rw", "quiet"])
-        .arg(format!("init={}", script.display()))
-        .args(["noreboot", "con=null", "con0=null,fd:1"])
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
+    let modules = &["can", "can-raw", "can-dev", "vcan"];
+    let console = Kernel { memory: 256, modules, patience: 120, argument: None }.run(folder.path(), &lines);
     let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
-    let report = format!("{}\n{}", String::from_utf8_lossy(&run.stdout), read(&output));
+    let report = format!("{console}\n{}", read(&output));
     assert_eq!(read(&status).trim(), "0", "{report}");
     assert!(read(&output).contains("1 passed"), "{report}");
 }

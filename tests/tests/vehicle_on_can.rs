@@ -19,6 +19,7 @@ use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
+use agv_tests::user_mode_linux::Kernel;
 use agv_tests::{emulator, image, is_on_path, python, repository, skip};
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller::{Content, PoseReceiver, PublishedPose};
@@ -108,37 +109,17 @@ fn start_board(image: &Path, folder: &Path) -> (Board, String) {
 
 fn in_user_mode_linux(terminal: &str, folder: &Path) -> String {
     let program = std::env::current_exe().unwrap();
-    let script = folder.join("init");
     let place = folder.display();
-    let text = format!(
-        "#!/bin/sh\n\
-         export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin\n\
-         mount -t proc proc /proc\n\
-         mount -t sysfs sys /sys\n\
-         mount -t devtmpfs dev /dev 2>/dev/null\n\
-         for name in can can-raw can-dev slcan; do\n\
-           insmod \"$(find /usr/lib/uml/modules -name $name.ko | head -n 1)\"\n\
-         done\n\
-         slcand -o -s6 -t hw ttyS0 can0\n\
+    let lines = format!(
+        "slcand -o -s6 -t hw ttyS0 can0\n\
          for i in 1 2 3 4 5 6 7 8 9 10; do ip link set can0 up txqueuelen 1000 && break; sleep 0.2; done\n\
          {INTERFACE}=can0 {FOLDER}='{place}' '{}' --exact {NAME} --nocapture > '{place}/output' 2>&1\n\
-         echo $? > '{place}/status'\n\
-         sync\n\
-         echo o > /proc/sysrq-trigger\n\
-         sleep 10\n",
+         echo $? > '{place}/status'",
         program.display(),
     );
-    std::fs::write(&script, text).unwrap();
-    assert!(Command::new("chmod").arg("+x").arg(&script).status().unwrap().success());
-    let run = Command::new("timeout")
-        .args(["--kill-after=5", "150", "linux.uml", "mem=256M", "rootfstype=hostfs", "rootflags=/", "rw", "quiet"])
-        .arg(format!("init={}", script.display()))
-        .arg(format!("ssl0=tty:{terminal}"))
-        .args(["noreboot", "con=null", "con0=null,fd:1"])
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    String::from_utf8_lossy(&run.stdout).into_owned()
+    let modules = &["can", "can-raw", "can-dev", "slcan"];
+    let serial_line = format!("ssl0=tty:{terminal}");
+    Kernel { memory: 256, modules, patience: 150, argument: Some(&serial_line) }.run(folder, &lines)
 }
 
 /// What runs in user-mode-linux.

@@ -15,6 +15,7 @@ pub mod features;
 pub mod gyro;
 pub mod halting_points;
 pub mod kidnapping;
+pub mod levels;
 pub mod lidar3d_calibration;
 pub mod lidar3d_places;
 pub mod lidar3d_sharpness;

@@ -9,7 +9,7 @@ use super::of_kind::{Class, OfKind, per_fault};
 use super::of_pairs::{OfPairs, pairs};
 use super::outcome::Outcome;
 use super::row::{OfSize, Row};
-use super::stanford::{Stanford, stanford};
+use super::stanford::Stanford;
 use agv_host_sim::accuracy::Spread;
 
 /// The figures of a campaign; shares of nothing are none.
@@ -132,8 +132,8 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
         per_fault: of_kinds,
         pairs,
         pairs_apart,
-        stanford_nominal: stanford(&sound.rows),
-        stanford_faults: stanford(&faulty),
+        stanford_nominal: Stanford::of_rows(&sound.rows),
+        stanford_faults: Stanford::of_rows(&faulty),
     }
 }
 

@@ -21,6 +21,7 @@ use agv_core::state::{Mode, Reason};
 use agv_wire::can::controller::PublishedPose;
 
 use super::outcome::{Found, Outcome};
+use super::stanford;
 
 /// Time between two outputs that are judged, s.
 pub const STEP: f64 = 0.01;
@@ -175,7 +176,7 @@ impl Judge {
         if moment.is_nominal {
             outcome.add_nominal(level);
         }
-        outcome.add_to_stanford(level.position, errors.position);
+        stanford::count(&mut outcome.stanford, level.position, errors.position);
         let share = errors.over(level);
         outcome.most_over_level = outcome.most_over_level.max(share.min(MOST_OVER));
         outcome.misleading += u64::from(share > 1.0);
@@ -216,28 +217,33 @@ fn said_by(pose: &PublishedPose) -> Option<&'static str> {
 
 /// How wrong a pose is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Errors {
+pub struct Errors {
     /// m.
-    pub(super) position: f64,
+    pub position: f64,
     /// rad.
-    pub(super) heading: f64,
+    pub heading: f64,
 }
 
 impl Errors {
-    pub(super) fn of(pose: &Pose, truth: &Pose) -> Self {
+    /// Of a pose beside the true one.
+    #[must_use]
+    pub fn of(pose: &Pose, truth: &Pose) -> Self {
         Self {
             position: (pose.position() - truth.position()).norm(),
             heading: difference(pose.theta, truth.theta).abs(),
         }
     }
 
-    pub(super) fn exceed(&self, limit: &AlertLimit) -> bool {
+    /// Whether one of them is beyond its limit.
+    #[must_use]
+    pub fn exceed(&self, limit: &AlertLimit) -> bool {
         // What is not a number is not within.
         !(self.position <= limit.position && self.heading <= limit.heading)
     }
 
-    /// The larger share of its bound.
-    pub(super) fn over(&self, level: &ProtectionLevel) -> f64 {
+    /// The larger share of its bound; infinite where one is not a number.
+    #[must_use]
+    pub fn over(&self, level: &ProtectionLevel) -> f64 {
         let share = |error: f64, bound: f64| if error <= 0.0 { 0.0 } else { error / bound };
         let (position, heading) = (share(self.position, level.position), share(self.heading, level.heading));
         if position.is_nan() || heading.is_nan() { f64::INFINITY } else { position.max(heading) }

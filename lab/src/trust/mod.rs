@@ -10,7 +10,6 @@ pub mod of_pairs;
 pub mod outcome;
 pub mod page;
 pub mod pair;
-pub mod recorded;
 pub mod row;
 pub mod sight;
 pub mod stanford;

@@ -68,18 +68,7 @@ pub struct Outcome {
     pub ends_right: bool,
 }
 
-/// Width of a cell of the Stanford diagram, mm, and their number along each axis.
-pub const CELL_MM: f64 = 5.0;
-/// See [`CELL_MM`].
-pub const CELLS: u32 = 81;
-
 impl Outcome {
-    /// Counts a claim with this protection level and error of the position, m.
-    pub(super) fn add_to_stanford(&mut self, level: f64, error: f64) {
-        let cell = |value: f64| (1e3 * value / CELL_MM).clamp(0.0, f64::from(CELLS - 1)) as u32;
-        *self.stanford.entry(CELLS * cell(level) + cell(error)).or_default() += 1;
-    }
-
     /// Counts a protection level with enough in sight.
     pub(super) fn add_nominal(&mut self, level: &ProtectionLevel) {
         let cell = |value: f64| value.ceil().clamp(0.0, f64::from(u32::MAX)) as u32;

@@ -4,8 +4,7 @@ use agv_core::integrity::AlertLimits;
 use agv_host_sim::report::{Figure, FigureError, Page, StanfordDiagram, Table, stanford_diagram};
 
 use super::figures::Figures;
-use super::outcome::CELLS;
-use super::stanford::Stanford;
+use super::stanford::{CELLS, Stanford};
 
 /// A page with the Stanford diagrams and the kinds of faults.
 ///

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use agv_host_sim::{data, output_file};
+use agv_lab::evaluate::levels::{Recorded, building, car_park};
 use agv_lab::trust::page::diagram;
-use agv_lab::trust::recorded::{Recorded, building, car_park};
 use anyhow::Context;
 use clap::ValueEnum;
 

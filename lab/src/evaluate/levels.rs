@@ -1,6 +1,6 @@
 //! Errors against protection levels on real drives whose truth is known, by the definitions of the campaign.
 //!
-//! Judged is each claim for which there is a truth; what a claim is, and what misleads, is as in [`super::judge`]. Nothing is known of the
+//! Judged is each claim for which there is a truth; what a claim is, and what misleads, is as in [`crate::trust::judge`]. Nothing is known of the
 //! heading in the car park but from a batch solution that used the same reflectors, so its claims are judged by position alone.
 
 use std::path::Path;
@@ -13,12 +13,11 @@ use agv_host_sim::mapping::contour_map::CELL;
 use agv_host_sim::replay::ReplayError;
 use serde::Serialize;
 
-use super::judge::Errors;
-use super::outcome::Outcome;
-use super::stanford::{Stanford, of_counts};
-use crate::evaluate::carpark::{self, CarparkError, Knowledge, Noise};
-use crate::evaluate::contour_map;
-use crate::evaluate::slam::OfficeDrive;
+use super::carpark::{self, CarparkError, Knowledge, Noise};
+use super::contour_map;
+use super::slam::OfficeDrive;
+use crate::trust::judge::Errors;
+use crate::trust::stanford::{self, Stanford};
 
 /// A drive in one mode, and what became of its claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -98,9 +97,9 @@ fn recorded(drive: &str, mode: &'static str, judged: impl Iterator<Item = Judged
     let is_claim = |one: &Judged| !matches!(one.mode, Mode::NotLocalised | Mode::Lost);
     let (claims, silent): (Vec<Judged>, Vec<Judged>) = judged.partition(is_claim);
     let AlertLimits { travel, docking } = AlertLimits::default();
-    let mut outcome = Outcome::default();
+    let mut counts = stanford::Counts::new();
     for Judged { errors, level, .. } in &claims {
-        outcome.add_to_stanford(level.position, errors.position);
+        stanford::count(&mut counts, level.position, errors.position);
     }
     let is_hazardous =
         |one: &&Judged| [travel, docking].iter().any(|limit| one.errors.exceed(limit) && limit.holds(&one.level));
@@ -116,6 +115,6 @@ fn recorded(drive: &str, mode: &'static str, judged: impl Iterator<Item = Judged
         error_over_pl_max: claims.iter().map(|one| one.errors.over(&one.level)).fold(0.0, f64::max),
         position_m: Spread::of(claims.iter().map(|one| one.errors.position)),
         pl_m: Spread::of(claims.iter().map(|one| one.level.position)),
-        stanford: of_counts(outcome.stanford),
+        stanford: Stanford::of(counts),
     }
 }
