@@ -266,3 +266,43 @@ fn one_landmark_that_is_seen_again_is_enough_against_a_move() {
         assert!(!check.misses(&scan, &Pose::default()), "{revolution}");
     }
 }
+
+/// So many were seen three times, and then others elsewhere in each revolution; every beam of the scans ends at `range`, m, and there are
+/// none if that is zero. Whether a move is told.
+fn is_change_told(count: usize, range: f32) -> bool {
+    let ranges = vec![range; 720];
+    let scan = Scan {
+        laser: LaserId::FIRST,
+        start: time(0),
+        beam_interval: 0.0,
+        first_bearing: -std::f64::consts::PI,
+        bearing_step: std::f64::consts::TAU / 720.0,
+        ranges: &ranges,
+        intensities: &[],
+    };
+    let mut check = SlipCheck::new();
+    (0..5).any(|revolution| {
+        check.begin(time(revolution));
+        let turned = if revolution < 3 { 0.0 } else { 0.3 * (revolution as f64 - 2.0) };
+        let pose = Pose::new(0.0, 0.0, turned);
+        (0..count).for_each(|index| check.see(&pose.transform(&around(index, count)), 5.0));
+        let disagrees = check.disagrees();
+        let confirmed = range > 0.0 && check.misses(&scan, &Pose::default());
+        disagrees || confirmed
+    })
+}
+
+/// At the end of an aisle the few reflectors in sight are hidden at once, and false ones come: no move, as the scan shows.
+#[test]
+fn few_landmarks_that_something_hides_tell_no_move() {
+    for (count, range, expected) in [
+        (4, 3.0, false),
+        (5, 3.0, false),
+        // Nothing hides them; no scan says so; they are many.
+        (4, 8.0, true),
+        (4, 0.0, true),
+        (6, 3.0, true),
+    ] {
+        assert_eq!(is_change_told(count, range), expected, "{count} {range}");
+    }
+}

@@ -397,6 +397,19 @@ fn a_vehicle_that_is_carried_to_where_no_reflector_is_says_so() {
     assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
 }
 
+/// Drives without a fault in which a level was wide or an alarm false: of a mounting that was never found, refuted; of two false reflectors
+/// that were alike in one revolution; at the entry of an aisle without reflectors.
+#[test]
+fn sound_drives_are_available_all_the_time() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kind = catalogue.kinds.iter().find(|kind| kind.name == NOTHING).unwrap();
+    for seed in [50_776, 50_793, 915_048, 915_081, 915_084, 915_096] {
+        let Outcome { judged, available, losses, alarms, .. } =
+            Trial { kind, size: 0.0, with: None, seed }.run(Equipment::default(), &|_| {}).unwrap().outcome;
+        assert_eq!((available, losses, alarms.len()), (judged, 0, 0), "{seed}: {alarms:?}");
+    }
+}
+
 /// The car park by its reflectors: a real drive whose levels hold.
 #[test]
 fn the_levels_of_the_car_park_hold() {

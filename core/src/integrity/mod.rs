@@ -127,9 +127,10 @@ impl Integrity {
     pub fn see_scan(&mut self, scan: &Scan, sensor: impl Fn(f64) -> Pose) -> bool {
         let laser = scan.laser.index();
         let middle = sensor(0.5 * scan.end().since(scan.start));
-        let are_gone = self.slip.get_mut(laser).is_some_and(|slip| slip.misses(scan, &middle));
-        let are_elsewhere = self.surfaces.get_mut(laser).is_some_and(|surfaces| surfaces.disagrees(scan, sensor));
-        are_gone || are_elsewhere
+        let Some((slip, surfaces)) = self.slip.get_mut(laser).zip(self.surfaces.get_mut(laser)) else { return false };
+        let are_gone = slip.misses(scan, &middle);
+        let are_elsewhere = surfaces.disagrees(scan, sensor);
+        are_gone || are_elsewhere || (slip.is_doubted() && surfaces.is_doubtful())
     }
 
     /// Takes what the landmarks of a fixed map have made of the estimate, up to `now`, if there are enough of them.

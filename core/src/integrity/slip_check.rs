@@ -3,7 +3,8 @@
 //! Landmarks are remembered for a moment in the frame of the odometry. If the vehicle moves as its odometry says, those
 //! seen a revolution ago are seen again where they were. If hardly one of them is, and more than half of what is seen is new,
 //! the laser has moved otherwise: the vehicle has slid or was carried, its wheel has spun, or the laser was knocked.
-//! The same is true if none of them is seen again although the scan shows nothing before their places.
+//! The same is true if none of them is seen again although the scan shows nothing before their places. Few landmarks may all be hidden at
+//! once, as at the end of an aisle, while false ones come: then the scan must show that they are not hidden.
 //! No map is needed, so that a wrong place that looks right does not hide it.
 
 use heapless::Vec;
@@ -21,6 +22,8 @@ const EXPECTED: u8 = 2;
 const LONGEST_PAUSE: f64 = 0.3;
 /// Landmarks on either side that a verdict needs.
 const LEAST: usize = 3;
+/// With fewer on either side the scan must confirm it, if there is one.
+const SURE: u8 = 6;
 /// Of those that should be seen again, this share is not enough.
 const TOO_FEW: f64 = 0.2;
 /// Revolutions in a row that must disagree.
@@ -71,6 +74,10 @@ pub struct SlipCheck {
     gone: u8,
     /// Whether the scan of the revolution is still to come.
     awaits_scan: bool,
+    /// Whether the revolution before had a scan.
+    has_scans: bool,
+    /// Whether the scan of the revolution must confirm that the laser has moved otherwise.
+    is_doubted: bool,
 }
 
 impl SlipCheck {
@@ -88,6 +95,8 @@ impl SlipCheck {
             contradictions: 0,
             gone: 0,
             awaits_scan: false,
+            has_scans: false,
+            is_doubted: false,
         }
     }
 
@@ -96,6 +105,7 @@ impl SlipCheck {
         self.remembered.clear();
         self.contradictions = 0;
         self.gone = 0;
+        self.is_doubted = false;
     }
 
     /// Begins a revolution that ends at `now`.
@@ -113,6 +123,7 @@ impl SlipCheck {
         (self.seen_again, self.seen, self.new) = (0, 0, 0);
         // Without a scan nobody knows what hides them.
         self.gone = if self.awaits_scan { 0 } else { self.gone };
+        self.has_scans = !self.awaits_scan;
         self.awaits_scan = true;
     }
 
@@ -149,7 +160,8 @@ impl SlipCheck {
         }
     }
 
-    /// Ends the revolution. True if the laser has moved otherwise than the odometry says.
+    /// Ends the revolution. True if the laser has moved otherwise than the odometry says, which few landmarks alone do not say where there
+    /// are scans: see [`Self::misses`].
     pub fn disagrees(&mut self) -> bool {
         let can_tell = usize::from(self.expected.min(self.seen)) >= LEAST;
         self.gone = if self.sees_none_again() { self.gone } else { 0 };
@@ -157,7 +169,15 @@ impl SlipCheck {
             && f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
             && self.new > self.seen.saturating_sub(self.new);
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
-        self.contradictions >= IN_A_ROW
+        let disagrees = self.contradictions >= IN_A_ROW;
+        self.is_doubted = disagrees && self.has_scans && self.expected.min(self.seen) < SURE;
+        disagrees && !self.is_doubted
+    }
+
+    /// Whether the laser seems to have moved otherwise, and the scan of the revolution must confirm it.
+    #[must_use]
+    pub const fn is_doubted(&self) -> bool {
+        self.is_doubted
     }
 
     /// Whether a scan is awaited because no landmark was seen again of those that should be.
@@ -175,10 +195,12 @@ impl SlipCheck {
             one.is_expected() && one.age > 0 && is_near && scan.passes(&place, BESIDE, -BEFORE)
         };
         let [at_once, in_a_row] = GONE;
-        let gone = if self.sees_none_again() { self.remembered.iter().filter(is_gone).count() } else { 0 };
+        let is_asked = self.is_doubted || self.sees_none_again();
+        let gone = if is_asked { self.remembered.iter().filter(is_gone).count() } else { 0 };
         self.awaits_scan = false;
         self.gone = if gone >= in_a_row { self.gone.saturating_add(1) } else { 0 };
-        gone >= at_once || self.gone >= IN_A_ROW
+        let is_confirmed = self.is_doubted && gone >= LEAST;
+        is_confirmed || gone >= at_once || self.gone >= IN_A_ROW
     }
 }
 

@@ -12,6 +12,8 @@ const LEAST_CONTRADICTING: f64 = 2.5;
 /// them contradict the pose if they are more than this share of what is seen.
 const ALIKE_WITHIN: f64 = 0.05;
 const LEAST_ALIKE: usize = 2;
+/// So many are no chance; of fewer, some must be alike in two events in a row: two false reflectors happen to be.
+const SURELY_ALIKE: usize = 3;
 const ALIKE: f64 = 0.1;
 /// Displacements that are compared in an event.
 const COMPARED: usize = 8;
@@ -59,6 +61,8 @@ pub struct Contradiction {
     /// By how much landmarks of the event are elsewhere in W, m.
     displaced: Vec<[f64; 2], COMPARED>,
     lately: Evidence,
+    /// How many of them are elsewhere by the same, and were in the event before that saw anything.
+    alike: [usize; 2],
     /// What the last event that saw anything has found, and whether more of it contradicted the pose than fitted.
     found: ProtectionLevel,
     is_outnumbered: bool,
@@ -74,6 +78,7 @@ impl Contradiction {
             event: Evidence::NONE,
             displaced: Vec::new(),
             lately: Evidence::NONE,
+            alike: [0; 2],
             found: ProtectionLevel::NONE,
             is_outnumbered: false,
             lasting: ProtectionLevel::NONE,
@@ -118,6 +123,8 @@ impl Contradiction {
         self.lately.add(&self.event);
         if self.event.fitting + self.event.contradicting > 0.0 {
             let before = self.found;
+            let [last, _] = self.alike;
+            self.alike = [self.number_alike(), last];
             self.found = self.find();
             self.is_outnumbered = self.event.contradicting > self.event.fitting;
             let is_moved = self.are_alike() || self.displaced.len() as f64 >= LEAST_CONTRADICTING;
@@ -143,12 +150,18 @@ impl Contradiction {
 
     /// Whether enough landmarks are elsewhere by the same.
     fn are_alike(&self) -> bool {
+        let [now, last] = self.alike;
+        now >= SURELY_ALIKE || now.min(last) >= LEAST_ALIKE
+    }
+
+    /// How many landmarks are elsewhere by the same at most.
+    fn number_alike(&self) -> usize {
         let near = |one: &[f64; 2], other: &[f64; 2]| {
             let [[x, y], [other_x, other_y]] = [*one, *other];
             libm::hypot(x - other_x, y - other_y) <= ALIKE_WITHIN
         };
         let count = |one: &[f64; 2]| self.displaced.iter().filter(|other| near(one, other)).count();
-        self.displaced.iter().any(|one| count(one) >= LEAST_ALIKE)
+        self.displaced.iter().map(count).max().unwrap_or_default()
     }
 
     /// By how much the bound is wider.

@@ -64,6 +64,8 @@ pub struct FreeSince {
     pub fit: Fit,
     /// Whether the place of the laser is free and the heading has not been found yet.
     pub awaits_heading: bool,
+    /// From where on, m driven and rad turned together, the next event is taken while that is so.
+    pub next: f64,
     /// Whether the last event refuted it, which was not taken then.
     pub is_surprised: bool,
     /// The solution.
@@ -101,6 +103,8 @@ impl Fit {
 
 /// What a turn shows of the place of the laser, and a drive of its yaw, is enough from here on, rad and m.
 const ENOUGH: (f64, f64) = (core::f64::consts::FRAC_PI_2, 5.0);
+/// While the heading is hardly known, events tell something new after this motion only, m and rad together.
+const APART: f64 = 0.1;
 /// A pose is well known if it has no larger deviations than these, m and rad.
 const WELL_KNOWN: (f64, f64) = (0.007, 1.4e-3);
 
@@ -115,6 +119,7 @@ impl FreeSince {
             is_needed: false,
             fit: Fit { mean: 0.0 },
             awaits_heading: false,
+            next: 0.0,
             is_surprised: false,
             solution,
         }
@@ -123,8 +128,13 @@ impl FreeSince {
     /// Takes what landmarks say; true if the solution does not hold. One event alone that refutes it may have seen something else than
     /// landmarks: it is not taken, and only the next one decides. While the heading was hardly known, the arm to the laser pointed
     /// elsewhere in each step, which looks like a turn and tells a place of the laser that nothing has shown: what was learned of
-    /// places until then is forgotten.
+    /// places until then is forgotten. A vehicle that stands would learn its heading from that alone, so events are taken apart.
     pub fn correct(&mut self, told: &SensorInformation, laser: &Laser) -> bool {
+        let moved = self.driven + self.turned;
+        if self.awaits_heading && moved < self.next {
+            return false;
+        }
+        self.next = moved + APART;
         let before = self.solution.clone();
         let square = self.solution.correct(told, laser);
         let was_surprised = core::mem::replace(&mut self.is_surprised, is_refuted(square));
