@@ -410,6 +410,16 @@ fn sound_drives_are_available_all_the_time() {
     }
 }
 
+/// In a layout that is mirrored, and nearly its own mirror image, what is in sight fits now and then: what has not fitted before speaks
+/// against it.
+#[test]
+fn what_has_not_fitted_is_not_forgotten_where_the_vehicle_looks_for_itself() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let kind = catalogue.kinds.iter().find(|kind| kind.name == "layout mirrored").unwrap();
+    let tried = Trial { kind, size: 1.0, with: None, seed: 50_508 }.run(Equipment::default(), &|_| {}).unwrap();
+    assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
+}
+
 /// The car park by its reflectors: a real drive whose levels hold.
 #[test]
 fn the_levels_of_the_car_park_hold() {

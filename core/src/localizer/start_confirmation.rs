@@ -71,21 +71,34 @@ const SAME: (f64, f64) = (0.3, 0.05);
 /// A reflector is explained if the map has one within so many standard deviations.
 const GATE: f32 = 3.5;
 
+/// So far around a place, m and rad, what did not fit there counts.
+const AROUND: (f64, f64) = (5.0, 0.5);
+
+/// Where reflectors did not fit, and how many.
+#[derive(Clone, Copy, Debug)]
+struct Doubt {
+    /// Pose of R in W.
+    place: Pose,
+    unexplained: usize,
+}
+
 /// The first of the looks that agree, and what speaks against it.
 #[derive(Clone, Debug)]
 pub(super) struct StartConfirmation {
     rule: StartRule,
     first: Option<Look>,
+    /// What has not fitted, also among reflectors that are forgotten since: what is seen later may fit a place that only looks alike.
+    doubt: Option<Doubt>,
     seen_through: SeenThrough,
 }
 
 impl StartConfirmation {
     /// Nothing was found.
     pub(super) const fn new(rule: StartRule) -> Self {
-        Self { rule, first: None, seen_through: SeenThrough::new() }
+        Self { rule, first: None, doubt: None, seen_through: SeenThrough::new() }
     }
 
-    /// Forgets the looks.
+    /// Forgets the looks, but not what did not fit.
     pub(super) fn forget(&mut self) {
         self.first = None;
         self.seen_through.forget();
@@ -123,18 +136,32 @@ impl StartConfirmation {
         let is_long = look.revolutions.saturating_sub(first.revolutions).saturating_add(1) >= revolutions;
         let pose = look.moved_to(odometry);
         let (fitting, seen) = reflectors.explained(snapshot, &pose, times, GATE);
+        let unexplained = seen.saturating_sub(fitting);
+        let doubted = self.doubted(&pose, unexplained);
         let places = snapshot.reflectors().iter().map(|seen| pose.transform(&seen.position.cast()));
         if is_long && (fitting as f64) < explained * seen as f64
             || self.seen_through.is_any_missing(reflectors.map(), places)
         {
             return Belief::Contradicted;
         }
-        let unexplained = seen.saturating_sub(fitting);
         let is_apart = unexplained == 0 && libm::hypot(between.x, between.y) >= apart;
-        if is_long && (is_apart || fitting >= enough + for_unexplained * unexplained) {
+        if is_long && (is_apart || fitting >= enough + for_unexplained * doubted) {
             Belief::Confirmed
         } else {
             Belief::Open
         }
+    }
+
+    /// How many reflectors have not fitted around a place, where so many do not now.
+    fn doubted(&mut self, place: &Pose, unexplained: usize) -> usize {
+        let is_around = |doubt: &Doubt| {
+            let off = doubt.place.between(place);
+            libm::hypot(off.x, off.y) < AROUND.0 && libm::fabs(off.theta) < AROUND.1
+        };
+        let before = self.doubt.filter(is_around);
+        if before.is_none_or(|doubt| unexplained >= doubt.unexplained) {
+            self.doubt = Some(Doubt { place: *place, unexplained });
+        }
+        before.map_or(unexplained, |doubt| unexplained.max(doubt.unexplained))
     }
 }
