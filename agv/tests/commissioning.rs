@@ -224,6 +224,25 @@ fn settings_are_listed_and_names_are_suggested() {
 }
 
 #[test]
+fn the_map_of_another_hall_is_refused() {
+    let files = Files::new();
+    let key = files.write("agv.key", "0".repeat(64).as_bytes());
+    let hall = files.write("hall.imk", b"7 -1000 2000 1 2 80 0\n8 5500 -6125 1 2 80 0\n9 0 40 1 2 80 0\n");
+    let other = files.write("other.imk", b"7 -1000 2000 1 2 80 0\n8 5500 -6125 1 2 80 0\n9 0 41 1 2 80 0\n");
+    let (_, told) = json(&["layout", "identity", &hall, "--json"]);
+    let identity = told["map_identity"].as_u64().unwrap();
+    assert_eq!(told["landmarks"], 3);
+    assert!(text(&agv(&["layout", "identity", &hall]).stdout).contains(&identity.to_string()));
+    let (set, flash) = (format!("maps.identity={identity}"), files.path("flash.bin"));
+    let (_, written) = json(&["provision", "--key", &key, "--map", &hall, "--set", &set, "--output", &flash, "--json"]);
+    assert_eq!(written["map_identity"], identity);
+    let before = std::fs::read(&flash).unwrap();
+    let refused = refusal(&["provision", "--key", &key, "--map", &other, "--set", &set, "--output", &flash]);
+    assert!(refused.contains(&format!("maps.identity is {identity}")), "{refused}");
+    assert_eq!(std::fs::read(&flash).unwrap(), before);
+}
+
+#[test]
 fn the_pages_of_man_are_written() {
     let files = Files::new();
     let output = agv(&["manual", "--output", &files.path("man1")]);

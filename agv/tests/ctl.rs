@@ -245,6 +245,10 @@ fn a_map_is_brought_to_a_controller_and_back() {
     assert_eq!(row(&bench.ctl(&["map", "download", &back]), "landmarks"), ["3"]);
     let [sent, got] = [&hall, &back].map(|path| layout_file::landmarks(&layout_file::load(Path::new(path)).unwrap()));
     assert_eq!(sent.len(), 3);
+    let of_file = text(&agv(&["layout", "identity", &hall]).stdout).to_owned();
+    let [of_file, of_controller] = [of_file, bench.ctl(&["map", "download", &back])]
+        .map(|said| said.split_whitespace().last().unwrap_or_default().to_owned());
+    assert_eq!(of_file, of_controller);
     assert_eq!(
         got.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>(),
         sent.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>()

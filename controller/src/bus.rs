@@ -8,7 +8,9 @@ use agv_core::state::{LaserHealth, Mode, PoseOutput, Relocalization};
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller::Health;
-use agv_wire::can::controller_node::{CONSUMERS, ControllerNode, ErrorKind, NodeSettings, Permission, ProcessData};
+use agv_wire::can::controller_node::{
+    CONSUMERS, CarriedMap, ControllerNode, ErrorKind, NodeSettings, Permission, ProcessData,
+};
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::sdo::{AbortCode, ObjectDictionary};
 use heapless::Vec;
@@ -86,9 +88,10 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// A bus on which nobody was heard before `start`; `hardware` is what the controller is called there (1009h).
+    /// A bus on which nobody was heard before `start`; `hardware` is what the controller is called there (1009h), `map` what it says of
+    /// its map.
     #[must_use]
-    pub fn new(settings: &Settings, hardware: &'static str, troubles: Troubles, start: Time) -> Self {
+    pub fn new(settings: &Settings, hardware: &'static str, map: CarriedMap, troubles: Troubles, start: Time) -> Self {
         let nodes = EncoderNodes::of(settings);
         let node = NodeSettings {
             vendor: settings.nodes.vendor,
@@ -96,6 +99,7 @@ impl Bus {
             starts_itself: settings.nodes.starts_itself,
             period: settings.publishing_period,
             hardware,
+            map,
             ..NodeSettings::new(nodes.controller)
         };
         let mut node = ControllerNode::new(node, start);

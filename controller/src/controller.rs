@@ -9,6 +9,7 @@ use agv_wire::can::frame::Frame;
 use agv_wire::nav350::{Configuration, Revolution, Step};
 
 use super::bus::{Bus, BusOutput, Troubles};
+use super::carried_map::carried_map;
 use super::encoders::BusEvent;
 use super::laser::Laser;
 use super::localization::Localization;
@@ -62,10 +63,12 @@ impl<L: Localize> Controller<L> {
     /// A controller that is switched on at `now`, with a localiser that has its maps.
     #[must_use]
     pub fn new(settings: &Settings, localizer: L, now: Time) -> Self {
+        let landmarks = localizer.reflectors().landmarks().iter().chain(localizer.features().landmarks());
+        let map = carried_map(landmarks);
         Self {
             laser: Laser::new(Configuration::default()),
             revolution: Revolution::new(),
-            bus: Bus::new(settings, HARDWARE, Troubles::default(), now),
+            bus: Bus::new(settings, HARDWARE, map, Troubles::default(), now),
             localization: Localization::new(localizer, settings),
             settings: settings.clone(),
         }

@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 mod bus;
+mod carried_map;
 mod controller;
 mod encoders;
 mod gyro;
@@ -26,6 +27,7 @@ mod setting_objects;
 mod standstill;
 
 pub use bus::{Bus, BusOutput, MOTIONS, Troubles};
+pub use carried_map::carried_map;
 pub use controller::{Controller, LaserOrder, TELEGRAM};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels, counted};
 pub use gyro::Gyro;

@@ -1,8 +1,8 @@
 //! What a controller's flash holds when it is delivered: settings, map and key.
 
 use agv_core::maps::Landmark;
-use agv_settings::Settings;
 use agv_settings::store::{KEY, PIECE, Store, StoreError};
+use agv_settings::{Settings, map_identity};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
@@ -23,6 +23,14 @@ pub enum ProvisionError {
     Map {
         /// Landmarks of the map.
         count: usize,
+    },
+    /// The map is another one than it must be.
+    #[error("maps.identity is {set}, and the map is {found}")]
+    OtherMap {
+        /// What the settings say.
+        set: u32,
+        /// What the map is.
+        found: u32,
     },
 }
 
@@ -73,13 +81,16 @@ impl NorFlash for Image {
 /// The bytes of the settings' flash.
 ///
 /// # Errors
-/// If they are too many.
+/// If they are too many, or the map is not that of the settings.
 pub fn flash_image(
     settings: &Settings,
     landmarks: &[Landmark],
     key: Option<&[u8; KEY]>,
 ) -> Result<Vec<u8>, ProvisionError> {
     let too_many = || ProvisionError::Map { count: landmarks.len() };
+    if !settings.accepts_map(landmarks) {
+        return Err(ProvisionError::OtherMap { set: settings.map_identity, found: map_identity(landmarks) });
+    }
     let mut store = Store::new(Image(vec![0xFF; 2 * PAGE])).ok_or(ProvisionError::Full)?;
     if let Some(key) = key {
         store.provision_key(key)?;

@@ -77,6 +77,10 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("maps.reflectors", "whether the map's reflectors are used"),
     ("maps.features", "whether the map's natural features are used"),
     ("maps.dynamic", "whether features that are found while driving are used"),
+    (
+        "maps.identity",
+        "which map it must be, as agv layout identity says; another one is left out at the start; 0 for any",
+    ),
     ("maps.start_search", "whether a vehicle that does not know where it is searches itself among the reflectors"),
     ("maps.slam", "whether features are found in the state of the filter"),
     ("reflectors.range_deviation", "noise of a reflector's distance"),

@@ -223,7 +223,7 @@ const NODE: (f64, f64) = (1.0, 127.0);
 const PROFILE: (f64, f64) = (402.0, 406.0);
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 148] = [
+pub static LEAVES: [Leaf; 149] = [
     Leaf {
         key: 107,
         name: "vehicle.kind",
@@ -307,6 +307,7 @@ pub static LEAVES: [Leaf; 148] = [
     switch!(162, "maps.dynamic", parameters.maps.dynamic),
     switch!(163, "maps.start_search", start_search),
     switch!(164, "maps.slam", parameters.maps.slam),
+    whole!(165, "maps.identity", "", 0.0, 4_294_967_295.0, map_identity),
     number!(170, "reflectors.range_deviation", "m", parameters.reflectors.range_deviation),
     number!(171, "reflectors.bearing_deviation", "rad", parameters.reflectors.bearing_deviation),
     number!(180, "features.nearest", "m", parameters.features.nearest),

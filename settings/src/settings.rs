@@ -2,10 +2,12 @@
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
+use agv_core::maps::Landmark;
 use agv_core::odometry::MOST_COUNTERS;
 use agv_wire::can::gyro::GyroFrame;
 use agv_wire::can::motion_frames::MotionFrames;
 
+use crate::map_identity::map_identity;
 use crate::vehicle::VehicleSettings;
 
 /// Everything that is set on commissioning, but for the map.
@@ -31,6 +33,8 @@ pub struct Settings {
     pub network: Network,
     /// Whether a vehicle that does not know where it is searches its pose among the reflectors of its map.
     pub start_search: bool,
+    /// Which map it must be, see [`map_identity`]; 0 for any.
+    pub map_identity: u32,
 }
 
 /// Numbers of the nodes on the CAN bus, 1 to 127, and who is in charge there.
@@ -126,6 +130,13 @@ impl Settings {
                 service_port: 5351,
             },
             start_search: true,
+            map_identity: 0,
         }
+    }
+
+    /// Whether it is the map that it must be.
+    #[must_use]
+    pub fn accepts_map(&self, landmarks: &[Landmark]) -> bool {
+        self.map_identity == 0 || self.map_identity == map_identity(landmarks)
     }
 }

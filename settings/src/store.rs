@@ -79,7 +79,7 @@ pub struct MapWriter {
     digest: u32,
 }
 
-const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+pub(crate) const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// The checksum of bytes and a piece more, from that of the bytes.
 fn checksum(before: u32, piece: &[u8]) -> u32 {

@@ -15,7 +15,7 @@ use agv_host_sim::log::Writer;
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::simulate::START;
 use agv_settings::Settings;
-use agv_wire::can::controller_node::WithoutSettings;
+use agv_wire::can::controller_node::{CarriedMap, WithoutSettings};
 use agv_wire::can::frame::Frame;
 
 /// When the vehicle drives off, ms.
@@ -43,7 +43,7 @@ impl Board {
         let mut localizer = <Localizer>::new(settings.parameters);
         localizer.add_landmarks(&recording.landmarks).unwrap();
         Self {
-            bus: Bus::new(&settings, "test", Troubles::default(), Time::default()),
+            bus: Bus::new(&settings, "test", CarriedMap::default(), Troubles::default(), Time::default()),
             localization: Localization::new(localizer, &settings),
             told: VecDeque::new(),
             published: VecDeque::new(),

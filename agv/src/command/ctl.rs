@@ -13,6 +13,7 @@ use agv_settings::service::Refusal;
 use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
+use super::layout::map_rows;
 use super::output::{note, print_rows};
 use super::progress;
 use super::setting_text::{named, parse_value, show, show_setting, word};
@@ -251,13 +252,13 @@ impl Ctl {
                 let progress = progress::bar("uploading", landmarks.len() as u64);
                 client.upload_map(&landmarks, |count| progress.inc(count as u64))?;
                 progress.finish_and_clear();
-                self.print(&[["landmarks".to_owned(), landmarks.len().to_string()]])?;
+                self.print(&map_rows(&landmarks))?;
             }
             Action::Map { action: MapAction::Download { file } } => {
                 layout_file::Format::of(file)?;
                 let landmarks = client.download_map()?;
                 layout_file::save(file, &layout_file::layout(&landmarks))?;
-                self.print(&[["landmarks".to_owned(), landmarks.len().to_string()]])?;
+                self.print(&map_rows(&landmarks))?;
             }
             Action::SetPose { x, y, theta, position_deviation, heading_deviation } => {
                 client.set_pose(Pose { x: *x, y: *y, theta: *theta }, [*position_deviation, *heading_deviation])?;

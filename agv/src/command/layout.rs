@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Point;
 use agv_core::localizer::ReflectorParameters;
+use agv_core::maps::Landmark;
 use agv_host_sim::layout_check::{CheckOptions, Finding, REFLECTORS, check, page};
 use agv_host_sim::layout_file;
 use agv_host_sim::mapping::map_file;
+use agv_settings::map_identity;
 use anyhow::Context;
 
 use super::output;
@@ -14,6 +16,7 @@ use super::output;
 const EXAMPLES: &str = "\
 Examples:
   agv layout check hall.imk --report hall
+  agv layout identity hall.imk
   agv layout convert hall.imk hall.dxf
   agv layout convert drawing.dxf hall.csv --map";
 
@@ -29,6 +32,40 @@ pub struct Layout {
 enum Action {
     Check(Check),
     Convert(Convert),
+    Identity(Identity),
+}
+
+/// Which map a layout is, in one number: the value of the setting 'maps.identity'
+#[derive(clap::Args)]
+struct Identity {
+    /// File to read, .imk, .csv or .dxf.
+    input: PathBuf,
+    /// Print it as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Identity {
+    fn run(self) -> anyhow::Result<()> {
+        let landmarks = layout_file::landmarks(&layout_file::load(&self.input)?);
+        if self.json {
+            println!(
+                "{}",
+                serde_json::json!({ "landmarks": landmarks.len(), "map_identity": map_identity(&landmarks) })
+            );
+        } else {
+            output::print_rows(&map_rows(&landmarks));
+        }
+        Ok(())
+    }
+}
+
+/// How many landmarks a map has, and which one it is.
+pub fn map_rows(landmarks: &[Landmark]) -> [[String; 2]; 2] {
+    [
+        ["landmarks".to_owned(), landmarks.len().to_string()],
+        ["map identity".to_owned(), map_identity(landmarks).to_string()],
+    ]
 }
 
 /// From one file to another: .imk, .csv or .dxf, as the ending of the name says
@@ -69,6 +106,7 @@ impl Layout {
         match self.action {
             Action::Check(check) => check.run(),
             Action::Convert(convert) => convert.run(),
+            Action::Identity(identity) => identity.run(),
         }
     }
 }

@@ -6,7 +6,7 @@ use agv_host_sim::provision::flash_image;
 use agv_host_sim::setting_doubts::doubt;
 use agv_host_sim::{layout_file, log, output_file};
 use agv_settings::leaf::{Leaf, Value};
-use agv_settings::{LEAVES, Settings};
+use agv_settings::{LEAVES, Settings, map_identity};
 use anyhow::Context;
 use serde_json::json;
 
@@ -70,7 +70,7 @@ impl Provision {
             let settings: serde_json::Map<_, _> =
                 changed.iter().map(|[name, value]| (name.clone(), value.clone().into())).collect();
             let written = json!({
-                "bytes": image.len(), "landmarks": landmarks.len(), "settings": settings, "questions": doubts,
+                "bytes": image.len(), "landmarks": landmarks.len(), "map_identity": map_identity(&landmarks), "settings": settings, "questions": doubts,
             });
             println!("{}", serde_json::to_string_pretty(&written)?);
             return Ok(());
@@ -78,6 +78,7 @@ impl Provision {
         let mut rows = changed;
         rows.push(["all other settings".to_owned(), "as agv settings shows".to_owned()]);
         rows.push(["landmarks".to_owned(), landmarks.len().to_string()]);
+        rows.push(["map identity".to_owned(), map_identity(&landmarks).to_string()]);
         rows.push(["key".to_owned(), self.key.display().to_string()]);
         rows.push(["written".to_owned(), format!("{}, {} bytes", self.output.display(), image.len())]);
         print_rows(&rows);

@@ -12,6 +12,7 @@ use agv_core::state::{LaserHealth, Mode, PoseOutput, Reason, Relocalization};
 use agv_settings::leaf::Value as Setting;
 use agv_settings::{LEAVES, Settings};
 use agv_tests::{python, repository};
+use agv_wire::can::controller_node::CarriedMap;
 use agv_wire::can::frame::{Frame, Id, standard_id};
 use serde_json::Value;
 
@@ -76,7 +77,13 @@ fn settings() -> Settings {
 /// What the master says of each thing; the time goes on by a millisecond for each of its frames.
 fn converse(mut master: Command) -> Vec<Value> {
     let settings = settings();
-    let mut bus = Bus::new(&settings, "test bench", Troubles::default(), Time::default());
+    let mut bus = Bus::new(
+        &settings,
+        "test bench",
+        CarriedMap { identity: 4_000_000_000, landmarks: 40 },
+        Troubles::default(),
+        Time::default(),
+    );
     bus.update(&estimate());
     let mut child = master.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut input = child.stdin.take().unwrap();
@@ -144,6 +151,7 @@ fn another_master_reads_every_object() {
     );
     // No encoder is on this bus, so the mode is 6, without odometry.
     assert_eq!((value(0x2012, 1), value(0x2013, 1), value(0x1018, 1)), (73.into(), 6.into(), 0x1A2.into()));
+    assert_eq!((value(0x2014, 1), value(0x2014, 2)), (4_000_000_000_u32.into(), 40.into()));
     assert_eq!((value(0x1008, 0), value(0x1009, 0)), ("Localisation controller".into(), "test bench".into()));
     let rest: Vec<&Value> = said.iter().filter(|object| !object["index"].is_u64()).collect();
     let [mapped, pdo, heartbeat, end] = rest[..] else { panic!("{rest:?}") };

@@ -25,6 +25,9 @@ pub trait Localize {
     /// See [`super::Localizer::reflectors`].
     fn reflectors(&self) -> MapView<'_>;
 
+    /// See [`super::Localizer::features`].
+    fn features(&self) -> MapView<'_>;
+
     /// See [`super::Localizer::contours`].
     fn contours(&self) -> Option<<Self::Contours as FindContours>::Map>;
 }
@@ -51,6 +54,11 @@ impl<L: Localize> Localize for &mut L {
     fn reflectors(&self) -> MapView<'_> {
         (**self).reflectors()
     }
+
+    fn features(&self) -> MapView<'_> {
+        (**self).features()
+    }
+
     fn contours(&self) -> Option<<Self::Contours as FindContours>::Map> {
         (**self).contours()
     }

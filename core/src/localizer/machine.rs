@@ -171,6 +171,12 @@ impl<C: Capacities> Localizer<C> {
         self.maps.reflectors()
     }
 
+    /// The map of the natural features.
+    #[must_use]
+    pub fn features(&self) -> MapView<'_> {
+        self.maps.features()
+    }
+
     /// The landmarks in the state of the filter, those too that were given: kind and position in W, m.
     pub fn state_landmarks(&self) -> impl Iterator<Item = (LandmarkKind, Point)> + '_ {
         self.slam.landmarks()
@@ -485,6 +491,10 @@ impl<C: Capacities> Localize for Localizer<C> {
 
     fn reflectors(&self) -> MapView<'_> {
         self.reflectors()
+    }
+
+    fn features(&self) -> MapView<'_> {
+        self.features()
     }
 
     fn contours(&self) -> Option<<C::Contours as FindContours>::Map> {

@@ -4,7 +4,7 @@
 
 use agv_controller::{Bus, BusOutput, Troubles};
 use agv_settings::Settings;
-use agv_wire::can::controller_node::ErrorKind;
+use agv_wire::can::controller_node::{CarriedMap, ErrorKind};
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
 use embedded_storage::nor_flash::NorFlash;
@@ -23,9 +23,10 @@ pub async fn run<F: NorFlash>(
     mut port: impl CanPort,
     settings: &Settings,
     controller: &SharedController<F>,
+    map: CarriedMap,
     troubles: Troubles,
 ) -> ! {
-    let mut bus = Bus::new(settings, name, troubles, now());
+    let mut bus = Bus::new(settings, name, map, troubles, now());
     let mut nodes = bus.nodes();
     port.listen_to(&nodes, &bus.other_frames());
     let mut objects = SharedSettings { controller };

@@ -51,6 +51,11 @@ pub fn read<F: NorFlash>(flash: F, map: &'static mut KeptMap, panic: &'static st
         key = store.key();
     }
     put_reflectors_first(map);
+    if !settings.accepts_map(map) {
+        exchange::set_settings_sound(false);
+        defmt::error!("settings: the map is not that of maps.identity and was left out");
+        map.clear();
+    }
     if settings.parameters.maps.slam && !has_slots {
         exchange::set_settings_sound(false);
         defmt::error!("settings: maps.slam is switched off, because this image has no room for it");

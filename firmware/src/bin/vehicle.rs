@@ -4,7 +4,7 @@
 
 use core::panic::PanicInfo;
 
-use agv_controller::Troubles;
+use agv_controller::{Troubles, carried_map};
 use agv_core::localizer::{self, Parameters};
 use agv_firmware::app::announced_flash::AnnouncedFlash;
 use agv_firmware::app::capacities::has_slots;
@@ -19,6 +19,7 @@ use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, set
 use agv_firmware::board::{self, Board, Current, Parts, RestartCause, Watchdog, retained, stack};
 use agv_settings::Settings;
 use agv_settings::service::Controller;
+use agv_wire::can::controller_node::CarriedMap;
 use agv_wire::nav350::Revolution;
 use embassy_executor::Spawner;
 use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
@@ -84,9 +85,10 @@ async fn bus_task(
     can: Can,
     settings: &'static Settings,
     controller: &'static SharedController<Flash>,
+    map: CarriedMap,
     troubles: Troubles,
 ) -> ! {
-    bus::run(Current::NAME, can, settings, controller, troubles).await
+    bus::run(Current::NAME, can, settings, controller, map, troubles).await
 }
 
 #[embassy_executor::task]
@@ -214,7 +216,8 @@ fn start() -> Vehicle {
         are_settings_lost: !exchange::are_settings_sound(),
     };
     let can = Current::take_part(can, settings.bit_rate);
-    Current::bus_tasks().spawn(bus_task(can, settings, controller, troubles).expect("the task runs once"));
+    Current::bus_tasks()
+        .spawn(bus_task(can, settings, controller, carried_map(landmarks), troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks };
     // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for. That may
     // take as long as a page takes to erase: so nothing else waits for it where the processor goes on meanwhile, and where it

@@ -5,6 +5,7 @@
 //! | 1000h to 1FFFh | communication | CiA 301, 7.5.2; CiA 302-2 |
 //! | 2001h to 2008h | whole telegrams, as `docs/agv.dbc` has them | here |
 //! | 2010h to 2013h | the same, one value an object | here |
+//! | 2014h | the map | here |
 //! | from 4000h on | settings | whoever has them |
 
 use crate::can::sdo::{AbortCode, Object};
@@ -146,7 +147,7 @@ const fn array(index: u16, name: &'static str, entries: &'static [Entry]) -> Rec
 }
 
 /// All objects but the settings.
-pub static OBJECTS: [Record; 29] = [
+pub static OBJECTS: [Record; 30] = [
     one(0x1000, &[entry(0, "Device type", Unsigned32, Constant)]),
     one(0x1001, &[entry(0, "Error register", Unsigned8, Read)]),
     array(
@@ -268,6 +269,11 @@ pub static OBJECTS: [Record; 29] = [
             value(9, "Resets of the pose", Unsigned8),
             value(10, "Overflows", Unsigned8),
         ],
+    ),
+    record(
+        (0x2014, 0x2014),
+        "Map",
+        &[HIGHEST, entry(1, "Identity", Unsigned32, Read), entry(2, "Number of landmarks", Unsigned16, Read)],
     ),
 ];
 

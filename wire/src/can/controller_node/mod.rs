@@ -56,6 +56,17 @@ pub struct NodeSettings {
     pub hardware: &'static str,
     /// What runs on it (100Ah).
     pub software: &'static str,
+    /// The map that it has.
+    pub map: CarriedMap,
+}
+
+/// What a controller says of its map (2014h).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CarriedMap {
+    /// Which one it is; 0 for none.
+    pub identity: u32,
+    /// How many landmarks it has.
+    pub landmarks: u16,
 }
 
 impl NodeSettings {
@@ -70,6 +81,7 @@ impl NodeSettings {
             period: PUBLISHING_PERIOD,
             hardware: "",
             software: concat!("agv ", env!("CARGO_PKG_VERSION")),
+            map: CarriedMap { identity: 0, landmarks: 0 },
         }
     }
 }

@@ -94,7 +94,7 @@ impl Objects {
 
     fn number(&self, Object { index, sub }: Object) -> Result<u32, AbortCode> {
         let history = self.errors.history();
-        let NodeSettings { node, vendor, is_master, starts_itself, .. } = self.settings;
+        let NodeSettings { node, vendor, is_master, starts_itself, map, .. } = self.settings;
         let value = match (index, sub) {
             (0x1000, 0) | (0x1018, 2 | 4) => Some(0),
             (0x1001, 0) => Some(u32::from(self.errors.register())),
@@ -128,6 +128,9 @@ impl Objects {
             (0x2010 | 0x2012, 0) => Some(5),
             (0x2011, 0) => Some(3),
             (0x2013, 0) => Some(10),
+            (0x2014, 0) => Some(2),
+            (0x2014, 1) => Some(map.identity),
+            (0x2014, 2) => Some(u32::from(map.landmarks)),
             _ => None,
         };
         value.ok_or(AbortCode::NoSuchSubindex)

@@ -7,7 +7,7 @@ use agv_core::measurement::Time;
 use agv_core::odometry::{GyroErrors, OdometryBias};
 use agv_core::state::{LaserHealth, Relocalization};
 use agv_settings::Settings;
-use agv_wire::can::controller_node::ErrorKind;
+use agv_wire::can::controller_node::{CarriedMap, ErrorKind};
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::slcan;
 
@@ -25,7 +25,7 @@ impl Bus {
         let settings: Settings = any(Settings::default());
         let troubles = Troubles { damaged_parts: any(0), has_panicked: any(false), are_settings_lost: any(false) };
         Self {
-            bus: ControllerBus::new(&settings, "no_panic", troubles, any(Time::default())),
+            bus: ControllerBus::new(&settings, "no_panic", any(CarriedMap::default()), troubles, any(Time::default())),
             settings,
             slcan: slcan::Decoder::new(),
         }
