@@ -22,7 +22,7 @@ const EXPECTED: u8 = 2;
 const LONGEST_PAUSE: f64 = 0.3;
 /// Landmarks on either side that a verdict needs.
 const LEAST: usize = 3;
-/// With fewer on either side the scan must confirm it, if there is one.
+/// With fewer on either side the scan must confirm it, if there is one: half of those that are not seen again must be hidden by nothing.
 const SURE: u8 = 6;
 /// Of those that should be seen again, this share is not enough.
 const TOO_FEW: f64 = 0.2;
@@ -189,17 +189,20 @@ impl SlipCheck {
     /// Takes the scan of the revolution that has ended, whose laser was at `sensor` in the frame of the odometry. True if landmarks that
     /// should be seen again are gone, though nothing hides them, and none is there.
     pub fn misses(&mut self, scan: &Scan, sensor: &Pose) -> bool {
-        let is_gone = |one: &&Remembered| {
-            let place = sensor.inverse_transform(&one.position.cast());
-            let is_near = (RANGES.0..=RANGES.1).contains(&libm::hypot(place.x, place.y));
-            one.is_expected() && one.age > 0 && is_near && scan.passes(&place, BESIDE, -BEFORE)
+        let count = |nearest: f64, farthest: f64| {
+            let is_gone = |one: &&Remembered| {
+                let place = sensor.inverse_transform(&one.position.cast());
+                let is_within = (nearest..=farthest).contains(&libm::hypot(place.x, place.y));
+                one.is_expected() && one.age > 0 && is_within && scan.passes(&place, BESIDE, -BEFORE)
+            };
+            self.remembered.iter().filter(is_gone).count()
         };
         let [at_once, in_a_row] = GONE;
-        let is_asked = self.is_doubted || self.sees_none_again();
-        let gone = if is_asked { self.remembered.iter().filter(is_gone).count() } else { 0 };
+        let gone = if self.sees_none_again() { count(RANGES.0, RANGES.1) } else { 0 };
+        let unseen = usize::from(self.expected.saturating_sub(self.seen_again));
+        let is_confirmed = self.is_doubted && 2 * count(0.0, f64::INFINITY) >= unseen;
         self.awaits_scan = false;
         self.gone = if gone >= in_a_row { self.gone.saturating_add(1) } else { 0 };
-        let is_confirmed = self.is_doubted && gone >= LEAST;
         is_confirmed || gone >= at_once || self.gone >= IN_A_ROW
     }
 }

@@ -12,8 +12,9 @@ const LEAST_CONTRADICTING: f64 = 2.5;
 /// them contradict the pose if they are more than this share of what is seen.
 const ALIKE_WITHIN: f64 = 0.05;
 const LEAST_ALIKE: usize = 2;
-/// So many are no chance; of fewer, some must be alike in two events in a row: two false reflectors happen to be.
+/// Two false reflectors happen to be alike: so it must be so many, or more than this share of what is seen, or some in two events in a row.
 const SURELY_ALIKE: usize = 3;
+const LARGE_SHARE: f64 = 0.15;
 const ALIKE: f64 = 0.1;
 /// Displacements that are compared in an event.
 const COMPARED: usize = 8;
@@ -151,7 +152,8 @@ impl Contradiction {
     /// Whether enough landmarks are elsewhere by the same.
     fn are_alike(&self) -> bool {
         let [now, last] = self.alike;
-        now >= SURELY_ALIKE || now.min(last) >= LEAST_ALIKE
+        let is_sure = last >= LEAST_ALIKE || self.event.share() > LARGE_SHARE;
+        now >= SURELY_ALIKE || (now >= LEAST_ALIKE && is_sure)
     }
 
     /// How many landmarks are elsewhere by the same at most.
