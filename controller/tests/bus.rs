@@ -12,6 +12,7 @@ use agv_settings::leaf::{Leaf, Value};
 use agv_settings::{LEAVES, Settings};
 use agv_wire::can::canopen::{Message, NodeId, transmit_pdo_id};
 use agv_wire::can::controller::Content;
+use agv_wire::can::controller_node::CarriedMap;
 use agv_wire::can::emcy::Emergency;
 use agv_wire::can::frame::{Frame, standard_id};
 
@@ -33,7 +34,7 @@ struct Bench {
 
 impl Bench {
     fn new(settings: Settings) -> Self {
-        let mut bus = Bus::new(&settings, "test", Troubles::default(), at(0));
+        let mut bus = Bus::new(&settings, "test", CarriedMap::default(), Troubles::default(), at(0));
         bus.update(&estimate(Mode::Reflectors));
         Self { bus, settings, sent: Vec::new(), given: Vec::new(), published: 0 }
     }
@@ -295,7 +296,7 @@ fn settings_are_changed_over_the_bus_if_that_is_permitted() {
 #[test]
 fn what_of_the_board_does_not_work_is_told_by_its_bit() {
     let troubles = Troubles { damaged_parts: 0b100, ..Troubles::default() };
-    let mut bus = Bus::new(&Settings::default(), "test", troubles, at(0));
+    let mut bus = Bus::new(&Settings::default(), "test", CarriedMap::default(), troubles, at(0));
     let mut told = Vec::new();
     for now in 0..100 {
         bus.poll(at(now), LaserHealth::Sound, |output| match output {

@@ -6,7 +6,7 @@ use agv_core::geometry::Pose;
 use agv_core::measurement::{EncoderFault, EncoderFaults, Time, WheelReading};
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::{Settings, VehicleKind};
-use agv_wire::can::controller_node::WithoutSettings;
+use agv_wire::can::controller_node::{CarriedMap, WithoutSettings};
 use agv_wire::can::encoder_group::Counts;
 use agv_wire::can::frame::{Frame, standard_id};
 use agv_wire::can::motion_frames::MotionFrames;
@@ -56,7 +56,7 @@ fn the_bus_listens_to_what_tells_the_motion() {
         (VehicleKind::CarSpeed, &[16], &[0x1A1, 0x1A1]),
         (VehicleKind::Increments, &[16], &[0x1A2]),
     ] {
-        let bus = Bus::new(&of_kind(kind), "test", Troubles::default(), at(0));
+        let bus = Bus::new(&of_kind(kind), "test", CarriedMap::default(), Troubles::default(), at(0));
         assert_eq!(bus.nodes().iter().map(|node| node.number()).collect::<Vec<_>>(), nodes, "{kind:?}");
         let ids: Vec<_> = others.iter().map(|id| standard_id(*id)).collect();
         assert_eq!(bus.other_frames(), ids[..], "{kind:?}");
@@ -118,7 +118,7 @@ fn reports_of_the_own_controller_are_events_and_their_silence_is_a_fault() {
 #[test]
 fn a_vehicle_whose_own_controller_says_so_stands() {
     for kind in [VehicleKind::TricycleSpeed, VehicleKind::Increments] {
-        let mut bus = Bus::new(&of_kind(kind), "test", Troubles::default(), at(0));
+        let mut bus = Bus::new(&of_kind(kind), "test", CarriedMap::default(), Troubles::default(), at(0));
         let hear = |bus: &mut Bus, now: u64, is_moving: bool| {
             for frame in frames_of(kind, is_moving) {
                 bus.hear(&frame, at(now), &mut WithoutSettings, |_| ());
