@@ -73,6 +73,8 @@ const GATE: f32 = 3.5;
 
 /// So far around a place, m and rad, what did not fit there counts.
 const AROUND: (f64, f64) = (5.0, 0.5);
+/// Fewer that do not fit are false reflectors, which are gone elsewhere.
+const DOUBTFUL: usize = 3;
 
 /// Where reflectors did not fit, and how many.
 #[derive(Clone, Copy, Debug)]
@@ -82,23 +84,42 @@ struct Doubt {
     unexplained: usize,
 }
 
+impl Doubt {
+    fn is_around(&self, place: &Pose) -> bool {
+        let off = self.place.between(place);
+        libm::hypot(off.x, off.y) < AROUND.0 && libm::fabs(off.theta) < AROUND.1
+    }
+}
+
 /// The first of the looks that agree, and what speaks against it.
 #[derive(Clone, Debug)]
 pub(super) struct StartConfirmation {
     rule: StartRule,
     first: Option<Look>,
-    /// What has not fitted, also among reflectors that are forgotten since: what is seen later may fit a place that only looks alike.
-    doubt: Option<Doubt>,
+    /// What did not fit in the last look, and what did not of reflectors that are forgotten since: what is seen later may fit a place that
+    /// only looks alike.
+    doubts: [Option<Doubt>; 2],
     seen_through: SeenThrough,
 }
 
 impl StartConfirmation {
     /// Nothing was found.
     pub(super) const fn new(rule: StartRule) -> Self {
-        Self { rule, first: None, doubt: None, seen_through: SeenThrough::new() }
+        Self { rule, first: None, doubts: [None; 2], seen_through: SeenThrough::new() }
     }
 
-    /// Forgets the looks, but not what did not fit.
+    /// The reflectors that were seen are forgotten, and the looks, but not what did not fit.
+    pub(super) fn begin_anew(&mut self) {
+        self.forget();
+        let [last, before] = self.doubts;
+        let is_larger = |last: &Doubt| {
+            let before = before.filter(|before| before.is_around(&last.place));
+            last.unexplained >= DOUBTFUL && before.is_none_or(|before| last.unexplained >= before.unexplained)
+        };
+        self.doubts = [None, last.filter(is_larger).or(before)];
+    }
+
+    /// Forgets the looks.
     pub(super) fn forget(&mut self) {
         self.first = None;
         self.seen_through.forget();
@@ -154,14 +175,8 @@ impl StartConfirmation {
 
     /// How many reflectors have not fitted around a place, where so many do not now.
     fn doubted(&mut self, place: &Pose, unexplained: usize) -> usize {
-        let is_around = |doubt: &Doubt| {
-            let off = doubt.place.between(place);
-            libm::hypot(off.x, off.y) < AROUND.0 && libm::fabs(off.theta) < AROUND.1
-        };
-        let before = self.doubt.filter(is_around);
-        if before.is_none_or(|doubt| unexplained >= doubt.unexplained) {
-            self.doubt = Some(Doubt { place: *place, unexplained });
-        }
-        before.map_or(unexplained, |doubt| unexplained.max(doubt.unexplained))
+        let [last, before] = &mut self.doubts;
+        *last = Some(Doubt { place: *place, unexplained });
+        before.filter(|before| before.is_around(place)).map_or(0, |before| before.unexplained).max(unexplained)
     }
 }

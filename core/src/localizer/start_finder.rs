@@ -110,7 +110,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
     fn begin_anew(&mut self) {
         self.snapshot.clear();
         self.begun = None;
-        self.confirmation.forget();
+        self.confirmation.begin_anew();
         self.revolutions = 0;
     }
 
