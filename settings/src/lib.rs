@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod bus_load;
+mod checksum;
 mod contradiction;
 pub mod leaf;
 mod leaves;

@@ -2,7 +2,7 @@
 
 use agv_core::maps::Landmark;
 
-use crate::store::CHECKSUM;
+use crate::checksum::CHECKSUM;
 
 /// Bytes of a landmark at most, as it is kept in flash.
 const ROOM: usize = 32;

@@ -15,6 +15,7 @@ use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 use serde::{Deserialize, Serialize};
 
+use crate::checksum::CHECKSUM;
 use crate::leaf::{Leaf, Value};
 use crate::{LEAVES, Settings};
 
@@ -78,8 +79,6 @@ pub struct MapWriter {
     written: u16,
     digest: u32,
 }
-
-pub(crate) const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// The checksum of bytes and a piece more, from that of the bytes.
 fn checksum(before: u32, piece: &[u8]) -> u32 {

@@ -54,7 +54,8 @@ const HOUSES: [House; 8] = [
     House {
         folder: "settings",
         floors: &[
-            &["vehicle"],
+            &["checksum", "vehicle"],
+            &["map_identity"],
             &["settings"],
             &["bus_load"],
             &["contradiction"],

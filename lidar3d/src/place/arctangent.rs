@@ -46,6 +46,7 @@ pub(super) fn sector_of(turn: f32, sectors: usize) -> usize {
 }
 
 /// In which of so many sectors a direction lies, counter-clockwise from straight ahead.
+#[cfg(any(test, feature = "std"))]
 pub(super) fn sector(y: f32, x: f32, sectors: usize) -> usize {
     sector_of(turn(y, x), sectors)
 }

@@ -1,7 +1,7 @@
 //! What a place looks like from where the sensor stood: the least range in each direction.
 
 use super::Floor;
-use super::arctangent::{arctangent, sector, sector_of};
+use super::arctangent::{arctangent, sector_of};
 use super::levelled::{Block, both};
 use crate::cloud::Cloud;
 
@@ -138,12 +138,14 @@ impl Panorama {
     }
 
     /// Column of a point, and how far it lies away on the level, m.
+    #[cfg(feature = "std")]
     pub(super) fn column(&self, [x, y, _]: [f32; 3]) -> (usize, f32) {
-        (sector(y, x, self.columns), libm::sqrtf(x * x + y * y))
+        (super::arctangent::sector(y, x, self.columns), libm::sqrtf(x * x + y * y))
     }
 
     /// Row and range, m, of a point that lies so far away on the level, with its height above the floor; None if it is not
     /// between the elevations.
+    #[cfg(feature = "std")]
     pub(super) fn row(&self, [_, _, up]: [f32; 3], level: f32) -> Option<(usize, f32)> {
         let z = up - self.height;
         Some((self.row_of(self.share(z, level))?, range(z, level)))
