@@ -204,19 +204,24 @@ fn around(index: usize, count: usize) -> Point {
     Point::new(5.0 * angle.cos(), 5.0 * angle.sin())
 }
 
-/// Whether a check tells that landmarks are gone: so many were seen three times, and then none; every beam of the scans ends at `range`, m.
-/// Which of the revolutions without any tells it first.
-fn told_gone(count: usize, range: f32, has_scan: impl Fn(usize) -> bool) -> Option<usize> {
-    let ranges = vec![range; 720];
-    let scan = Scan {
+/// A whole turn of a laser that stands.
+fn scan_of(ranges: &[f32]) -> Scan<'_> {
+    Scan {
         laser: LaserId::FIRST,
         start: time(0),
         beam_interval: 0.0,
         first_bearing: -std::f64::consts::PI,
-        bearing_step: std::f64::consts::TAU / 720.0,
-        ranges: &ranges,
+        bearing_step: std::f64::consts::TAU / ranges.len() as f64,
+        ranges,
         intensities: &[],
-    };
+    }
+}
+
+/// Whether a check tells that landmarks are gone: so many were seen three times, and then none; every beam of the scans ends at `range`, m.
+/// Which of the revolutions without any tells it first.
+fn told_gone(count: usize, range: f32, has_scan: impl Fn(usize) -> bool) -> Option<usize> {
+    let ranges = [range; 720];
+    let scan = scan_of(&ranges);
     let mut check = SlipCheck::new();
     (0..7).find_map(|revolution| {
         check.begin(time(revolution));
@@ -250,15 +255,7 @@ fn landmarks_that_nothing_hides_and_that_are_all_gone_tell_a_move() {
 #[test]
 fn one_landmark_that_is_seen_again_is_enough_against_a_move() {
     let ranges = [8.0; 720];
-    let scan = Scan {
-        laser: LaserId::FIRST,
-        start: time(0),
-        beam_interval: 0.0,
-        first_bearing: 0.0,
-        bearing_step: std::f64::consts::TAU / 720.0,
-        ranges: &ranges,
-        intensities: &[],
-    };
+    let scan = scan_of(&ranges);
     let mut check = SlipCheck::new();
     for revolution in 0..8 {
         check.begin(time(revolution));
@@ -270,16 +267,8 @@ fn one_landmark_that_is_seen_again_is_enough_against_a_move() {
 /// So many were seen three times, and then others elsewhere in each revolution; every beam of the scans ends at `range`, m, and there are
 /// none if that is zero. Whether a move is told.
 fn is_change_told(count: usize, range: f32) -> bool {
-    let ranges = vec![range; 720];
-    let scan = Scan {
-        laser: LaserId::FIRST,
-        start: time(0),
-        beam_interval: 0.0,
-        first_bearing: -std::f64::consts::PI,
-        bearing_step: std::f64::consts::TAU / 720.0,
-        ranges: &ranges,
-        intensities: &[],
-    };
+    let ranges = [range; 720];
+    let scan = scan_of(&ranges);
     let mut check = SlipCheck::new();
     (0..5).any(|revolution| {
         check.begin(time(revolution));
