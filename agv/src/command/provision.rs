@@ -70,7 +70,8 @@ impl Provision {
             let settings: serde_json::Map<_, _> =
                 changed.iter().map(|[name, value]| (name.clone(), value.clone().into())).collect();
             let written = json!({
-                "bytes": image.len(), "landmarks": landmarks.len(), "map_identity": map_identity(&landmarks), "settings": settings, "questions": doubts,
+                "bytes": image.len(), "landmarks": landmarks.len(), "map_identity": map_identity(&landmarks),
+                "settings": settings, "questions": doubts,
             });
             println!("{}", serde_json::to_string_pretty(&written)?);
             return Ok(());

@@ -12,10 +12,10 @@ const LEAST_CONTRADICTING: f64 = 2.5;
 /// them contradict the pose if they are more than this share of what is seen.
 const ALIKE_WITHIN: f64 = 0.05;
 const LEAST_ALIKE: usize = 2;
+const ALIKE: f64 = 0.1;
 /// Two false reflectors happen to be alike: so it must be so many, or more than this share of what is seen, or some in two events in a row.
 const SURELY_ALIKE: usize = 3;
 const LARGE_SHARE: f64 = 0.15;
-const ALIKE: f64 = 0.1;
 /// Displacements that are compared in an event.
 const COMPARED: usize = 8;
 /// What they count from one event to the next.

@@ -64,7 +64,7 @@ pub struct FreeSince {
     pub fit: Fit,
     /// Whether the place of the laser is free and the heading has not been found yet.
     pub awaits_heading: bool,
-    /// From where on, m driven and rad turned together, the next event is taken while that is so.
+    /// While the heading has not been found, the next event is taken once so much was driven and turned, m and rad together.
     pub next: f64,
     /// Whether the last event refuted it, which was not taken then.
     pub is_surprised: bool,
