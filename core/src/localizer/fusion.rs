@@ -22,8 +22,8 @@ impl<C: Capacities> Localizer<C> {
             dynamic: self.maps.dynamic(),
         };
         let has_slots = believed.maps.slam;
-        // With slots a vehicle without a map of reflectors finds them on its way.
-        let are_reflectors_expected = !has_slots || !maps.reflectors.landmarks().is_empty();
+        // A vehicle whose map has none knows of none, or finds them on its way.
+        let are_reflectors_expected = !maps.reflectors.landmarks().is_empty();
         let gate = believed.association.gate;
         let mut evidence = Evidence::new(&mut self.outputs, &mut self.distance, gate, are_reflectors_expected);
         for sighting in &mut self.workspace.sightings {
