@@ -41,9 +41,7 @@ impl<L: Localize> Localization<L> {
     #[inline(always)]
     pub fn new(localizer: L, settings: &Settings) -> Self {
         let search = StartSearch::new(&settings.parameters, settings.start_search);
-        let mut localization = Self { localizer, search, answered: 0, told: 0 };
-        localization.index();
-        localization
+        Self { localizer, search, answered: 0, told: 0 }
     }
 
     /// The localiser.
@@ -52,15 +50,10 @@ impl<L: Localize> Localization<L> {
         &self.localizer
     }
 
-    /// The localiser, to replace its maps; [`Localization::index`] is to be called then.
+    /// The localiser, to replace its maps: what was found of those before is forgotten.
     pub fn localizer_mut(&mut self) -> &mut L {
+        self.search.forget_maps();
         &mut self.localizer
-    }
-
-    /// Makes ready for the reflectors and the contours that the localiser has.
-    pub fn index(&mut self) {
-        self.search.index(self.localizer.reflectors());
-        self.search.forget_contours();
     }
 
     /// Takes an event that the bus has told, or somebody else.
@@ -115,8 +108,11 @@ impl<L: Localize> Localization<L> {
     /// Goes on with the search for a pose for a slice of time, and returns whether there is more to do. A pose that is found
     /// is an event like any other, so that a replay of the log needs no search.
     pub fn search(&mut self, log: impl FnMut(&Record)) -> bool {
-        let contours = self.localizer.contours();
-        let (is_busy, found) = self.search.advance(self.localizer.reflectors(), contours.as_ref());
+        if !self.search.has_time() {
+            return false;
+        }
+        let (reflectors, contours) = self.localizer.for_search();
+        let (is_busy, found) = self.search.advance(reflectors, contours);
         if let Some(fix) = found {
             self.handle(&Event::SetPose(fix), log);
         }

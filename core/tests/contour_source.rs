@@ -376,9 +376,34 @@ fn surroundings_that_are_cut_are_said_to_be() {
     assert_eq!((narrow.outputs().pose.overflows, wide.outputs().pose.overflows), (1, 0));
 }
 
+/// A search uses the memory of what was loaded around the vehicle. What the localiser says afterwards is the same as without one, to the last
+/// bit: here the laser has left the tile in whose middle the surfaces were loaded.
+#[test]
+fn a_search_leaves_no_trace_in_what_is_said() {
+    let said = |searches: bool| {
+        let mut drive = Drive::told(parameters(), room(), Some(kept_map(&room(), &Pose::default())), 3);
+        let mut said = Vec::new();
+        for number in 0..14 {
+            if number == 11 {
+                let place = drive.truth.compose(&LASER);
+                assert!(place.x < 0.0 && place.x > -0.3, "{place:?}");
+                if searches {
+                    let (_, contours) = drive.localizer.for_search();
+                    contours.unwrap().1.begin(&Pose::new(3.0, 2.0, 1.0));
+                }
+                drive.tell(drive.truth, 0.01, 0.003);
+            }
+            said.extend(drive.revolve((-0.4, 0.0), 1.0).iter().map(|pose| format!("{pose:?}")));
+            assert_eq!(drive.status().accepted, 1, "{number}");
+        }
+        said
+    };
+    assert_eq!(said(false), said(true));
+}
+
 /// What a controller asks any localiser.
-fn has_map(localizer: &impl agv_core::localizer::Localize) -> bool {
-    localizer.contours().is_some()
+fn has_map(mut localizer: impl agv_core::localizer::Localize) -> bool {
+    localizer.for_search().1.is_some()
 }
 
 #[test]
@@ -390,8 +415,20 @@ fn any_localiser_tells_its_map_if_it_is_used() {
         let mut drive = Drive::new(parameters, room(), map, 1);
         let expected = is_on && map.is_some();
         assert_eq!(drive.localizer.contours().is_some(), expected);
-        assert_eq!(has_map(&*drive.localizer), expected);
-        assert_eq!(has_map(&&mut *drive.localizer), expected);
+        assert_eq!(has_map(&mut *drive.localizer), expected);
+        assert_eq!(has_map(&mut &mut *drive.localizer), expected);
+    }
+}
+
+/// The hall has reflectors, and the vehicle a map of its contours only.
+#[test]
+fn reflectors_of_which_there_is_no_map_are_nothing_against_contours() {
+    let mut drive = Drive::told(parameters(), room(), Some(kept_map(&room(), &Pose::default())), 8);
+    drive.reflectors = reflectors();
+    for revolution in 0..20 {
+        drive.revolve((0.4, 0.1), 1.0);
+        let uses = &drive.localizer.outputs().uses;
+        assert!(revolution == 0 || drive.said().mode == Mode::Features, "{revolution}: {:?}, {uses:?}", drive.said());
     }
 }
 

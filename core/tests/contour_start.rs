@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use agv_core::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch};
+use agv_core::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch, Submap};
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Mode, Parameters, PoseFix, StartSearch};
 use agv_core::maps::FixedMap;
@@ -19,7 +19,14 @@ use super::support::walls::{Noise, Walls, corridor, range, room};
 const BEAMS: usize = 720;
 const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
 
-type Search = PlaceSearch<400, 4096, 16_384>;
+type Room = Submap<4096>;
+
+/// A search and its room.
+#[derive(Default)]
+struct Search {
+    places: PlaceSearch<400, 16_384>,
+    room: Room,
+}
 
 /// A map of walls where they are.
 fn map(walls: &Walls) -> KeptMap<'static> {
@@ -48,9 +55,9 @@ fn answer(search: &mut Search, walls: &Walls, map: &KeptMap, laser: &Pose, slice
     let ranges = ranges(walls, laser, &mut Noise(7));
     let mut points: Box<PointScan<BEAMS>> = Box::default();
     points.set(&scan(&ranges, Time::default()), 0.05, 60.0);
-    search.begin(points.view());
+    search.places.begin(points.view());
     for slices in 1..1_000_000 {
-        if let PlaceProgress::Done(answer) = search.advance(map, slice) {
+        if let PlaceProgress::Done(answer) = search.places.advance(map, &mut search.room, slice) {
             return (answer, slices);
         }
     }
@@ -116,7 +123,7 @@ fn where_the_free_space_of_the_map_is_taken_nothing_is_found() {
 
 #[test]
 fn without_a_map_or_surfaces_nothing_is_found() {
-    let empty = KeptMap::new(&[], &[]).unwrap();
+    let empty = KeptMap::EMPTY;
     let place = Pose::new(1.0, 2.0, 0.7);
     assert_eq!(answer(&mut Box::default(), &room(), &empty, &place, 3000).0, PlaceAnswer::Unknown);
     let nothing = Walls::new();
@@ -160,6 +167,7 @@ fn between_two_things_of_which_one_was_moved_no_place_is_told() {
 /// What a controller does: events, and slices of the search in between.
 struct Switched {
     search: Box<StartSearch<Places<'static, 400, 4096>>>,
+    room: Box<Room>,
     map: KeptMap<'static>,
     time: f64,
     pose: Pose,
@@ -169,7 +177,7 @@ struct Switched {
 impl Switched {
     fn new(map: KeptMap<'static>, pose: Pose) -> Self {
         let search = Box::new(StartSearch::new(&Parameters::new(Vehicle::Increments, LASER), true));
-        Self { search, map, time: 1.0, pose, noise: Noise(11) }
+        Self { search, room: Box::default(), map, time: 1.0, pose, noise: Noise(11) }
     }
 
     /// Moves, sees a revolution, and searches as long as there is time for it.
@@ -183,7 +191,7 @@ impl Switched {
         let ranges = ranges(walls, &self.pose.compose(&LASER), &mut self.noise);
         self.search.handle(&Event::Scan(scan(&ranges, time)), Mode::NotLocalised, reflectors.view());
         for _ in 0..10_000 {
-            let (is_busy, found) = self.search.advance(reflectors.view(), Some(&self.map));
+            let (is_busy, found) = self.search.advance(reflectors.view(), Some((self.map, &mut self.room)));
             if found.is_some() || !is_busy {
                 return found;
             }
@@ -243,7 +251,7 @@ fn what_was_seen_before_another_map_or_another_pose_tells_nothing() {
         vehicle.revolve(&room(), &Pose::default()).is_some()
     };
     assert!(two(&|_| ()), "two looks are enough");
-    assert!(!two(&|vehicle| vehicle.search.forget_contours()), "the map was replaced");
+    assert!(!two(&|vehicle| vehicle.search.forget_maps()), "the map was replaced");
     let reflectors = Box::new(FixedMap::<4>::new());
     // The localiser has a pose for a while.
     let silence = Event::EncoderFaults(agv_core::measurement::EncoderFaults::default());
@@ -262,6 +270,7 @@ fn a_laser_that_moves_while_it_looks_is_found_where_it_is() {
     };
     let mut search: Box<StartSearch<Places<'static, 400, 4096>>> =
         Box::new(StartSearch::new(&Parameters::new(Vehicle::Increments, LASER), true));
+    let mut room_of_search: Box<Room> = Box::default();
     let (mut pose, mut time, mut noise) = (Pose::new(-0.5, 0.2, 0.0), 1.0, Noise(5));
     let fix = (0..8).find_map(|_| {
         let (from, start) = (pose, Time::from_seconds(time));
@@ -281,7 +290,7 @@ fn a_laser_that_moves_while_it_looks_is_found_where_it_is() {
         let scan = Scan { beam_interval: REVOLUTION / BEAMS as f64, ..scan(&ranges, start) };
         search.handle(&Event::Scan(scan), Mode::NotLocalised, reflectors.view());
         (0..10_000).find_map(|_| {
-            let (is_busy, found) = search.advance(reflectors.view(), Some(&map));
+            let (is_busy, found) = search.advance(reflectors.view(), Some((map, &mut room_of_search)));
             (found.is_some() || !is_busy).then_some(found)
         })?
     });
@@ -298,7 +307,7 @@ fn in_another_map_the_place_is_that_of_the_other_map() {
     let mut vehicle = Switched::new(map(&room()), Pose::new(0.5, 1.0, -0.6));
     assert_eq!(vehicle.revolve(&room(), &Pose::default()), None);
     vehicle.map = map(&moved);
-    vehicle.search.forget_contours();
+    vehicle.search.forget_maps();
     let fix = (0..6).find_map(|_| vehicle.revolve(&room(), &Pose::default())).unwrap();
     assert!(is_near(&fix.pose, &shift.compose(&vehicle.pose)), "{fix:?}");
 }

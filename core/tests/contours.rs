@@ -173,15 +173,37 @@ fn kept_points_are_true_to_a_millimetre_and_half_a_degree() {
 #[test]
 fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
     let point = KeptPoint::of(&SurfacePoint { position: ScanPoint::new(1.0, 3.0), normal: ScanPoint::new(0.0, 1.0) });
-    let points = [point; 3];
-    let tile = |row, column, first| Tile { place: (row, column), first, count: 1 };
-    let tiles = [tile(-2, 5, 0), tile(0, 0, 1), tile(0, 7, 2)];
-    assert!(matches!(KeptMap::new(&[tiles[1], tiles[0]], &points), Err(KeptMapError::Order)));
-    assert!(matches!(KeptMap::new(&[tiles[0], tiles[0]], &points), Err(KeptMapError::Order)));
-    assert!(matches!(KeptMap::new(&[tile(0, 0, 3)], &points), Err(KeptMapError::Points)));
-    assert!(matches!(KeptMap::new(&[tile(0, 0, u32::MAX)], &points), Err(KeptMapError::Points)));
+    let bytes = |tiles: &[Tile]| {
+        let tile_bytes = tiles.iter().flat_map(Tile::bytes);
+        KeptMap::header(tiles.len() as u32)
+            .into_iter()
+            .chain(tile_bytes)
+            .chain([point; 3].iter().flat_map(KeptPoint::bytes))
+            .collect::<Vec<u8>>()
+    };
+    let error = |bytes: &[u8]| KeptMap::read(bytes).unwrap_err();
+    let tile = |row, column, end| Tile { place: (row, column), end };
+    let tiles = [tile(-2, 5, 1), tile(0, 0, 2), tile(0, 7, 3)];
+    assert_eq!(error(&bytes(&[tiles[1], tiles[0], tiles[2]])), KeptMapError::Order);
+    assert_eq!(error(&bytes(&[tile(0, 0, 1), tile(0, 0, 3)])), KeptMapError::Order);
+    for ends in [[0, 2], [1, 4], [3, 2], [0, u32::MAX]] {
+        assert_eq!(error(&bytes(&[tile(0, 0, ends[0]), tile(0, 1, ends[1])])), KeptMapError::Points, "{ends:?}");
+    }
+    let bytes = bytes(&tiles);
+    for length in 0..bytes.len() {
+        let wanted =
+            if length < 8 + 24 || (length - 32) % 5 != 0 { KeptMapError::Format } else { KeptMapError::Points };
+        assert_eq!(error(&bytes[..length]), wanted, "{length} bytes");
+    }
+    assert_eq!(error(&[&[0], &bytes[1..]].concat()), KeptMapError::Format);
+    assert_eq!(error(&[&bytes[..4], &[0xFF; 4], &bytes[8..]].concat()), KeptMapError::Format);
 
-    let map = KeptMap::new(&tiles, &points).unwrap();
+    let map = KeptMap::read(&bytes).unwrap();
+    assert_eq!((map.len(), KeptMap::EMPTY.len(), KeptMap::read(&KeptMap::header(0)).unwrap().len()), (3, 0, 0));
+    let places: Vec<_> = map.surfaces().map(|(corner, surface)| corner + surface.position.cast::<f64>()).collect();
+    for (place, known) in places.iter().zip([[21.0, -5.0], [1.0, 3.0], [29.0, 3.0]]) {
+        assert!((place.x - known[0]).hypot(place.y - known[1]) < 1e-3, "{place:?}");
+    }
     let mut surroundings: Box<Surroundings> = Box::default();
     // The three points are at (1, 3), (29, 3) and (21, -5).
     assert_eq!(surroundings.around(&map, &Pose::new(2.0, 2.0, 0.3)).len(), 1);

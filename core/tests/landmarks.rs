@@ -166,7 +166,7 @@ fn a_map_is_replaced_as_a_whole_or_not_at_all() {
 
 #[test]
 fn a_map_that_is_lent_is_in_use_or_refused() {
-    use agv_core::localizer::{Localizer, Parameters, SlamWithLentMap};
+    use agv_core::localizer::{LentCapacities, Localizer, Parameters};
     use agv_core::maps::LendError;
     use agv_core::odometry::Vehicle;
     let parameters = Parameters::new(Vehicle::Increments, agv_core::geometry::Pose::default());
@@ -174,7 +174,7 @@ fn a_map_that_is_lent_is_in_use_or_refused() {
         [Landmark::reflector(1, Point::new(1.0, 2.0), 0.002), Landmark::reflector(2, Point::new(3.0, 2.0), 0.002)];
     let corner = Landmark { kind: LandmarkKind::Corner, ..good[0] };
     let turned = [corner, good[1]];
-    let mut localizer = Box::new(Localizer::<SlamWithLentMap>::new(parameters));
+    let mut localizer = Box::new(Localizer::<LentCapacities>::new(parameters));
     assert_eq!(localizer.lend_landmarks(&good), Ok(()));
     assert_eq!(localizer.reflectors().landmarks(), &good[..]);
     assert_eq!(localizer.lend_landmarks(&turned), Err(LendError::Order));

@@ -25,8 +25,7 @@ impl Start {
     fn new(landmarks: &[Landmark]) -> Self {
         let mut map = Box::new(FixedMap::new());
         assert_eq!(map.extend(landmarks), Ok(()));
-        let mut search = Box::new(StartSearch::new(&parameters(), true));
-        search.index(map.view());
+        let search = Box::new(StartSearch::new(&parameters(), true));
         let mut start = Self { map, search, pose: Pose::new(-3.0, 0.5, 0.2), time: 5.0 };
         start.drive(0.0, 1);
         start

@@ -42,8 +42,7 @@ struct Search {
 impl Search {
     fn new(landmarks: &[Landmark], is_wanted: bool) -> Self {
         let map = map(landmarks);
-        let mut search = Box::new(StartSearch::new(&parameters(), is_wanted));
-        search.index(map.view());
+        let search = Box::new(StartSearch::new(&parameters(), is_wanted));
         assert_eq!(search.state(), Relocalization::Idle);
         Self { map, search, mode: Mode::NotLocalised }
     }

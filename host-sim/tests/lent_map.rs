@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::Point;
-use agv_core::localizer::{Localizer, SlamCapacities, SlamWithLentMap};
+use agv_core::localizer::{ContourCapacities, LentCapacities, Localizer};
 use agv_core::maps::{Landmark, LandmarkKind, LendError, put_reflectors_first};
 use agv_host_sim::mapping::{Clustering, map_features};
 use agv_host_sim::simulate::scenario::Scenario;
@@ -24,9 +24,9 @@ fn a_lent_map_answers_as_a_copy() {
     recording.landmarks = features[..50].iter().chain(&reflectors).chain(&features[50..]).copied().collect();
     let mut sorted = recording.landmarks.clone();
     put_reflectors_first(&mut sorted);
-    let mut own = Box::new(Localizer::<SlamCapacities>::new(recording.parameters));
+    let mut own = Box::new(Localizer::<ContourCapacities>::new(recording.parameters));
     own.add_landmarks(&recording.landmarks).unwrap();
-    let mut lent = Box::new(Localizer::<SlamWithLentMap>::new(recording.parameters));
+    let mut lent = Box::new(Localizer::<LentCapacities>::new(recording.parameters));
     lent.lend_landmarks(&sorted).unwrap();
     assert_eq!(lent.reflectors().landmarks(), own.reflectors().landmarks());
     let mut accepted = 0;
@@ -61,7 +61,7 @@ fn a_map_that_cannot_be_lent_changes_nothing() {
     let turned = [good[1], good[0]];
     let many: Vec<Landmark> = (0..1001).map(|id| landmark(id, LandmarkKind::Reflector)).collect();
     let nowhere = [Landmark { x: f64::NAN, ..good[0] }];
-    let mut localizer = Box::new(Localizer::<SlamWithLentMap>::new(parameters));
+    let mut localizer = Box::new(Localizer::<LentCapacities>::new(parameters));
     assert_eq!(localizer.lend_landmarks(&good), Ok(()));
     assert_eq!(localizer.lend_landmarks(&turned), Err(LendError::Order));
     assert_eq!(localizer.lend_landmarks(&many), Err(LendError::Full));

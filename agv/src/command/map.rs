@@ -197,7 +197,7 @@ impl Map {
         contour_file::write(&self.output, &map)?;
         let summary = ContourSummary {
             points: map.len(),
-            bytes: map.bytes(),
+            bytes: map.bytes().len(),
             key_scans: slam.map(|slam| slam.0),
             loops: slam.map(|slam| slam.1),
         };

@@ -222,7 +222,7 @@ impl Replay {
         let running = progress::bar("replaying", recording.events.len() as u64);
         let done = |events: usize| running.set_position(events as u64);
         // A map that was read here is in order.
-        let contours = contours.and_then(|map| map.view().ok());
+        let contours = contours.map(ContourMap::view);
         let replay = replay_in(recording, contours, done).with_context(|| self.log.display().to_string())?;
         running.finish_and_clear();
         Ok(replay)

@@ -1,104 +1,86 @@
 //! A map of contours that is kept: points of surfaces in square tiles, of which those around the vehicle are loaded.
+//!
+//! It is bytes in memory that somebody else holds, as in flash: a header ([`KeptMap::header`]: what it is, and the number of tiles), the
+//! tiles in order of their places ([`Tile::bytes`]), and the points in order of their tiles ([`KeptPoint::bytes`]).
 
-use super::{KeyRing, LARGEST_REACH, Submap, SurfacePoint};
-use crate::geometry::{Pose, ScanPoint};
-
-/// Side of a tile, m.
-pub const TILE: f64 = 4.0;
+use super::{KeptPoint, Submap, SurfacePoint, TILE, Tile};
+use crate::geometry::{Point, Pose, ScanPoint};
 
 /// Tiles to each side that are loaded: they reach as far as a submap does.
 const AROUND: i32 = 4;
 
-/// Counts of a coordinate for a metre: 4 m in 12 bits.
-const COUNTS: f32 = 1023.0;
+/// Bytes before the tiles.
+const HEADER: usize = 8;
 
-/// Counts for the length of a normal.
-const UNIT: f32 = 127.0;
-
-/// A point in 5 bytes: twice 12 bits for the position in its tile, to a millimetre, and a normal to half a degree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct KeptPoint {
-    bytes: [u8; 5],
-}
-
-impl KeptPoint {
-    /// Packs a point, given from the corner of its tile.
-    #[must_use]
-    pub fn of(point: &SurfacePoint) -> Self {
-        let count = |length: f32| libm::roundf(length * COUNTS).clamp(0.0, 4095.0) as u16;
-        let normal = |share: f32| (libm::roundf(share * UNIT) as i8).to_le_bytes()[0];
-        let (x, y) = (count(point.position.x), count(point.position.y));
-        let high = ((x >> 8) | ((y >> 8) << 4)) as u8;
-        Self { bytes: [x.to_le_bytes()[0], y.to_le_bytes()[0], high, normal(point.normal.x), normal(point.normal.y)] }
-    }
-
-    /// The point from the corner of its tile.
-    #[must_use]
-    pub fn unpacked(&self) -> SurfacePoint {
-        let [x, y, high, normal_x, normal_y] = self.bytes;
-        let length = |low: u8, high: u8| f32::from(u16::from_le_bytes([low, high])) * (1.0 / COUNTS);
-        let share = |byte: u8| f32::from(i8::from_le_bytes([byte])) * (1.0 / UNIT);
-        SurfacePoint {
-            position: ScanPoint::new(length(x, high & 15), length(y, high >> 4)),
-            normal: ScanPoint::new(share(normal_x), share(normal_y)),
-        }
-    }
-}
-
-/// A square of a map, and which of the points are in it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tile {
-    /// Row and column: the corner of a tile is at `TILE` times these, y and x.
-    pub place: (i16, i16),
-    /// Number of its first point.
-    pub first: u32,
-    /// Number of its points.
-    pub count: u16,
-}
-
-impl Tile {
-    /// The tile in which a position lies. None beyond 131 km.
-    #[must_use]
-    pub fn place_of(x: f64, y: f64) -> Option<(i16, i16)> {
-        let index = |length: f64| {
-            let index = libm::floor(length / TILE);
-            (libm::fabs(index) < f64::from(i16::MAX)).then_some(index as i16)
-        };
-        Some((index(y)?, index(x)?))
-    }
-}
+/// What a map begins with: `AGC` and the number of this format.
+const FORMAT: u32 = 0x0143_4741;
 
 /// Why a map cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeptMapError {
+    /// The bytes do not begin as a map, or end within a tile or a point.
+    Format,
     /// Tiles are not in order of their rows and columns, each once.
     Order,
-    /// A tile names points that are not there.
+    /// The tiles have more or fewer points than there are, or end before they begin.
     Points,
+    /// The localiser has no room for contours.
+    NoRoom,
 }
 
 /// A map in memory that somebody else holds.
 #[derive(Clone, Copy, Debug)]
 pub struct KeptMap<'a> {
-    tiles: &'a [Tile],
-    points: &'a [KeptPoint],
+    tiles: &'a [[u8; Tile::BYTES]],
+    points: &'a [[u8; KeptPoint::BYTES]],
 }
 
 impl<'a> KeptMap<'a> {
-    /// Tiles in order of their places, and their points.
+    /// A map without tiles.
+    pub const EMPTY: Self = Self { tiles: &[], points: &[] };
+
+    /// What the bytes of a map of so many tiles begin with.
+    #[must_use]
+    pub const fn header(tiles: u32) -> [u8; HEADER] {
+        let ([a, b, c, d], [e, f, g, h]) = (FORMAT.to_le_bytes(), tiles.to_le_bytes());
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// Takes bytes as a map.
     ///
     /// # Errors
     /// See [`KeptMapError`].
-    pub fn new(tiles: &'a [Tile], points: &'a [KeptPoint]) -> Result<Self, KeptMapError> {
-        if !tiles.is_sorted_by(|before, after| before.place < after.place) {
+    pub fn read(bytes: &'a [u8]) -> Result<Self, KeptMapError> {
+        let (header, rest) = bytes.split_first_chunk::<HEADER>().ok_or(KeptMapError::Format)?;
+        let ([format, count], []) = header.as_chunks::<4>() else { return Err(KeptMapError::Format) };
+        let count = u32::from_le_bytes(*count) as usize;
+        let length = count.checked_mul(Tile::BYTES).filter(|_| u32::from_le_bytes(*format) == FORMAT);
+        let (tiles, points) = length.and_then(|length| rest.split_at_checked(length)).ok_or(KeptMapError::Format)?;
+        let (tiles, []) = tiles.as_chunks() else { return Err(KeptMapError::Format) };
+        let (points, []) = points.as_chunks() else { return Err(KeptMapError::Format) };
+        let map = Self { tiles, points };
+        let each = || tiles.iter().map(|bytes| Tile::of_bytes(*bytes));
+        if !each().is_sorted_by(|before, after| before.place < after.place) {
             return Err(KeptMapError::Order);
         }
-        let ends = |tile: &Tile| (tile.first as usize).checked_add(usize::from(tile.count));
-        if tiles.iter().all(|tile| ends(tile).is_some_and(|end| end <= points.len())) {
-            Ok(Self { tiles, points })
+        let ends = each().map(|tile| tile.end as usize);
+        if ends.clone().is_sorted() && ends.last().unwrap_or(0) == points.len() {
+            Ok(map)
         } else {
             Err(KeptMapError::Points)
         }
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether it holds nothing.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.points.is_empty()
     }
 
     /// Fills a submap with what is around a place, from near to far. The submap says whether there was room for all.
@@ -118,13 +100,11 @@ impl<'a> KeptMap<'a> {
         (first, count): (usize, usize),
         submap: &mut Submap<ROOM>,
     ) -> usize {
-        let (down, right) = beside(number as i32);
-        let Some(tile) = self.tile_beside(place, (down, right)) else { return 0 };
+        let (down, right) = around(number as i32);
         let shift = corner_of(down, right);
-        let points = self.points_of(tile).iter().skip(first).take(count);
+        let points = self.beside(place, (down, right)).some(first, count);
         let added = points.len();
         for point in points {
-            let point = point.unpacked();
             submap.add_point(&SurfacePoint { position: point.position + shift, ..point });
         }
         added
@@ -143,39 +123,76 @@ impl<'a> KeptMap<'a> {
         let mut looked_at: u32 = 0;
         for down in steps(position.y - reach)..=steps(position.y + reach) {
             for right in steps(position.x - reach)..=steps(position.x + reach) {
-                let Some(tile) = self.tile_beside(place, (down, right)) else { continue };
+                let points = self.beside(place, (down, right));
                 let shift = corner_of(down, right);
-                for point in self.points_of(tile) {
-                    let point = point.unpacked();
+                for point in points.some(0, usize::MAX) {
                     let position_of_it = point.position + shift;
                     if (position_of_it - position).amax() <= reach {
                         with(SurfacePoint { position: position_of_it, ..point });
                     }
                 }
-                looked_at = looked_at.saturating_add(u32::from(tile.count));
+                looked_at = looked_at.saturating_add(points.len() as u32);
             }
         }
         looked_at
     }
 
-    /// The tile so many rows and columns from a place.
-    fn tile_beside(&self, place: (i16, i16), (down, right): (i32, i32)) -> Option<&'a Tile> {
-        let row = i16::try_from(i32::from(place.0).checked_add(down)?).ok()?;
-        let column = i16::try_from(i32::from(place.1).checked_add(right)?).ok()?;
-        let found = self.tiles.binary_search_by(|tile| tile.place.cmp(&(row, column))).ok()?;
-        self.tiles.get(found)
+    /// The points of the tile so many rows and columns from a place; none if there is no such tile.
+    fn beside(&self, place: (i16, i16), (down, right): (i32, i32)) -> Points<'a> {
+        let place_beside = || {
+            let row = i16::try_from(i32::from(place.0).checked_add(down)?).ok()?;
+            let column = i16::try_from(i32::from(place.1).checked_add(right)?).ok()?;
+            Some((row, column))
+        };
+        let number = place_beside()
+            .and_then(|sought| self.tiles.binary_search_by(|tile| Tile::of_bytes(*tile).place.cmp(&sought)).ok());
+        number.map_or(Points(&[]), |number| self.points_of(number))
     }
 
-    /// All tiles, in order of their places.
-    pub(super) const fn tiles(&self) -> &'a [Tile] {
-        self.tiles
+    /// All surfaces: the corner of the tile, m in W, and the point from there.
+    pub fn surfaces(&self) -> impl Iterator<Item = (Point, SurfacePoint)> + use<'a> {
+        let map = *self;
+        map.places().enumerate().flat_map(move |(number, place)| {
+            map.points_of(number).some(0, usize::MAX).map(move |point| (corner(place), point))
+        })
     }
 
-    /// The points of a tile.
-    pub(super) fn points_of(&self, tile: &Tile) -> &'a [KeptPoint] {
-        let first = tile.first as usize;
-        self.points.get(first..first + usize::from(tile.count)).unwrap_or_default()
+    /// The places of all tiles, in order.
+    pub(super) fn places(&self) -> impl Iterator<Item = (i16, i16)> + use<'a> {
+        self.tiles.iter().map(|tile| Tile::of_bytes(*tile).place)
     }
+
+    /// The place of the tile with that number.
+    pub(super) fn place(&self, number: usize) -> Option<(i16, i16)> {
+        Some(Tile::of_bytes(*self.tiles.get(number)?).place)
+    }
+
+    /// The points of the tile with that number.
+    pub(super) fn points_of(&self, number: usize) -> Points<'a> {
+        let end = |number: usize| self.tiles.get(number).map_or(0, |tile| Tile::of_bytes(*tile).end as usize);
+        let first = number.checked_sub(1).map_or(0, end);
+        Points(self.points.get(first..end(number)).unwrap_or_default())
+    }
+}
+
+/// Points of a tile.
+#[derive(Clone, Copy)]
+pub(super) struct Points<'a>(&'a [[u8; KeptPoint::BYTES]]);
+
+impl<'a> Points<'a> {
+    pub(super) const fn len(self) -> usize {
+        self.0.len()
+    }
+
+    /// At most `count` of them from number `first` on, each from the corner of the tile.
+    pub(super) fn some(self, first: usize, count: usize) -> impl ExactSizeIterator<Item = SurfacePoint> + use<'a> {
+        self.0.iter().skip(first).take(count).map(|bytes| KeptPoint::of_bytes(*bytes).unpacked())
+    }
+}
+
+/// The corner of a tile, m in W.
+pub(super) fn corner((row, column): (i16, i16)) -> Point {
+    Point::new(f64::from(column), f64::from(row)) * TILE
 }
 
 /// The corner of a tile so many rows and columns away, from the middle of the tile here.
@@ -185,7 +202,7 @@ fn corner_of(down: i32, right: i32) -> ScanPoint {
 }
 
 /// The tiles around a place by number, ring by ring: rows and columns away.
-fn beside(number: i32) -> (i32, i32) {
+fn around(number: i32) -> (i32, i32) {
     let mut ring = 0;
     // Rings 0 to `ring` have the square of 2 ring + 1 tiles.
     while ring < AROUND && number >= (2 * ring + 1) * (2 * ring + 1) {
@@ -238,54 +255,4 @@ impl Loading {
 pub(super) fn middle((row, column): (i16, i16)) -> Pose {
     let middle = |index: i16| (f64::from(index) + 0.5) * TILE;
     Pose::new(middle(column), middle(row), 0.0)
-}
-
-/// What is around the vehicle of a map that is larger, in a submap with room for `ROOM` points.
-#[derive(Clone, Debug, Default)]
-pub struct Surroundings<const ROOM: usize = 6144> {
-    submap: Submap<ROOM>,
-    place: Option<(i16, i16)>,
-}
-
-/// The submap is loaded anew where the vehicle has come so far out of the tile in whose middle it stands, m.
-const OUTSIDE: f64 = LARGEST_REACH as f64;
-
-impl<const ROOM: usize> Surroundings<ROOM> {
-    /// Nothing is loaded.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { submap: Submap::new(), place: None }
-    }
-
-    /// The map has been replaced.
-    pub const fn forget(&mut self) {
-        self.place = None;
-    }
-
-    /// The surfaces of key scans around a pose, instead of those of a map.
-    pub fn of_keys<const KEYS: usize, const POINTS: usize>(&mut self, pose: &Pose, keys: &KeyRing<KEYS, POINTS>) {
-        self.place = None;
-        self.submap.surround(pose, keys);
-    }
-
-    /// The surfaces that were loaded last.
-    #[must_use]
-    pub const fn loaded(&self) -> &Submap<ROOM> {
-        &self.submap
-    }
-
-    /// The surfaces of the map around a pose.
-    pub fn around(&mut self, map: &KeptMap, pose: &Pose) -> &Submap<ROOM> {
-        let from = self.submap.origin();
-        let reach = 0.5 * TILE + OUTSIDE;
-        let is_inside = libm::fabs(pose.x - from.x) < reach && libm::fabs(pose.y - from.y) < reach;
-        let wanted = Tile::place_of(pose.x, pose.y);
-        if (self.place.is_none() || !is_inside)
-            && let Some(place) = wanted
-        {
-            map.load(place, &mut self.submap);
-            self.place = wanted;
-        }
-        &self.submap
-    }
 }

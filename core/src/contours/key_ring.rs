@@ -27,7 +27,7 @@ const TURN: f64 = 20.0 * core::f64::consts::PI / 180.0;
 /// The last `KEYS` key scans of at most `POINTS` points.
 #[derive(Clone, Debug)]
 pub struct KeyRing<const KEYS: usize, const POINTS: usize> {
-    keys: [KeyScan<POINTS>; KEYS],
+    keys: Vec<KeyScan<POINTS>, KEYS>,
     /// Number of key scans that were made.
     made: usize,
 }
@@ -35,8 +35,9 @@ pub struct KeyRing<const KEYS: usize, const POINTS: usize> {
 impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
     /// No key scans; never any if there is no room for one.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
-        Self { keys: [const { KeyScan::EMPTY }; KEYS], made: 0 }
+        Self { keys: Vec::new(), made: 0 }
     }
 
     /// Forgets all.
@@ -67,7 +68,11 @@ impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
 
     /// Keeps a scan in place of the oldest.
     pub fn keep(&mut self, pose: &Pose, points: &[SurfacePoint]) {
-        let Some(key) = self.made.checked_rem(KEYS).and_then(|place| self.keys.get_mut(place)) else { return };
+        let Some(place) = self.made.checked_rem(KEYS) else { return };
+        if place >= self.keys.len() && self.keys.push(KeyScan::EMPTY).is_err() {
+            return;
+        }
+        let Some(key) = self.keys.get_mut(place) else { return };
         key.pose = *pose;
         key.points.clear();
         key.points.extend(points.iter().filter_map(PackedPoint::of).take(POINTS));

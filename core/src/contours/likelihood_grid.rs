@@ -1,5 +1,7 @@
 //! How near surfaces are, in two bits for each cell of a square: what the search looks up.
 
+use heapless::Vec;
+
 use crate::geometry::ScanPoint;
 
 /// Size of a cell, m.
@@ -20,19 +22,23 @@ const STAMP: [[u8; 5]; 5] = [[0, 1, 1, 1, 0], [1, 1, 2, 1, 1], [1, 2, 3, 2, 1], 
 /// A grid around the origin of its frame.
 #[derive(Clone, Debug)]
 pub struct LikelihoodGrid {
-    cells: [u8; BYTES],
+    /// Nothing before the grid is cleared for the first time: what would be built here would be built on the stack.
+    cells: Vec<u8, BYTES>,
 }
 
 impl LikelihoodGrid {
-    /// Nothing is near.
+    /// Nothing is near; it is to be cleared before something is added.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
-        Self { cells: [0; BYTES] }
+        Self { cells: Vec::new() }
     }
 
     /// Forgets all.
     pub fn clear(&mut self) {
         self.cells.fill(0);
+        // As many as there is room for.
+        let _ = self.cells.resize(BYTES, 0);
     }
 
     /// Column and row of a point, m; outside of the grid they are negative or too large.

@@ -5,6 +5,7 @@
 
 mod correlative_search;
 mod kept_map;
+mod kept_point;
 mod key_ring;
 mod likelihood_grid;
 mod matcher;
@@ -14,9 +15,12 @@ mod refinement;
 mod submap;
 mod surface_point;
 mod surface_points;
+mod surroundings;
+mod tile;
 
 pub use correlative_search::{SearchResult, SearchWindow, search};
-pub use kept_map::{KeptMap, KeptMapError, KeptPoint, Surroundings, TILE, Tile};
+pub use kept_map::{KeptMap, KeptMapError};
+pub use kept_point::KeptPoint;
 pub use key_ring::{KeyRing, KeyScan};
 pub use likelihood_grid::LikelihoodGrid;
 pub use matcher::{ContourMatch, ContourMatcher, align, align_nearby};
@@ -27,3 +31,5 @@ pub use refinement::{Refinement, refine};
 pub use submap::{LARGEST_REACH, Submap};
 pub use surface_point::{PackedPoint, SurfacePoint};
 pub use surface_points::find_surface_points;
+pub use surroundings::Surroundings;
+pub use tile::{TILE, Tile};

@@ -34,20 +34,22 @@ pub struct Submap<const ROOM: usize> {
     /// Where its frame is.
     origin: Pose,
     entries: Vec<Entry, ROOM>,
-    first: [[u16; SIDE]; SIDE],
+    /// Nothing before the submap is begun for the first time: what would be built here would be built on the stack.
+    first: Vec<[u16; SIDE], SIDE>,
     grid: LikelihoodGrid,
     has_cut: bool,
 }
 
 impl<const ROOM: usize> Submap<ROOM> {
-    /// Nothing around.
+    /// Nothing around; it is to be begun before something is added.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
         const { assert!(ROOM < NONE as usize) };
         Self {
             origin: Pose { x: 0.0, y: 0.0, theta: 0.0 },
             entries: Vec::new(),
-            first: [[NONE; SIDE]; SIDE],
+            first: Vec::new(),
             grid: LikelihoodGrid::new(),
             has_cut: false,
         }
@@ -57,7 +59,9 @@ impl<const ROOM: usize> Submap<ROOM> {
     pub fn begin(&mut self, place: &Pose) {
         self.origin = Pose { theta: 0.0, ..*place };
         self.entries.clear();
-        self.first = [[NONE; SIDE]; SIDE];
+        self.first.fill([NONE; SIDE]);
+        // As many as there is room for.
+        let _ = self.first.resize(SIDE, [NONE; SIDE]);
         self.grid.clear();
         self.has_cut = false;
     }

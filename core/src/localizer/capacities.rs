@@ -63,8 +63,8 @@ pub type ContourCapacities<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, 
 /// The same without contours.
 pub type SlamCapacities = CapacitiesOf<1440, 1000, 1000, 256>;
 
-/// The same with a map that is lent for `'m`.
-pub type SlamWithLentMap<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, NoContours, Lent<'m>>;
+/// The room for everything, with maps that are lent for `'m`.
+pub type LentCapacities<'m> = CapacitiesOf<1440, 1000, 1000, 256, SlamSlots, Contours<'m>, Lent<'m>>;
 
 /// The same without contours and without a map in the state: [`super::Parameters::maps`] must not ask for one.
 pub type VehicleCapacities = CapacitiesOf<1440, 1000, 1000, 256, NoSlots>;

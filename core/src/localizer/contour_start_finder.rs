@@ -47,6 +47,7 @@ pub struct ContourStartFinder<P: FindPlaces> {
 impl<P: FindPlaces> ContourStartFinder<P> {
     /// A finder that has seen nothing.
     #[must_use]
+    #[inline(always)]
     pub fn new(parameters: Parameters) -> Self {
         Self { odometry: StartOdometry::new(&parameters), places: P::new(), begun: None, last: None, parameters }
     }
@@ -96,9 +97,9 @@ impl<P: FindPlaces> ContourStartFinder<P> {
 
     /// Goes on with the search that is under way, if one is, until about `effort` is spent: see
     /// [`crate::contours::PlaceSearch::advance`].
-    pub fn search(&mut self, map: &P::Map, effort: u32) -> StartState {
+    pub fn search(&mut self, map: &P::Map, room: &mut P::Room, effort: u32) -> StartState {
         let Some((odometry, laser)) = self.begun else { return StartState::Waiting };
-        let answer = match self.places.advance(map, effort) {
+        let answer = match self.places.advance(map, room, effort) {
             PlaceProgress::Searching => return StartState::Searching,
             PlaceProgress::Done(answer) => answer,
         };

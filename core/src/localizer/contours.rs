@@ -1,11 +1,14 @@
 //! Correcting the pose by the contours of a kept map: a scan is used as a whole, at the time of its middle.
 
-use super::{Capacities, Localizer};
+use super::{Capacities, ContourSearch, Localizer};
+use crate::contours::KeptMapError;
 use crate::filter::{Ekf, PoseObservation};
 use crate::geometry::Pose;
-use crate::maps::Verdict;
+use crate::maps::{MapView, Verdict};
 use crate::measurement::{LaserId, Scan, Time};
-use crate::sources::{ContourOutcome, FindContours, FindFeatures, LaserPlace, ScanBehind, see_contours};
+use crate::sources::{
+    ContourOutcome, FindContours, FindFeatures, LandmarkMaps, LaserPlace, LendContours, ScanBehind, see_contours,
+};
 
 /// While reflectors have the position as well as this, m, contours do not correct it.
 const BY_REFLECTORS: f64 = 0.02;
@@ -25,6 +28,21 @@ pub(super) enum ContourCorrection {
     Told { time: Time, seen: PoseObservation },
 }
 
+impl<'m, C: Capacities> Localizer<C>
+where
+    C::Contours: LendContours<'m>,
+{
+    /// Takes bytes as the map of contours instead of the one before, also while the vehicle drives. They stay where they are.
+    ///
+    /// # Errors
+    /// See [`KeptMapError`]; the map is as before then.
+    pub fn lend_contours(&mut self, bytes: &'m [u8]) -> Result<(), KeptMapError> {
+        self.contours.lend(bytes)?;
+        self.slam.forget_way_behind();
+        Ok(())
+    }
+}
+
 impl<C: Capacities> Localizer<C> {
     /// Takes another map of contours, or none; also while the vehicle drives.
     pub fn set_contours(&mut self, map: Option<<C::Contours as FindContours>::Map>) {
@@ -36,6 +54,13 @@ impl<C: Capacities> Localizer<C> {
     #[must_use]
     pub fn contours(&self) -> Option<<C::Contours as FindContours>::Map> {
         self.contours.map().filter(|_| self.parameters.sources.contours)
+    }
+
+    /// What a search for a start goes through: the reflectors, and the map of contours, if scans are compared with one. It is for a
+    /// localiser that is lost or has no pose.
+    pub fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, C::Contours>) {
+        let contours = if self.parameters.sources.contours { self.contours.for_search() } else { None };
+        (self.maps.reflectors(), contours)
     }
 
     /// Whether scans are compared with a map of contours.
@@ -61,6 +86,9 @@ impl<C: Capacities> Localizer<C> {
 
     /// The same with landmarks in the state, where the filter stands; `place` is where the laser was then in the frame of the points.
     pub(super) fn fuse_contours_by_slam(&mut self, mount: &Pose, place: &Pose, laser: LaserId) {
+        if self.lost.is_some() {
+            return;
+        }
         let (time, state) = (self.slam.time(), self.slam.state());
         let outcome = self.see_contours(time, &mount.compose(&place.inverse()), &state);
         let is_used = outcome.wanted().is_some_and(|seen| seen.apply(self.slam.parts().0));

@@ -8,7 +8,7 @@ use crate::geometry::{Pose, wrap};
 use crate::integrity::{Estimate, Replacement};
 use crate::maps::Verdict;
 use crate::odometry::{Coasting, Motion};
-use crate::sources::LandmarkMaps;
+use crate::sources::{FindContours, LandmarkMaps};
 
 impl<C: Capacities> Localizer<C> {
     #[inline(never)]
@@ -46,6 +46,8 @@ impl<C: Capacities> Localizer<C> {
         if let Some(gyro) = &mut self.gyro {
             gyro.begin_pose();
         }
+        // Whoever has searched for it may have used the room of what was loaded.
+        self.contours.load_anew();
         self.lost = None;
         self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
         if !is_past {

@@ -3,7 +3,11 @@
 use super::{Event, Outputs};
 use crate::maps::MapView;
 use crate::odometry::{GyroErrors, OdometryBias};
-use crate::sources::FindContours;
+use crate::sources::{FindContours, FindPlaces};
+
+/// The map of contours as a search has it, and its room.
+pub type ContourSearch<'a, C> =
+    Option<(<C as FindContours>::Map, &'a mut <<C as FindContours>::Places as FindPlaces>::Room)>;
 
 /// What a controller wants of its localiser, whatever the localiser has room for.
 pub trait Localize {
@@ -28,8 +32,8 @@ pub trait Localize {
     /// See [`super::Localizer::features`].
     fn features(&self) -> MapView<'_>;
 
-    /// See [`super::Localizer::contours`].
-    fn contours(&self) -> Option<<Self::Contours as FindContours>::Map>;
+    /// See [`super::Localizer::for_search`].
+    fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, Self::Contours>);
 }
 
 impl<L: Localize> Localize for &mut L {
@@ -59,7 +63,7 @@ impl<L: Localize> Localize for &mut L {
         (**self).features()
     }
 
-    fn contours(&self) -> Option<<Self::Contours as FindContours>::Map> {
-        (**self).contours()
+    fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, L::Contours>) {
+        (**self).for_search()
     }
 }

@@ -8,8 +8,8 @@ use super::slam::Slam;
 use super::supervisor::{Support, remark_on_motion, supervise};
 use super::travel::Outage;
 use super::{
-    Capacities, ContourCapacities, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseOutput, Reason,
-    StatedCapacities,
+    Capacities, ContourCapacities, ContourSearch, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseOutput,
+    Reason, StatedCapacities,
 };
 use crate::filter::Timeline;
 use crate::geometry::{Point, Pose};
@@ -497,8 +497,8 @@ impl<C: Capacities> Localize for Localizer<C> {
         self.features()
     }
 
-    fn contours(&self) -> Option<<C::Contours as FindContours>::Map> {
-        self.contours()
+    fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, C::Contours>) {
+        self.for_search()
     }
 }
 

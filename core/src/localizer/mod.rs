@@ -28,13 +28,13 @@ mod travel;
 
 pub use bounds::{ParameterError, bounds};
 pub use capacities::{
-    Capacities, CapacitiesOf, ContourCapacities, SlamCapacities, SlamSlots, SlamWithLentMap, StatedCapacities,
+    Capacities, CapacitiesOf, ContourCapacities, LentCapacities, SlamCapacities, SlamSlots, StatedCapacities,
     VehicleCapacities, VehicleWithContours,
 };
 pub use contour_start_finder::ContourStartFinder;
 pub use event::{AnyEvent, AsReflectors, AsScan, Event, kind};
 pub use lasers::Lasers;
-pub use localize::Localize;
+pub use localize::{ContourSearch, Localize};
 pub use machine::Localizer;
 pub use output::{Misuse, OBSERVATIONS, Outputs};
 pub use output_predictor::OutputPredictor;

@@ -60,6 +60,7 @@ pub struct StartFinder<const SEEN: usize = 64> {
 impl<const SEEN: usize> StartFinder<SEEN> {
     /// A finder that has seen nothing, and believes what it finds by that rule.
     #[must_use]
+    #[inline(always)]
     pub fn new(parameters: Parameters, search: RelocalizationParameters, rule: StartRule) -> Self {
         Self {
             odometry: StartOdometry::new(&parameters),

@@ -27,6 +27,7 @@ pub const CONTOUR_EFFORT_A_REVOLUTION: u32 = 2_400_000;
 pub struct StartSearch<P: FindPlaces = NoPlaces> {
     finder: StartFinder,
     index: ReflectorIndex<WORDS>,
+    has_index: bool,
     is_wanted: bool,
     /// What is left of the effort of this revolution.
     left: u32,
@@ -44,6 +45,7 @@ impl<P: FindPlaces> StartSearch<P> {
         Self {
             finder: StartFinder::new(*parameters, RelocalizationParameters::default(), StartRule::default()),
             index: ReflectorIndex::new(),
+            has_index: false,
             is_wanted,
             left: 0,
             contours: ContourStartFinder::new(*parameters),
@@ -52,13 +54,9 @@ impl<P: FindPlaces> StartSearch<P> {
         }
     }
 
-    /// Makes ready for the reflectors that the localiser has.
-    pub fn index(&mut self, reflectors: MapView) {
-        self.index.build(reflectors);
-    }
-
-    /// The localiser has another map of contours.
-    pub fn forget_contours(&mut self) {
+    /// The localiser has other maps.
+    pub fn forget_maps(&mut self) {
+        self.has_index = false;
         self.contours.forget_map();
     }
 
@@ -72,6 +70,10 @@ impl<P: FindPlaces> StartSearch<P> {
     pub fn handle(&mut self, event: &Event, mode: Mode, reflectors: MapView) {
         let is_lost = matches!(mode, Mode::NotLocalised | Mode::Lost);
         if self.is_wanted && is_lost {
+            if !self.has_index {
+                self.index.build(reflectors);
+                self.has_index = true;
+            }
             let reflectors = self.index.of(reflectors);
             self.finder.handle(event, &reflectors);
             if matches!(event, Event::Reflectors(_) | Event::Scan(_)) {
@@ -83,16 +85,29 @@ impl<P: FindPlaces> StartSearch<P> {
                     self.contours_left = CONTOUR_EFFORT_A_REVOLUTION;
                 }
             }
-        } else if self.state != Relocalization::Idle {
-            self.finder.forget();
-            self.contours.forget();
-            self.state = Relocalization::Idle;
+        } else {
+            (self.left, self.contours_left) = (0, 0);
+            if self.state != Relocalization::Idle {
+                self.finder.forget();
+                self.contours.forget();
+                self.state = Relocalization::Idle;
+            }
         }
     }
 
+    /// Whether effort is left for the present revolution.
+    #[must_use]
+    pub const fn has_time(&self) -> bool {
+        self.left > 0 || self.contours_left > 0
+    }
+
     /// Searches for a while. Whether there is more to do, and the pose if it is found. The map of contours, if there is one, is looked at
-    /// where the reflectors have not told it.
-    pub fn advance(&mut self, reflectors: MapView, contours: Option<&P::Map>) -> (bool, Option<PoseFix>) {
+    /// where the reflectors have not told it, with the room that is lent for it.
+    pub fn advance(
+        &mut self,
+        reflectors: MapView,
+        contours: Option<(P::Map, &mut P::Room)>,
+    ) -> (bool, Option<PoseFix>) {
         let has_reflectors = !reflectors.landmarks().is_empty();
         if has_reflectors || contours.is_none() {
             let (is_busy, found) = self.advance_among_reflectors(reflectors);
@@ -101,7 +116,7 @@ impl<P: FindPlaces> StartSearch<P> {
             }
         }
         match contours {
-            Some(map) => self.advance_among_contours(map, !has_reflectors),
+            Some((map, room)) => self.advance_among_contours(&map, room, !has_reflectors),
             None => (false, None),
         }
     }
@@ -121,12 +136,12 @@ impl<P: FindPlaces> StartSearch<P> {
     }
 
     /// What contours say is told unless reflectors are there to tell it.
-    fn advance_among_contours(&mut self, map: &P::Map, is_told: bool) -> (bool, Option<PoseFix>) {
+    fn advance_among_contours(&mut self, map: &P::Map, room: &mut P::Room, is_told: bool) -> (bool, Option<PoseFix>) {
         if self.contours_left == 0 {
             return (false, None);
         }
         self.contours_left = self.contours_left.saturating_sub(CONTOUR_SLICE);
-        let state = self.contours.search(map, CONTOUR_SLICE);
+        let state = self.contours.search(map, room, CONTOUR_SLICE);
         if is_told {
             self.state = told(&state, self.state);
         }

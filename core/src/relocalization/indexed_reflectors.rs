@@ -30,6 +30,7 @@ impl<const WORDS: usize> Default for ReflectorIndex<WORDS> {
 impl<const WORDS: usize> ReflectorIndex<WORDS> {
     /// The index of an empty map.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
         Self { origin: Point::new(0.0, 0.0), occupancy: Occupancy::new(), distances: DistanceHistogram::new() }
     }

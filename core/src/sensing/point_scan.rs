@@ -38,6 +38,7 @@ pub struct PointView<'a> {
 impl<const BEAMS: usize> PointScan<BEAMS> {
     /// An empty scan.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
         Self {
             points: Vec::new(),

@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::places::{FindPlaces, NoPlaces, Places};
 use crate::contours::{
-    ContourMatch, KeptMap, KeyRing, Prediction, SurfacePoint, Surroundings, align, align_nearby, find_surface_points,
+    ContourMatch, KeptMap, KeptMapError, KeyRing, Prediction, Submap, SurfacePoint, Surroundings, align, align_nearby,
+    find_surface_points,
 };
 use crate::filter::{Ekf, PoseObservation};
 use crate::geometry::Pose;
@@ -54,6 +55,30 @@ pub struct Contours<'m, const POINTS: usize = 400, const ROOM: usize = 6144, con
 #[derive(Clone, Copy, Debug)]
 pub struct NoContours;
 
+/// Who takes a map of contours as the bytes of somebody else, for `'m`.
+pub trait LendContours<'m>: FindContours {
+    /// Takes bytes as the map, instead of the one before.
+    ///
+    /// # Errors
+    /// See [`KeptMapError`]; the map is as before then.
+    fn lend(&mut self, bytes: &'m [u8]) -> Result<(), KeptMapError>;
+}
+
+impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> LendContours<'m>
+    for Contours<'m, POINTS, ROOM, KEYS>
+{
+    fn lend(&mut self, bytes: &'m [u8]) -> Result<(), KeptMapError> {
+        self.set_map(Some(KeptMap::read(bytes)?));
+        Ok(())
+    }
+}
+
+impl<'m> LendContours<'m> for NoContours {
+    fn lend(&mut self, _: &'m [u8]) -> Result<(), KeptMapError> {
+        Err(KeptMapError::NoRoom)
+    }
+}
+
 /// [`Contours`] of any capacity, or none.
 pub trait FindContours: Clone + Debug {
     /// A map as it is lent.
@@ -81,6 +106,12 @@ pub trait FindContours: Clone + Debug {
     fn has_map(&self) -> bool {
         self.map().is_some()
     }
+
+    /// The map, and memory for who searches a start in it. What was loaded is loaded anew afterwards.
+    fn for_search(&mut self) -> Option<(Self::Map, &mut <Self::Places as FindPlaces>::Room)>;
+
+    /// What is around is loaded anew when the next scan is compared with the map.
+    fn load_anew(&mut self);
 
     /// Takes the points of a scan and finds where it was taken. None if the map says nothing of it.
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch>;
@@ -119,12 +150,20 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
 
     fn set_map(&mut self, map: Option<KeptMap<'m>>) {
         self.map = map;
-        self.surroundings.forget();
+        self.surroundings.load_anew();
         self.keys.clear();
     }
 
     fn map(&self) -> Option<KeptMap<'m>> {
         self.map
+    }
+
+    fn for_search(&mut self) -> Option<(KeptMap<'m>, &mut Submap<ROOM>)> {
+        Some((self.map?, self.surroundings.lend()))
+    }
+
+    fn load_anew(&mut self) {
+        self.surroundings.load_anew();
     }
 
     #[inline(never)]
@@ -181,6 +220,12 @@ impl FindContours for NoContours {
     fn map(&self) -> Option<Self::Map> {
         None
     }
+
+    fn for_search(&mut self) -> Option<(Self::Map, &mut Self::Map)> {
+        None
+    }
+
+    fn load_anew(&mut self) {}
 
     fn locate(&mut self, _: PointView<'_>, _: &Prediction) -> Option<ContourMatch> {
         None

@@ -22,7 +22,7 @@ mod status;
 
 pub use aid::{Aid, AidOutcome};
 pub use association::{AssociationParameters, MapUse};
-pub use contours::{Contours, FindContours, NoContours, pose_by_contours};
+pub use contours::{Contours, FindContours, LendContours, NoContours, pose_by_contours};
 pub use features::FeatureParameters;
 pub use gyro::{AtRest, GyroMotion, GyroSource, RestSum};
 pub use key_scans::KeyScanParameters;

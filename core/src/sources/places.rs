@@ -5,7 +5,7 @@ use core::fmt::Debug;
 use core::marker::PhantomData;
 
 use super::FeatureParameters;
-use crate::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch};
+use crate::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch, Submap};
 use crate::geometry::Pose;
 use crate::measurement::Scan;
 use crate::odometry::RecentMotion;
@@ -21,8 +21,8 @@ const PATH_STEPS: u32 = 8;
 #[derive(Clone, Debug)]
 pub struct Places<'m, const POINTS: usize, const ROOM: usize> {
     points: PointScan<BEAMS>,
-    search: PlaceSearch<POINTS, ROOM>,
-    map: PhantomData<KeptMap<'m>>,
+    search: PlaceSearch<POINTS>,
+    lent: PhantomData<(KeptMap<'m>, Submap<ROOM>)>,
 }
 
 /// A vehicle that searches no start in a map of contours.
@@ -33,6 +33,9 @@ pub struct NoPlaces;
 pub trait FindPlaces: Clone + Debug {
     /// A map as it is lent.
     type Map: Copy + Debug;
+
+    /// Memory for what is around a place, as it is lent.
+    type Room: Debug;
 
     /// Whether there is anything to search with.
     const IS_THERE: bool;
@@ -47,17 +50,18 @@ pub trait FindPlaces: Clone + Debug {
     fn begin(&mut self, scan: &Scan, mount: &Pose, motion: &RecentMotion, features: &FeatureParameters);
 
     /// Goes on until `effort` is spent: see [`PlaceSearch::advance`].
-    fn advance(&mut self, map: &Self::Map, effort: u32) -> PlaceProgress;
+    fn advance(&mut self, map: &Self::Map, room: &mut Self::Room, effort: u32) -> PlaceProgress;
 }
 
 impl<'m, const POINTS: usize, const ROOM: usize> FindPlaces for Places<'m, POINTS, ROOM> {
     type Map = KeptMap<'m>;
+    type Room = Submap<ROOM>;
 
     const IS_THERE: bool = true;
 
     #[inline(always)]
     fn new() -> Self {
-        Self { points: PointScan::new(), search: PlaceSearch::new(), map: PhantomData }
+        Self { points: PointScan::new(), search: PlaceSearch::new(), lent: PhantomData }
     }
 
     fn forget_map(&mut self) {
@@ -77,13 +81,14 @@ impl<'m, const POINTS: usize, const ROOM: usize> FindPlaces for Places<'m, POINT
         self.search.begin(self.points.view());
     }
 
-    fn advance(&mut self, map: &KeptMap<'m>, effort: u32) -> PlaceProgress {
-        self.search.advance(map, effort)
+    fn advance(&mut self, map: &KeptMap<'m>, room: &mut Submap<ROOM>, effort: u32) -> PlaceProgress {
+        self.search.advance(map, room, effort)
     }
 }
 
 impl FindPlaces for NoPlaces {
     type Map = Infallible;
+    type Room = Infallible;
 
     const IS_THERE: bool = false;
 
@@ -95,7 +100,7 @@ impl FindPlaces for NoPlaces {
 
     fn begin(&mut self, _: &Scan, _: &Pose, _: &RecentMotion, _: &FeatureParameters) {}
 
-    fn advance(&mut self, _: &Infallible, _: u32) -> PlaceProgress {
+    fn advance(&mut self, _: &Infallible, _: &mut Infallible, _: u32) -> PlaceProgress {
         PlaceProgress::Done(PlaceAnswer::Unknown)
     }
 }

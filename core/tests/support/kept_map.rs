@@ -18,10 +18,11 @@ pub fn kept_map(walls: &Walls, moved: &Pose) -> KeptMap<'static> {
         let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
         by_tile.entry(place).or_default().push(KeptPoint::of(&point));
     }
-    let (mut tiles, mut points) = (Vec::new(), Vec::new());
+    let (mut bytes, mut points) = (KeptMap::header(by_tile.len() as u32).to_vec(), Vec::new());
     for (place, found) in by_tile {
-        tiles.push(Tile { place, first: points.len() as u32, count: found.len() as u16 });
         points.extend(found);
+        bytes.extend(Tile { place, end: points.len() as u32 }.bytes());
     }
-    KeptMap::new(tiles.leak(), points.leak()).unwrap()
+    bytes.extend(points.iter().flat_map(KeptPoint::bytes));
+    KeptMap::read(bytes.leak()).unwrap()
 }

@@ -34,15 +34,14 @@ pub struct MapPoint {
     pub normal: Point,
 }
 
-/// A map in tiles, as the vehicle keeps it.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A map in tiles, in the bytes in which the vehicle keeps it.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContourMap {
-    tiles: Vec<Tile>,
-    points: Vec<KeptPoint>,
+    bytes: Vec<u8>,
 }
 
 impl ContourMap {
-    /// Puts points into tiles. Those beyond 131 km, and those of a tile with more than 65,535, are left out.
+    /// Puts points into tiles. Those beyond 131 km are left out.
     #[must_use]
     pub fn of(points: impl IntoIterator<Item = MapPoint>) -> Self {
         let mut by_tile: BTreeMap<(i16, i16), Vec<KeptPoint>> = BTreeMap::new();
@@ -52,51 +51,61 @@ impl ContourMap {
             let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
             by_tile.entry(place).or_default().push(KeptPoint::of(&point));
         }
-        let mut map = Self::default();
-        for (place, points) in by_tile {
-            let count = u16::try_from(points.len()).unwrap_or(u16::MAX);
-            map.tiles.push(Tile { place, first: map.points.len() as u32, count });
-            map.points.extend(points.into_iter().take(usize::from(count)));
+        let mut bytes = KeptMap::header(by_tile.len() as u32).to_vec();
+        let mut end = 0;
+        for (place, points) in &by_tile {
+            end += points.len() as u32;
+            bytes.extend(Tile { place: *place, end }.bytes());
         }
-        map
+        bytes.extend(by_tile.values().flatten().flat_map(KeptPoint::bytes));
+        Self { bytes }
+    }
+
+    /// Takes bytes of a vehicle.
+    ///
+    /// # Errors
+    /// See [`KeptMapError`].
+    pub fn of_bytes(bytes: Vec<u8>) -> Result<Self, KeptMapError> {
+        KeptMap::read(&bytes)?;
+        Ok(Self { bytes })
     }
 
     /// The map as the core uses it.
-    ///
-    /// # Errors
-    /// Never for a map that was made here.
-    pub fn view(&self) -> Result<KeptMap<'_>, KeptMapError> {
-        KeptMap::new(&self.tiles, &self.points)
+    #[must_use]
+    pub fn view(&self) -> KeptMap<'_> {
+        KeptMap::read(&self.bytes).unwrap_or(KeptMap::EMPTY)
     }
 
     /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.points.len()
+        self.view().len()
     }
 
     /// Whether it holds nothing.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
+        self.view().is_empty()
     }
 
-    /// How large it is in the vehicle: points, and eight bytes a tile.
+    /// What the vehicle keeps.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.points.len() * size_of::<KeptPoint>() + self.tiles.len() * 8
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// Its points in W.
     pub fn points(&self) -> impl Iterator<Item = MapPoint> {
-        self.tiles.iter().flat_map(|tile| {
-            let corner = Point::new(f64::from(tile.place.1), f64::from(tile.place.0)) * TILE;
-            let first = tile.first as usize;
-            self.points[first..first + usize::from(tile.count)].iter().map(move |point| {
-                let point = point.unpacked();
-                MapPoint { position: corner + point.position.cast::<f64>(), normal: point.normal.cast() }
-            })
+        self.view().surfaces().map(|(corner, point)| MapPoint {
+            position: corner + point.position.cast::<f64>(),
+            normal: point.normal.cast(),
         })
+    }
+}
+
+impl Default for ContourMap {
+    fn default() -> Self {
+        Self::of([])
     }
 }
 

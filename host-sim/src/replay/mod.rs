@@ -6,7 +6,7 @@ mod start_search;
 
 pub use comparison::{Comparison, Comparisons, compare};
 pub use publishing::compare_published;
-pub use start_search::{ContourFinder, StartSearchError, find_start, find_start_by_contours};
+pub use start_search::{ContourFinder, ContourRoom, StartSearchError, find_start, find_start_by_contours};
 
 use std::time::{Duration, Instant};
 

@@ -1,6 +1,6 @@
 //! Where a drive begins, found as the controller finds it: by the reflectors that are seen.
 
-use agv_core::contours::KeptMap;
+use agv_core::contours::{KeptMap, Submap};
 use agv_core::localizer::{ContourStartFinder, PoseFix, StartFinder, StartRule, StartState};
 use agv_core::maps::{FixedMap, Landmark, LandmarkKind, MapError};
 use agv_core::relocalization::{ReflectorIndex, RelocalizationParameters};
@@ -72,7 +72,13 @@ pub fn find_start(recording: &Recording) -> Result<(usize, PoseFix), StartSearch
 }
 
 /// What finds a start in a map of contours, of the capacities of the vehicle.
-pub type ContourFinder<'m> = ContourStartFinder<Places<'m, 400, 6144>>;
+pub type ContourFinder<'m> = ContourStartFinder<Places<'m, 400, CONTOUR_POINTS>>;
+
+/// The room that it needs.
+pub type ContourRoom = Submap<CONTOUR_POINTS>;
+
+/// Points around a place at the most.
+const CONTOUR_POINTS: usize = 6144;
 
 /// The same by a map of contours.
 ///
@@ -80,10 +86,11 @@ pub type ContourFinder<'m> = ContourStartFinder<Places<'m, 400, 6144>>;
 /// See [`StartSearchError`].
 pub fn find_start_by_contours(recording: &Recording, map: &KeptMap<'_>) -> Result<(usize, PoseFix), StartSearchError> {
     let mut finder = Box::new(ContourFinder::new(recording.parameters));
+    let mut room: Box<ContourRoom> = Box::default();
     let mut reason = StartSearchError::TooFew;
     for (number, event) in recording.events.iter().enumerate().filter(|(_, event)| !event.is_told()) {
         finder.handle(&event.view());
-        match finder.search(map, u32::MAX) {
+        match finder.search(map, &mut room, u32::MAX) {
             StartState::Found(fix) => return Ok((number, fix)),
             StartState::Ambiguous(..) => reason = StartSearchError::Ambiguous,
             StartState::Unknown => reason = StartSearchError::Unknown,

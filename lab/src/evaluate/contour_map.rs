@@ -195,7 +195,7 @@ fn localise_window(
     noise: &OdometryNoise,
 ) -> Result<Vec<PoseOutput>, ReplayError> {
     let recording = drive.recording((first, last), drive.steps((first, last)), noise);
-    let replay = replay_in(&recording, map.view().ok(), |_| {})?;
+    let replay = replay_in(&recording, Some(map.view()), |_| {})?;
     let is_scan = |(event, _): &(&RecordedEvent, &PoseOutput)| matches!(event, RecordedEvent::Scan(_));
     Ok(recording.events.iter().zip(&replay.poses).filter(is_scan).map(|(_, pose)| *pose).collect())
 }

@@ -83,7 +83,7 @@ impl Relocalisation {
             }
             (Some(By::Contours), _, _) => {
                 let map = contours.context("--relocalise contours: no map of contours is given (--map)")?;
-                let map = map.view().ok().context("the map of contours is damaged")?;
+                let map = map.view();
                 let (event, fix) =
                     find_start_by_contours(recording, &map).context("the vehicle does not find itself")?;
                 (event + 1, fix)

@@ -85,6 +85,7 @@ pub(super) struct BestPlaces {
 }
 
 impl BestPlaces {
+    #[inline(always)]
     pub(super) const fn new() -> Self {
         Self { places: Vec::new() }
     }

@@ -84,6 +84,7 @@ pub(super) struct CoarseSearch {
 }
 
 impl CoarseSearch {
+    #[inline(always)]
     pub(super) const fn new() -> Self {
         Self {
             sought: Vec::new(),

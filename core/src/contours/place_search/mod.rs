@@ -20,11 +20,11 @@ use range_profile::{InSight, RangeProfile};
 use settling::Settling;
 use support::{Support, Verdict};
 
-use super::kept_map::Loading;
+use super::kept_map::{Loading, corner};
 use super::matcher::weak_axis;
 use super::refinement::Refining;
 use super::{KeptMap, SearchResult, SearchWindow, Submap, SurfacePoint, TILE, find_surface_points, search};
-use crate::geometry::{Point, Pose, ScanPoint, Transform, wrap};
+use crate::geometry::{Pose, ScanPoint, Transform, wrap};
 use crate::sensing::PointView;
 
 /// Whether a search has ended.
@@ -113,16 +113,16 @@ enum Step {
     Answer,
 }
 
-/// Searches in maps of which `ROOM` points are around a place at the most, by `POINTS` points of a scan, with `CELLS` cells for all of the
-/// map.
+/// Searches by `POINTS` points of a scan, with `CELLS` cells for all of the map.
+///
+/// What is around a place is loaded into a submap that is lent to each step: nobody else may change it while a search is under way.
 #[derive(Clone, Debug)]
-pub struct PlaceSearch<const POINTS: usize = 400, const ROOM: usize = 6144, const CELLS: usize = 49_152> {
+pub struct PlaceSearch<const POINTS: usize = 400, const CELLS: usize = 49_152> {
     grid: PlaceGrid<CELLS>,
     has_grid: bool,
     points: Vec<SurfacePoint, POINTS>,
     profile: RangeProfile,
     coarse: CoarseSearch,
-    submap: Submap<ROOM>,
     step: Step,
     /// Places that have been looked at.
     done: [bool; PLACES],
@@ -135,9 +135,10 @@ pub struct PlaceSearch<const POINTS: usize = 400, const ROOM: usize = 6144, cons
     debt: u32,
 }
 
-impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POINTS, ROOM, CELLS> {
+impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
     /// A search with nothing to do.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
         Self {
             grid: PlaceGrid::new(),
@@ -145,7 +146,6 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
             points: Vec::new(),
             profile: RangeProfile::new(),
             coarse: CoarseSearch::new(),
-            submap: Submap::new(),
             step: Step::None,
             done: [false; PLACES],
             best: BestPlaces::new(),
@@ -179,7 +179,12 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
 
     /// Goes on until `effort` is spent: a point that is looked up is one, about 15 instructions. What the last step, of at most some
     /// thousand, takes beyond it is spent of the next call's.
-    pub fn advance(&mut self, map: &KeptMap, effort: u32) -> PlaceProgress {
+    pub fn advance<const ROOM: usize>(
+        &mut self,
+        map: &KeptMap,
+        submap: &mut Submap<ROOM>,
+        effort: u32,
+    ) -> PlaceProgress {
         let mut left = i64::from(effort) - i64::from(self.debt);
         self.debt = 0;
         while left > 0 {
@@ -189,13 +194,13 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
                     self.step = Step::None;
                     return PlaceProgress::Done(self.best.answer(self.coarse.is_crowded()));
                 }
-                Step::Mark { tile, point } => self.mark(map, (tile, point), &mut left),
+                Step::Mark { tile, point } => self.mark(map, submap, (tile, point), &mut left),
                 Step::Search if self.coarse.advance(&self.grid, &mut left) => Step::Search,
-                Step::Search | Step::Choose => self.choose(),
-                Step::Load(place, loading) => self.load(map, place, loading, &mut left),
-                Step::Turn { place, turn, best } => self.turn(place, turn, best, &mut left),
-                Step::Refine(place, refining) => self.refine(place, refining, &mut left),
-                Step::Look { fix, point, found } => self.look(&fix, point, found, &mut left),
+                Step::Search | Step::Choose => self.choose(submap),
+                Step::Load(place, loading) => self.load(map, submap, (place, loading), &mut left),
+                Step::Turn { place, turn, best } => self.turn(submap, place, (turn, best), &mut left),
+                Step::Refine(place, refining) => self.refine(submap, place, refining, &mut left),
+                Step::Look { fix, point, found } => self.look(submap, &fix, (point, found), &mut left),
                 Step::Settle { place, settling } => self.settle(map, place, settling, &mut left),
                 Step::Ask { place, is_across, support } => self.ask(map, (place, is_across), support, &mut left),
             };
@@ -205,18 +210,26 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
         PlaceProgress::Searching
     }
 
-    fn mark(&mut self, map: &KeptMap, (tile, point): (usize, usize), left: &mut i64) -> Step {
-        if (tile, point) == (0, 0) && !self.grid.begin(map) {
-            return Step::Answer;
+    fn mark<const ROOM: usize>(
+        &mut self,
+        map: &KeptMap,
+        submap: &mut Submap<ROOM>,
+        (tile, point): (usize, usize),
+        left: &mut i64,
+    ) -> Step {
+        if (tile, point) == (0, 0) {
+            // What is in it may be of another map.
+            submap.begin(&Pose::default());
+            if !self.grid.begin(map) {
+                return Step::Answer;
+            }
         }
-        let Some(at) = map.tiles().get(tile) else {
+        let Some(place) = map.place(tile) else {
             self.has_grid = true;
             return Step::Search;
         };
-        let corner = Point::new(f64::from(at.place.1), f64::from(at.place.0)) * TILE;
-        let points = map.points_of(at);
-        for kept in points.iter().skip(point).take(POINTS_A_STEP) {
-            let surface = kept.unpacked();
+        let (corner, points) = (corner(place), map.points_of(tile));
+        for surface in points.some(point, POINTS_A_STEP) {
             self.grid.add(&(corner + surface.position.cast::<f64>()), &surface);
         }
         *left -= MARK_EFFORT;
@@ -225,11 +238,11 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
     }
 
     /// The next place: one that is within what is loaded, or else the best.
-    fn choose(&mut self) -> Step {
-        let origin = *self.submap.origin();
+    fn choose<const ROOM: usize>(&mut self, submap: &mut Submap<ROOM>) -> Step {
+        let origin = *submap.origin();
         let is_loaded = |place: &Place| {
             let apart = place.pose.position() - origin.position();
-            !self.submap.is_empty() && apart.amax() < TILE
+            !submap.is_empty() && apart.amax() < TILE
         };
         let mut open = self.coarse.places().iter().zip(self.done).enumerate().filter(|(_, (_, is_done))| !is_done);
         let first = open.clone().next();
@@ -240,45 +253,57 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
             *done = true;
         }
         if loaded.is_some() {
-            return self.first_turn(number);
+            return self.first_turn(submap, number);
         }
-        match Loading::begin(place.pose.x, place.pose.y, &mut self.submap) {
+        match Loading::begin(place.pose.x, place.pose.y, submap) {
             Some(loading) => Step::Load(number, loading),
             None => Step::Choose,
         }
     }
 
-    fn load(&mut self, map: &KeptMap, place: usize, mut loading: Loading, left: &mut i64) -> Step {
+    fn load<const ROOM: usize>(
+        &mut self,
+        map: &KeptMap,
+        submap: &mut Submap<ROOM>,
+        (place, mut loading): (usize, Loading),
+        left: &mut i64,
+    ) -> Step {
         *left -= LOAD_EFFORT;
-        if loading.step(map, POINTS_A_STEP, &mut self.submap) {
+        if loading.step(map, POINTS_A_STEP, submap) {
             Step::Load(place, loading)
         } else {
-            self.first_turn(place)
+            self.first_turn(submap, place)
         }
     }
 
-    fn first_turn(&self, place: usize) -> Step {
+    fn first_turn<const ROOM: usize>(&self, submap: &Submap<ROOM>, place: usize) -> Step {
         match self.coarse.places().get(place) {
             Some(found) => {
-                let best = SearchResult { pose: self.submap.origin().between(&found.pose), score: -1.0 };
+                let best = SearchResult { pose: submap.origin().between(&found.pose), score: -1.0 };
                 Step::Turn { place, turn: -TURNS, best }
             }
             None => Step::Choose,
         }
     }
 
-    fn turn(&mut self, place: usize, turn: i32, best: SearchResult, left: &mut i64) -> Step {
+    fn turn<const ROOM: usize>(
+        &mut self,
+        submap: &Submap<ROOM>,
+        place: usize,
+        (turn, best): (i32, SearchResult),
+        left: &mut i64,
+    ) -> Step {
         let Some(found) = self.coarse.places().get(place) else { return Step::Choose };
         *left -= TURN_EFFORT;
-        let around = self.submap.origin().between(&found.pose);
+        let around = submap.origin().between(&found.pose);
         let around = Pose { theta: wrap(around.theta + f64::from(turn) * TURN), ..around };
-        let result = search(&self.points, self.submap.grid(), &around, &WINDOW);
+        let result = search(&self.points, submap.grid(), &around, &WINDOW);
         let best = if result.score > best.score { result } else { best };
         if turn < TURNS {
             return Step::Turn { place, turn: turn + 1, best };
         }
         // What is beyond the reach of the grid is not found in it.
-        let reached = self.reached(&best.pose).filter(|is_reached| *is_reached).count();
+        let reached = self.reached::<ROOM>(&best.pose).filter(|is_reached| *is_reached).count();
         let score = best.score * self.points.len() as f32 / reached.max(1) as f32;
         if reached < FEWEST || score < PROMISING * self.score {
             return Step::Choose;
@@ -288,25 +313,31 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
     }
 
     /// Whether the points of the scan are within the reach of the submap, in whose frame it is at a pose.
-    fn reached(&self, pose: &Pose) -> impl Iterator<Item = bool> {
+    fn reached<const ROOM: usize>(&self, pose: &Pose) -> impl Iterator<Item = bool> {
         let transform = Transform::of(pose);
         self.points.iter().map(move |point| Submap::<ROOM>::reaches(&transform.apply(&point.position)))
     }
 
     /// Points further away that have surfaces near.
-    fn far_hits(&self, pose: &Pose) -> usize {
-        let in_map = self.submap.origin().compose(pose);
-        let far = self.points.iter().zip(self.reached(pose)).filter(|(_, is_reached)| !is_reached);
+    fn far_hits<const ROOM: usize>(&self, submap: &Submap<ROOM>, pose: &Pose) -> usize {
+        let in_map = submap.origin().compose(pose);
+        let far = self.points.iter().zip(self.reached::<ROOM>(pose)).filter(|(_, is_reached)| !is_reached);
         far.filter(|(point, _)| self.grid.is_near(&in_map.transform(&point.position.cast()))).count()
     }
 
-    fn refine(&mut self, place: usize, mut refining: Refining, left: &mut i64) -> Step {
+    fn refine<const ROOM: usize>(
+        &mut self,
+        submap: &Submap<ROOM>,
+        place: usize,
+        mut refining: Refining,
+        left: &mut i64,
+    ) -> Step {
         *left -= REFINE_EFFORT;
-        if refining.step(&self.points, &self.submap) {
+        if refining.step(&self.points, submap) {
             return Step::Refine(place, refining);
         }
         let Some(found) = refining.outcome() else { return Step::Choose };
-        let on_surfaces = found.inliers as usize + self.far_hits(&found.pose);
+        let on_surfaces = found.inliers as usize + self.far_hits(submap, &found.pose);
         let share = (on_surfaces as f32 / self.points.len().max(1) as f32).min(1.0);
         if share < LEAST_SHARE {
             return Step::Choose;
@@ -316,11 +347,17 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
         Step::Look { fix, point: 0, found: InSight::default() }
     }
 
-    fn look(&mut self, fix: &PlaceFix, point: usize, mut found: InSight, left: &mut i64) -> Step {
+    fn look<const ROOM: usize>(
+        &mut self,
+        submap: &Submap<ROOM>,
+        fix: &PlaceFix,
+        (point, mut found): (usize, InSight),
+        left: &mut i64,
+    ) -> Step {
         *left -= LOOK_EFFORT;
         let to_laser = Transform::of(&fix.pose.inverse());
         let mut seen = 0;
-        for surface in self.submap.points(point, POINTS_A_STEP) {
+        for surface in submap.points(point, POINTS_A_STEP) {
             self.profile.look(&surface, &to_laser, &mut found);
             seen += 1;
         }
@@ -328,7 +365,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
             return Step::Look { fix: *fix, point: point + seen, found };
         }
         if found.share() >= LEAST_SHOWN {
-            let pose = self.submap.origin().compose(&fix.pose);
+            let pose = submap.origin().compose(&fix.pose);
             self.best.keep(PlaceFix { pose, shown: found.share(), ..*fix });
         }
         Step::Choose
@@ -404,7 +441,7 @@ impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> PlaceSearch<POI
     }
 }
 
-impl<const POINTS: usize, const ROOM: usize, const CELLS: usize> Default for PlaceSearch<POINTS, ROOM, CELLS> {
+impl<const POINTS: usize, const CELLS: usize> Default for PlaceSearch<POINTS, CELLS> {
     fn default() -> Self {
         Self::new()
     }

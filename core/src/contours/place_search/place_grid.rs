@@ -72,6 +72,7 @@ pub(super) struct PlaceGrid<const CELLS: usize> {
 }
 
 impl<const CELLS: usize> PlaceGrid<CELLS> {
+    #[inline(always)]
     pub(super) const fn new() -> Self {
         let area = Area { columns: 0, rows: 0, first: 0 };
         Self { corner: Point::new(0.0, 0.0), cell: SMALLEST_CELL, areas: [area; LEVELS], cells: [0; CELLS] }
@@ -81,11 +82,11 @@ impl<const CELLS: usize> PlaceGrid<CELLS> {
     pub(super) fn begin(&mut self, map: &KeptMap) -> bool {
         self.cells.fill(0);
         self.areas = [Area::default(); LEVELS];
-        let Some(first) = map.tiles().first() else { return false };
-        let (mut low, mut high) = (first.place, first.place);
-        for tile in map.tiles() {
-            low = (low.0.min(tile.place.0), low.1.min(tile.place.1));
-            high = (high.0.max(tile.place.0), high.1.max(tile.place.1));
+        let Some(first) = map.place(0) else { return false };
+        let (mut low, mut high) = (first, first);
+        for (row, column) in map.places() {
+            low = (low.0.min(row), low.1.min(column));
+            high = (high.0.max(row), high.1.max(column));
         }
         self.corner = Point::new(f64::from(low.1), f64::from(low.0)) * TILE;
         let side = |low: i16, high: i16| (f64::from(high) - f64::from(low) + 1.0) * TILE;

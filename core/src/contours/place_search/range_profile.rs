@@ -42,6 +42,7 @@ impl InSight {
 }
 
 impl RangeProfile {
+    #[inline(always)]
     pub(super) const fn new() -> Self {
         Self { directions: [(f32::INFINITY, 0.0); DIRECTIONS] }
     }

@@ -175,7 +175,7 @@ fn drive(kind: SiteKind, moved_share: f64, seconds: f64, seed: u64) -> Result<Ve
     let truth = way(&now, seconds, INTERVAL, &mut Random::new(seed, Stream::Start));
     let caster = RayCaster::new(&now.world());
     let recording = recording(&truth, &caster, seed);
-    let replay = replay_in(&recording, kept.view().ok(), |_| {})?;
+    let replay = replay_in(&recording, Some(kept.view()), |_| {})?;
     let unmoved = RayCaster::new(&site.in_common(&now).world());
     let is_determined: Vec<bool> = truth
         .iter()

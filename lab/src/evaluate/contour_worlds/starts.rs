@@ -9,7 +9,7 @@ use agv_core::odometry::Vehicle;
 use agv_host_sim::accuracy::Spread;
 use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::recording::RecordedScan;
-use agv_host_sim::replay::ContourFinder;
+use agv_host_sim::replay::{ContourFinder, ContourRoom};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::raycast::RayCaster;
 use rayon::prelude::*;
@@ -130,11 +130,13 @@ fn in_world(kind: SiteKind, moved_share: f64, seed: u64, count: u64, done: &(imp
     let now = site.changed(moved_share, seed);
     let caster = RayCaster::new(&now.world());
     let mut finder = Box::new(ContourFinder::new(Parameters::new(Vehicle::Increments, Pose::default())));
+    let mut room: Box<ContourRoom> = Box::default();
     (0..count)
         .map(|number| {
             let truth = now.free_pose(&mut random);
             let look = |time: Time, random: &mut Random| scan(&caster, &truth, time, random);
-            let (said, seconds, effort) = switch_on(&mut finder, &kept, &truth, &overlap, look, &mut random);
+            let (said, seconds, effort) =
+                switch_on((&mut finder, &mut room), &kept, &truth, &overlap, look, &mut random);
             done();
             Start { name: (seed, number), said, seconds, effort }
         })
@@ -143,14 +145,14 @@ fn in_world(kind: SiteKind, moved_share: f64, seed: u64, count: u64, done: &(imp
 
 /// What the vehicle says that stands at `truth`, when, s, and with which effort.
 fn switch_on<'m>(
-    finder: &mut ContourFinder<'m>,
+    (finder, room): (&mut ContourFinder<'m>, &mut ContourRoom),
     kept: &'m ContourMap,
     truth: &Pose,
     overlap: &Overlap,
     look: impl Fn(Time, &mut Random) -> RecordedScan,
     random: &mut Random,
 ) -> (Said, f64, f64) {
-    let Ok(map) = kept.view() else { return (Said::Nothing, 0.0, 0.0) };
+    let map = kept.view();
     let is_right = |pose: &Pose| {
         let error = truth.between(pose);
         error.position().norm() < RIGHT.0 && error.theta.abs() < RIGHT.1
@@ -168,7 +170,7 @@ fn switch_on<'m>(
         while left > 0 {
             left = left.saturating_sub(SLICE);
             effort += f64::from(SLICE);
-            match finder.search(&map, SLICE) {
+            match finder.search(&map, room, SLICE) {
                 StartState::Searching => continue,
                 StartState::Found(fix) => {
                     let said = if is_right(&fix.pose) { Said::Right } else { Said::Wrong };
