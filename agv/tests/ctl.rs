@@ -11,7 +11,9 @@ use std::sync::{Arc, Mutex};
 
 use agv_core::measurement::Time;
 use agv_host_sim::layout_file;
+use agv_host_sim::mapping::contour_file;
 use agv_settings::Settings;
+use agv_settings::contour_store::ContourStore;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::{Action, Controller, Frames, LONGEST_MESSAGE, Response, Session, encode};
 use agv_settings::store::Store;
@@ -25,7 +27,7 @@ const PAGE: usize = 128 * 1024;
 type Memory = Flash<PAGE>;
 
 /// A controller as it starts with what is in its flash.
-fn start(flash: Memory, starts: u32) -> Controller<Memory> {
+fn start(flash: Memory, contours: Option<Memory>, starts: u32) -> Controller<Memory> {
     let mut store = Store::new(flash).unwrap();
     let (settings, landmarks, _) = load(&mut store);
     let key = store.key();
@@ -39,6 +41,7 @@ fn start(flash: Memory, starts: u32) -> Controller<Memory> {
         nonces: 0,
         panic: "",
         map: None,
+        contours: contours.and_then(ContourStore::open),
     }
 }
 
@@ -53,7 +56,7 @@ impl Emulated {
     /// With the flash that `agv provision` has written.
     pub fn of(image: &str) -> Self {
         let flash = Memory::filled(std::fs::read(image).unwrap());
-        let controller = Arc::new(Mutex::new(start(flash, 1)));
+        let controller = Arc::new(Mutex::new(start(flash, Some(Memory::new()), 1)));
         let is_moving = Arc::new(AtomicBool::new(false));
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let host = listener.local_addr().unwrap().to_string();
@@ -98,7 +101,8 @@ fn converse(mut stream: TcpStream, controller: &Mutex<Controller<Memory>>, is_mo
             stream.write_all(&room[..length]).unwrap();
             if action == Action::Reboot {
                 let flash = controller.store.take().unwrap().into_flash();
-                *controller = start(flash, controller.starts + 1);
+                let contours = controller.contours.take().map(ContourStore::into_flash);
+                *controller = start(flash, contours, controller.starts + 1);
                 let _ = stream.shutdown(Shutdown::Both);
                 return;
             }
@@ -253,6 +257,30 @@ fn a_map_is_brought_to_a_controller_and_back() {
         got.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>(),
         sent.iter().map(|one| (one.id, one.x, one.y)).collect::<Vec<_>>()
     );
+}
+
+#[test]
+fn a_map_of_contours_is_brought_to_a_controller_and_back_and_taken_away() {
+    let bench = Bench::new();
+    let points: String = (0..400).map(|place| format!("{:.4},{:.4},90.0\n", 0.25 * f64::from(place), 1.5)).collect();
+    let hall = bench.files.write("hall.csv", format!("x_m,y_m,facing_deg\n{points}").as_bytes());
+    let back = bench.files.path("back.csv");
+    assert!(bench.refused(&["contours", "upload", &hall]).contains("--key FILE"));
+    assert!(bench.refused(&["contours", "download", &back]).contains("no map of contours"));
+    bench.ctl(&["--key", &bench.key, "contours", "upload", &hall]);
+    assert!(bench.refused(&["contours", "download", &back]).contains("no map of contours"), "it is for the next start");
+    bench.ctl(&["--key", &bench.key, "reboot"]);
+    assert_eq!(row(&bench.ctl(&["contours", "download", &back]), "points"), ["400"]);
+    let [sent, got] = [&hall, &back].map(|path| contour_file::read(Path::new(path)).unwrap());
+    assert_eq!(sent, got);
+    bench.ctl(&["--key", &bench.key, "contours", "remove"]);
+    bench.ctl(&["--key", &bench.key, "reboot"]);
+    assert!(bench.refused(&["contours", "download", &back]).contains("no map of contours"));
+    assert_eq!(contour_file::read(Path::new(&back)).unwrap(), sent, "a failed run leaves what was there");
+    let wrong = bench.files.write("wrong.csv", b"1,2,3\n");
+    assert!(bench.refused(&["--key", &bench.key, "contours", "upload", &wrong]).contains("heading"));
+    bench.emulated.controller.lock().unwrap().contours = None;
+    assert!(bench.refused(&["--key", &bench.key, "contours", "upload", &hall]).contains("no room"));
 }
 
 #[test]

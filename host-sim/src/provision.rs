@@ -1,11 +1,14 @@
-//! What a controller's flash holds when it is delivered: settings, map and key.
+//! What a controller's flash holds when it is delivered: settings, key and maps.
 
 use agv_core::maps::Landmark;
+use agv_settings::contour_store::{CONTOUR_PIECE, ContourStore, MOST, checksum};
 use agv_settings::store::{KEY, PIECE, Store, StoreError};
 use agv_settings::{Settings, map_identity};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
+
+use crate::mapping::contour_map::ContourMap;
 
 /// Bytes of a page of the STM32H743's flash.
 const PAGE: usize = 128 * 1024;
@@ -23,6 +26,12 @@ pub enum ProvisionError {
     Map {
         /// Landmarks of the map.
         count: usize,
+    },
+    /// The map of contours is too large.
+    #[error("the map of contours has {bytes} bytes; {MOST} can be kept; fewer points, as by agv map --cell, take less")]
+    Contours {
+        /// Bytes of the map.
+        bytes: usize,
     },
     /// The map is another one than it must be.
     #[error("maps.identity is {set}, and the map is {found}")]
@@ -102,5 +111,19 @@ pub fn flash_image(
         store.write_piece(&mut writer, piece)?;
     }
     store.finish_map(&writer)?;
+    Ok(store.into_flash().0)
+}
+
+/// The bytes of the flash of the map of contours.
+///
+/// # Errors
+/// If they are too many.
+pub fn contour_image(map: &ContourMap) -> Result<Vec<u8>, ProvisionError> {
+    let bytes = map.bytes();
+    let too_many = |_| ProvisionError::Contours { bytes: bytes.len() };
+    let mut store = ContourStore::open(Image(vec![0xFF; 2 * PAGE])).ok_or(ProvisionError::Full)?;
+    store.begin(u32::try_from(bytes.len()).unwrap_or(u32::MAX), checksum(bytes)).map_err(too_many)?;
+    bytes.chunks(CONTOUR_PIECE).try_for_each(|piece| store.write(piece))?;
+    store.finish()?;
     Ok(store.into_flash().0)
 }

@@ -7,6 +7,7 @@
 
 mod bus_load;
 mod checksum;
+pub mod contour_store;
 mod contradiction;
 pub mod leaf;
 mod leaves;

@@ -15,7 +15,7 @@ use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::map::{MapConfig, MapStorage};
 use serde::{Deserialize, Serialize};
 
-use crate::checksum::CHECKSUM;
+use crate::checksum::continued;
 use crate::leaf::{Leaf, Value};
 use crate::{LEAVES, Settings};
 
@@ -43,8 +43,10 @@ pub enum StoreError {
     Flash,
     /// There is no room.
     Full,
-    /// The map has more landmarks than can be kept, or its pieces do not follow each other.
+    /// The map is larger than can be kept, or its pieces do not follow each other, or are not those that were told.
     Map,
+    /// The board has no flash for a map of contours.
+    NoContours,
 }
 
 /// What the flash held.
@@ -78,13 +80,6 @@ pub struct MapWriter {
     count: u16,
     written: u16,
     digest: u32,
-}
-
-/// The checksum of bytes and a piece more, from that of the bytes.
-fn checksum(before: u32, piece: &[u8]) -> u32 {
-    let mut digest = CHECKSUM.digest_with_initial((!before).reverse_bits());
-    digest.update(piece);
-    digest.finalize()
 }
 
 /// Flash whose work is done when it returns, as the storage wants it.
@@ -271,7 +266,7 @@ impl<F: NorFlash> Store<F> {
         let mut digest = 0;
         for number in 0..index.count.div_ceil(PIECE as u16) {
             let bytes = self.fetch(first + number).ok()??;
-            digest = checksum(digest, bytes);
+            digest = continued(digest, bytes);
             let piece: Vec<Landmark, PIECE> = postcard::from_bytes(bytes).ok()?;
             landmarks.extend_from_slice(&piece).ok()?;
         }
@@ -331,7 +326,7 @@ impl<F: NorFlash> Store<F> {
         let bytes = postcard::to_slice(&piece, &mut room).map_err(|_| StoreError::Full)?;
         let first = PIECES.get(usize::from(writer.generation)).copied().ok_or(StoreError::Map)?;
         self.put(first + writer.written / PIECE as u16, bytes)?;
-        writer.digest = checksum(writer.digest, bytes);
+        writer.digest = continued(writer.digest, bytes);
         writer.written += piece.len() as u16;
         Ok(())
     }

@@ -4,12 +4,13 @@ mod support;
 
 use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
+use agv_settings::contour_store::{CONTOUR_PIECE, ContourStore, checksum};
 use agv_settings::leaf::{Leaf, LeafError, Value};
 use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{
     Action, Change, Controller, Frames, LONGEST_MESSAGE, MessageError, Refusal, Request, Response, Session, encode,
 };
-use agv_settings::store::{PIECE, Store};
+use agv_settings::store::{PIECE, Store, StoreError};
 use agv_settings::{LEAVES, Settings, bus_load};
 use proptest::prelude::*;
 use support::{Flash, load, map};
@@ -31,6 +32,7 @@ fn controller() -> Controller<Flash<PAGE>> {
         nonces: 0,
         panic: "panicked at nothing",
         map: None,
+        contours: ContourStore::open(Flash::new()),
     }
 }
 
@@ -153,6 +155,44 @@ fn settings_and_map_are_written_with_the_key() {
     assert_eq!(talk.change(Change::ForgetPanic).1, Action::ForgetPanic);
     assert_eq!(talk.ask(&Request::Panic).0, Response::Panic(""));
     assert_eq!(talk.change(Change::Reboot).1, Action::Reboot);
+}
+
+/// The map of contours that the controller says it uses.
+fn contours(talk: &mut Talk) -> Vec<u8> {
+    let mut found = Vec::new();
+    loop {
+        let answer = talk.ask(&Request::Contours(found.len() as u32)).0;
+        let Response::Contours { length, piece } = answer else { panic!("{answer:?}") };
+        found.extend_from_slice(piece);
+        if piece.is_empty() {
+            assert_eq!(found.len(), length as usize);
+            return found;
+        }
+    }
+}
+
+#[test]
+fn a_map_of_contours_is_written_with_the_key_and_read_without() {
+    let mut talk = Talk::new();
+    assert_eq!(contours(&mut talk), []);
+    let bytes: Vec<u8> = (0..3000_u32).map(|place| (place * place) as u8).collect();
+    let begin = |length: usize| Change::BeginContours { length: length as u32, checksum: checksum(&bytes) };
+    assert_eq!(talk.change(begin(bytes.len())).0, Response::Done);
+    for piece in bytes.chunks(CONTOUR_PIECE) {
+        assert_eq!(talk.change(Change::ContourPiece(piece)).0, Response::Done);
+    }
+    assert_eq!(talk.change(Change::FinishContours).0, Response::Done);
+    assert_eq!(contours(&mut talk), [], "it counts from the next start on");
+    let flash = talk.controller.contours.take().unwrap().into_flash();
+    talk.controller.contours = ContourStore::open(flash);
+    assert_eq!(contours(&mut talk), bytes);
+
+    let refused = |error| Response::Refused(Refusal::Store(error));
+    assert_eq!(talk.change(begin(PAGE)).0, refused(StoreError::Map));
+    assert_eq!(talk.change(Change::ContourPiece(&bytes[..9])).0, refused(StoreError::Map));
+    talk.controller.contours = None;
+    assert_eq!(talk.change(begin(bytes.len())).0, refused(StoreError::NoContours));
+    assert_eq!(talk.ask(&Request::Contours(0)).0, refused(StoreError::NoContours));
 }
 
 #[test]

@@ -7,6 +7,8 @@ use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, ServiceError, Setting};
 use agv_host_sim::link::with_port;
+use agv_host_sim::mapping::contour_file;
+use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::Refusal;
@@ -29,6 +31,7 @@ Examples:
   agv ctl 192.168.1.20 --key agv.key set vehicle.track 0.612
   agv ctl 192.168.1.20 --key agv.key apply vehicle.toml
   agv ctl 192.168.1.20 --key agv.key map upload hall.imk
+  agv ctl 192.168.1.20 --key agv.key contours upload hall.csv
   agv ctl 192.168.1.20 --key agv.key store
   agv ctl 192.168.1.20 --key agv.key reboot
   agv ctl 192.168.1.20 --key agv.key set-pose 12.5 3.2 1.57";
@@ -83,6 +86,11 @@ enum Action {
         #[command(subcommand)]
         action: MapAction,
     },
+    /// The map of contours.
+    Contours {
+        #[command(subcommand)]
+        action: ContourAction,
+    },
     /// Tell the vehicle where it is: x and y in metres, heading in radians.
     #[command(allow_negative_numbers = true)]
     SetPose {
@@ -121,6 +129,22 @@ enum MapAction {
         /// File to write.
         file: PathBuf,
     },
+}
+
+#[derive(clap::Subcommand)]
+enum ContourAction {
+    /// From a file, as agv map --kind contours writes it, to the controller, for its next start.
+    Upload {
+        /// File to read.
+        file: PathBuf,
+    },
+    /// From the controller to a file.
+    Download {
+        /// File to write.
+        file: PathBuf,
+    },
+    /// Take it away, from the next start on.
+    Remove,
 }
 
 /// The key in a file: 64 hexadecimal digits.
@@ -169,6 +193,11 @@ fn show_settings(settings: &[Setting], as_json: bool) -> anyhow::Result<()> {
 /// The kinds of vehicles that have a setting.
 fn kinds(leaf: &Leaf) -> String {
     leaf.kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ")
+}
+
+/// What a map of contours is.
+fn contour_rows(map: &ContourMap) -> [[String; 2]; 2] {
+    [["points", &map.len().to_string()], ["bytes", &map.bytes().len().to_string()]].map(|row| row.map(str::to_owned))
 }
 
 /// A setting of a controller; what comes near the name is suggested if there is none.
@@ -260,6 +289,19 @@ impl Ctl {
                 layout_file::save(file, &layout_file::layout(&landmarks))?;
                 self.print(&map_rows(&landmarks))?;
             }
+            Action::Contours { action: ContourAction::Upload { file } } => {
+                let map = contour_file::read(file)?;
+                let progress = progress::bar("uploading", map.bytes().len() as u64);
+                client.upload_contours(Some(&map), |count| progress.inc(count as u64))?;
+                progress.finish_and_clear();
+                self.print(&contour_rows(&map))?;
+            }
+            Action::Contours { action: ContourAction::Download { file } } => {
+                let map = client.download_contours()?.context("the controller has no map of contours")?;
+                contour_file::write(file, &map)?;
+                self.print(&contour_rows(&map))?;
+            }
+            Action::Contours { action: ContourAction::Remove } => client.upload_contours(None, |_| ())?,
             Action::SetPose { x, y, theta, position_deviation, heading_deviation } => {
                 client.set_pose(Pose { x: *x, y: *y, theta: *theta }, [*position_deviation, *heading_deviation])?;
             }

@@ -4,12 +4,16 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+use agv_core::contours::KeptMapError;
 use agv_core::geometry::Pose;
 use agv_core::maps::Landmark;
+use agv_settings::contour_store::{CONTOUR_PIECE, checksum};
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, PROTOCOL, Refusal, Request, Response, encode};
-use agv_settings::store::{KEY, PIECE};
+use agv_settings::store::{KEY, PIECE, StoreError};
+
+use crate::mapping::contour_map::ContourMap;
 
 /// Port of the service.
 pub const PORT: u16 = 5351;
@@ -52,6 +56,14 @@ pub enum ServiceError {
         /// Landmarks that came.
         got: usize,
     },
+    /// It gives another map of contours than it says, or something else than one.
+    #[error("{host}: the map of contours has {length} bytes, and what came is none")]
+    Contours {
+        /// The controller.
+        host: String,
+        /// Bytes of its map, as it says.
+        length: usize,
+    },
     /// It refuses.
     #[error("{}", explain(*.0))]
     Refused(Refusal),
@@ -80,9 +92,10 @@ fn explain(refusal: Refusal) -> String {
              can.encoder_period, or a higher can.bit_rate"
         }
         Refusal::Pose => "the pose or its deviations are no sensible numbers",
-        Refusal::Store(agv_settings::store::StoreError::Full) => "the flash is full",
-        Refusal::Store(agv_settings::store::StoreError::Map) => "the map is too large, or was not sent as a whole",
-        Refusal::Store(agv_settings::store::StoreError::Flash) => "the flash does not work",
+        Refusal::Store(StoreError::Full) => "the flash is full",
+        Refusal::Store(StoreError::Map) => "the map is too large, or was not sent as a whole",
+        Refusal::Store(StoreError::Flash) => "the flash does not work",
+        Refusal::Store(StoreError::NoContours) => "the board has no room for a map of contours",
     };
     text.to_owned()
 }
@@ -281,6 +294,33 @@ impl Client {
         }
     }
 
+    /// The map of contours that the vehicle uses; none if it has none.
+    ///
+    /// # Errors
+    /// If it does not answer, has no room for one, or gives something else than it says.
+    pub fn download_contours(&mut self) -> Result<Option<ContourMap>, ServiceError> {
+        let mut bytes: Vec<u8> = Vec::new();
+        loop {
+            let (length, is_last) = self.ask(&Request::Contours(bytes.len() as u32), |response| match response {
+                Response::Contours { length, piece } => {
+                    bytes.extend_from_slice(piece);
+                    Some((*length as usize, piece.is_empty()))
+                }
+                _ => None,
+            })?;
+            if length == 0 {
+                return Ok(None);
+            }
+            let other = |_| ServiceError::Contours { host: self.host.clone(), length };
+            if bytes.len() == length {
+                return ContourMap::of_bytes(bytes).map(Some).map_err(other);
+            }
+            if is_last || bytes.len() > length {
+                return Err(other(KeptMapError::Format));
+            }
+        }
+    }
+
     /// What the last panic said; empty if there was none.
     ///
     /// # Errors
@@ -313,7 +353,7 @@ impl Client {
     /// # Errors
     /// If the controller refuses. It has its old map then.
     pub fn upload_map(&mut self, landmarks: &[Landmark], mut progress: impl FnMut(usize)) -> Result<(), ServiceError> {
-        let too_large = ServiceError::Refused(Refusal::Store(agv_settings::store::StoreError::Map));
+        let too_large = ServiceError::Refused(Refusal::Store(StoreError::Map));
         let count = u16::try_from(landmarks.len()).map_err(|_| too_large)?;
         self.change(Change::BeginMap(count))?;
         for piece in landmarks.chunks(PIECE) {
@@ -321,6 +361,26 @@ impl Client {
             progress(piece.len());
         }
         self.change(Change::FinishMap)
+    }
+
+    /// Replaces the map of contours, or takes it away, from the next start on.
+    ///
+    /// # Errors
+    /// If the controller refuses. It has its old map then.
+    pub fn upload_contours(
+        &mut self,
+        map: Option<&ContourMap>,
+        mut progress: impl FnMut(usize),
+    ) -> Result<(), ServiceError> {
+        let bytes = map.map(ContourMap::bytes).unwrap_or_default();
+        let too_large = ServiceError::Refused(Refusal::Store(StoreError::Map));
+        let length = u32::try_from(bytes.len()).map_err(|_| too_large)?;
+        self.change(Change::BeginContours { length, checksum: checksum(bytes) })?;
+        for piece in bytes.chunks(CONTOUR_PIECE) {
+            self.change(Change::ContourPiece(piece))?;
+            progress(piece.len());
+        }
+        self.change(Change::FinishContours)
     }
 
     /// Tells the vehicle where it is.

@@ -30,6 +30,8 @@ pub enum Request<'a> {
     Panic,
     /// What changes something.
     Change(Change<'a>),
+    /// The bytes of the map of contours from that one on.
+    Contours(u32),
 }
 
 /// What changes something: it has a tag, and the vehicle must stand.
@@ -58,6 +60,17 @@ pub enum Change<'a> {
     ForgetPanic,
     /// Starts again.
     Reboot,
+    /// Begins to write a map of contours; one of no bytes takes away the one that is kept.
+    BeginContours {
+        /// Its bytes.
+        length: u32,
+        /// Their CRC-32.
+        checksum: u32,
+    },
+    /// Its next bytes: [`crate::contour_store::CONTOUR_PIECE`], or the last ones.
+    ContourPiece(&'a [u8]),
+    /// Makes the written map of contours the one that is used from the next start on.
+    FinishContours,
 }
 
 /// What is answered.
@@ -103,6 +116,13 @@ pub enum Response<'a> {
     Done,
     /// It is not done.
     Refused(Refusal),
+    /// A piece of the map of contours that the vehicle uses.
+    Contours {
+        /// Bytes of the whole map; 0 if there is none.
+        length: u32,
+        /// Those from the place that was asked for on.
+        piece: &'a [u8],
+    },
 }
 
 /// Why a request is refused.

@@ -10,6 +10,7 @@ use heapless::Vec;
 use super::authentication::{self, Nonce, TAG};
 use super::frame::{LONGEST_MESSAGE, MessageError, encode};
 use super::message::{Change, PROTOCOL, Refusal, Request, Response};
+use crate::contour_store::{CONTOUR_PIECE, ContourStore};
 use crate::leaf::{Leaf, LeafError};
 use crate::store::{KEY, MapWriter, PIECE, Store, StoreError};
 use crate::{LEAVES, Settings};
@@ -34,6 +35,8 @@ pub struct Controller<F: NorFlash> {
     pub panic: &'static str,
     /// A map that is being written.
     pub map: Option<MapWriter>,
+    /// Where the map of contours is kept. None if the board has no room for one.
+    pub contours: Option<ContourStore<F>>,
 }
 
 /// What is left to do when a request was answered.
@@ -99,6 +102,7 @@ impl Session {
             return Err(MessageError);
         }
         let mut action = Action::None;
+        let mut piece = [0; CONTOUR_PIECE];
         let response = match request {
             Request::Version => {
                 Response::Version { software: controller.software, protocol: PROTOCOL, starts: controller.starts, time }
@@ -112,6 +116,7 @@ impl Session {
             }
             Request::Map(first) => map_piece(controller.landmarks, first),
             Request::Panic => Response::Panic(controller.panic),
+            Request::Contours(first) => contour_piece(controller.contours.as_mut(), first, &mut piece),
             Request::Change(change) => {
                 let signed = message.get(..message.len() - TAG).unwrap_or_default();
                 let outcome = self.permit(controller, signed, tag, is_standing);
@@ -173,10 +178,23 @@ fn map_piece(landmarks: &[Landmark], first: u16) -> Response<'static> {
     Response::Map { count: landmarks.len() as u16, piece: Vec::from_slice(piece).unwrap_or_default() }
 }
 
+fn contour_piece<'a, F: NorFlash>(
+    store: Option<&mut ContourStore<F>>,
+    first: u32,
+    room: &'a mut [u8; CONTOUR_PIECE],
+) -> Response<'a> {
+    let Some(store) = store else { return Response::Refused(Refusal::Store(StoreError::NoContours)) };
+    let length = store.found().map_or(0, |found| found.length);
+    match store.read(first, room) {
+        Ok(piece) => Response::Contours { length, piece },
+        Err(error) => Response::Refused(Refusal::Store(error)),
+    }
+}
+
 /// What is to be kept in flash.
 #[allow(clippy::large_enum_variant, reason = "there is no allocator, and there is one message at a time")]
 #[derive(Clone, Debug, PartialEq)]
-pub enum Kept {
+pub enum Kept<'a> {
     /// All settings.
     Settings,
     /// A map of so many landmarks, which begins.
@@ -185,6 +203,12 @@ pub enum Kept {
     MapPiece(Vec<Landmark, PIECE>),
     /// Its end.
     MapEnd,
+    /// A map of contours of so many bytes with that checksum, which begins.
+    ContourBegin(u32, u32),
+    /// Its next bytes.
+    ContourPiece(&'a [u8]),
+    /// Its end.
+    ContourEnd,
 }
 
 fn perform<F: NorFlash>(
@@ -198,6 +222,9 @@ fn perform<F: NorFlash>(
         Change::BeginMap(count) => Kept::MapBegin(count),
         Change::MapPiece(piece) => Kept::MapPiece(piece),
         Change::FinishMap => Kept::MapEnd,
+        Change::BeginContours { length, checksum } => Kept::ContourBegin(length, checksum),
+        Change::ContourPiece(piece) => Kept::ContourPiece(piece),
+        Change::FinishContours => Kept::ContourEnd,
         Change::Set(name, value) => {
             let leaf = Leaf::named(name).ok_or(Refusal::Name)?;
             leaf.change(&mut controller.settings, value).map_err(|error| match error {
@@ -227,8 +254,9 @@ fn perform<F: NorFlash>(
 }
 
 fn keep<F: NorFlash>(kept: Kept, controller: &mut Controller<F>) -> Result<(), StoreError> {
-    let Controller { settings, store, map, .. } = controller;
+    let Controller { settings, store, map, contours, .. } = controller;
     let store = store.as_mut().ok_or(StoreError::Flash);
+    let contours = contours.as_mut().ok_or(StoreError::NoContours);
     match kept {
         Kept::Settings => store?.store_leaves(settings)?,
         Kept::MapBegin(count) => *map = Some(store?.begin_map(count)?),
@@ -240,6 +268,9 @@ fn keep<F: NorFlash>(kept: Kept, controller: &mut Controller<F>) -> Result<(), S
             let writer = map.take().ok_or(StoreError::Map)?;
             store?.finish_map(&writer)?;
         }
+        Kept::ContourBegin(length, checksum) => contours?.begin(length, checksum)?,
+        Kept::ContourPiece(piece) => contours?.write(piece)?,
+        Kept::ContourEnd => contours?.finish()?,
     }
     Ok(())
 }

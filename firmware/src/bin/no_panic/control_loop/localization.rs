@@ -17,6 +17,7 @@ use agv_settings::Settings;
 use super::any;
 
 static RANGES: [f32; 1500] = [0.0; 1500];
+static BYTES: [u8; 4000] = [0; 4000];
 static INTENSITIES: [u16; 1500] = [0; 1500];
 static OBSERVATIONS: [ReflectorObservation; 300] =
     [ReflectorObservation { time: Time::from_micros(0), range: 0.0, bearing: 0.0 }; 300];
@@ -86,7 +87,7 @@ impl Localization {
         let Self { localization, small, frame, .. } = self;
         let _ = black_box(localization.localizer_mut().lend_landmarks(part(&LANDMARKS)));
         let _ = black_box(small.add_landmarks(part(&LANDMARKS)));
-        localization.index();
+        let _ = black_box(localization.localizer_mut().lend_contours(part(&BYTES)));
         localization.handle(&event, |record| log(frame, record));
         localization.hear(
             &any(Told::from(BusEvent::Encoders(EncoderSample { time: Time::default(), drive: 0, steering: 0 }))),

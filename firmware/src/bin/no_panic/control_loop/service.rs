@@ -61,6 +61,7 @@ impl Service {
             starts: any(0),
             nonces: any(0),
             panic: any(""),
+            contours: None,
             map: None,
         };
         Self { frames: Frames::new(), session: Session::new(), controller, room: [0; LONGEST_MESSAGE] }
