@@ -12,16 +12,15 @@ from emulated_chip.can_bus import CanFrame
 from emulated_chip.can_peers import Listener
 from emulated_chip.clock import MICROSECOND
 from emulated_chip.network import Host
-from stored_settings import FIRST_PAGE, PAGE
+from stored_settings import FIRST_CONTOUR_PAGE, FIRST_PAGE, PAGE
 
 
 class Served:
     def __init__(self, bench, vehicle):
         self.chip = bench.chip()
-        with open(vehicle["flash"], "rb") as file:
-            contents = file.read()
-        first = FIRST_PAGE * PAGE
-        self.chip.settings_flash.bytes[first : first + len(contents)] = contents
+        self.load(vehicle["flash"], FIRST_PAGE * PAGE)
+        if vehicle["contours"]:
+            self.load(vehicle["contours"], FIRST_CONTOUR_PAGE * PAGE)
         # It hears what the chip says, and says what sensors say.
         self.sensors = Listener(self.chip.clock)
         self.chip.can_bus.nodes.append(self.sensors)
@@ -31,6 +30,12 @@ class Served:
         self.host.listens_at.add(self.laser_port)
         self.laser = None
         self.log = None
+
+    def load(self, path, first):
+        """Puts what a file holds into the flash."""
+        with open(path, "rb") as file:
+            contents = file.read()
+        self.chip.settings_flash.bytes[first : first + len(contents)] = contents
 
     def step(self, said):
         """What the chip says until a time, having been told something now."""

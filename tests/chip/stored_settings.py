@@ -5,6 +5,8 @@ PAGE = 128 * 1024
 STARTS_KEY = 2
 # The first of the two pages, in its bank.
 FIRST_PAGE = 6
+# The first of the two pages of the map of contours.
+FIRST_CONTOUR_PAGE = 4
 
 
 def crc16(data):

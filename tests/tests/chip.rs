@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use agv_host_sim::emulate::vehicle::{InChip, drive_in_chip, errors};
+use agv_host_sim::emulate::vehicle::{InChip, InChipOptions, drive_in_chip, errors};
+use agv_host_sim::mapping::contour_map::{CELL, ContourMap, map_contours_at};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
@@ -63,16 +64,22 @@ fn the_image_of_the_smaller_board_lives_in_its_chip() {
     check("the_image_of_the_smaller_board_lives_in_its_chip", "h723", &OF_ONE_BANK);
 }
 
-/// The hall among reflectors in virtual time: poses as on the emulated board, a log that replays to the same bits.
-fn drives_through_the_hall(test: &str, board: &str, seconds: f64) {
+/// The hall in virtual time, in maps of reflectors or of contours: poses as on the emulated board, a log that replays to the same bits.
+fn drives_through_the_hall(test: &str, board: &str, seconds: f64, by_contours: bool) {
     if !is_there(test, board) {
         return;
     }
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/scenarios/warehouse_hall.toml");
-    let recording = simulate(&Scenario::read(&scenario).unwrap()).unwrap().recording;
+    let mut recording = simulate(&Scenario::read(&scenario).unwrap()).unwrap().recording;
+    let map = by_contours.then(|| map_contours_at(&recording, &recording.truth, CELL));
+    if by_contours {
+        recording.landmarks.clear();
+    }
+    // Among contours it finds out where it is.
+    let options = InChipOptions { contours: map.as_ref(), is_not_told: by_contours };
     let folder = tempfile::tempdir().unwrap();
     let InChip { driven, stack } =
-        drive_in_chip(&recording, chip(&["--board", board, "--serve"]), folder.path(), seconds).unwrap();
+        drive_in_chip(&recording, chip(&["--board", board, "--serve"]), folder.path(), seconds, options).unwrap();
     let errors = errors(&driven, &recording).unwrap();
     println!("{errors:?}, {stack} bytes of stack");
     assert!(errors.poses as f64 >= 99.0 * seconds && errors.localised_share > 0.99, "{errors:?}");
@@ -81,7 +88,7 @@ fn drives_through_the_hall(test: &str, board: &str, seconds: f64) {
     let contents = log::read_contents(&driven.log, |_| ()).unwrap();
     // Poses are published before anybody listens to the log.
     assert!(driven.stream.damages <= 1, "{:?}", driven.stream);
-    let again = replay::replay(&contents.recording, |_| ()).unwrap();
+    let again = replay::replay_in(&contents.recording, map.as_ref().map(ContourMap::view), |_| ()).unwrap();
     let outputs = replay::compare(&contents.outputs, &again);
     assert_eq!(outputs.first_difference, None);
     assert!(outputs.compared as f64 > 100.0 * seconds, "{}", outputs.compared);
@@ -92,10 +99,15 @@ fn drives_through_the_hall(test: &str, board: &str, seconds: f64) {
 
 #[test]
 fn the_flashed_image_drives_through_the_hall() {
-    drives_through_the_hall("the_flashed_image_drives_through_the_hall", "h743", 10.0);
+    drives_through_the_hall("the_flashed_image_drives_through_the_hall", "h743", 10.0, false);
+}
+
+#[test]
+fn the_flashed_image_drives_through_the_hall_by_contours() {
+    drives_through_the_hall("the_flashed_image_drives_through_the_hall_by_contours", "h743", 5.0, true);
 }
 
 #[test]
 fn the_image_of_the_smaller_board_drives_through_the_hall() {
-    drives_through_the_hall("the_image_of_the_smaller_board_drives_through_the_hall", "h723", 3.0);
+    drives_through_the_hall("the_image_of_the_smaller_board_drives_through_the_hall", "h723", 3.0, false);
 }

@@ -486,8 +486,14 @@ fn strangers_change_nothing_and_stop_nothing() {
     let Some(image) = image(NAME, "an500", "vehicle").filter(|_| emulator(NAME)) else { return };
     let recording = standing();
     let folder = tempfile::tempdir().unwrap();
-    let options =
-        VehicleOptions { image: &image, folder: folder.path(), key: Some(KEY), provision: true, is_told: true };
+    let options = VehicleOptions {
+        image: &image,
+        folder: folder.path(),
+        key: Some(KEY),
+        provision: true,
+        contours: None,
+        is_told: true,
+    };
     let mut seen = None;
     let look = |watch: &Watch| {
         // Ends the emulation even if something is found.

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use agv_host_sim::emulate::vehicle::{self, Driven, Errors, InChip, VehicleOptions, Watch};
+use agv_host_sim::emulate::vehicle::{self, Driven, Errors, InChip, InChipOptions, VehicleOptions, Watch};
+use agv_host_sim::mapping::contour_file;
+use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{simulate, standard};
@@ -27,6 +29,7 @@ Examples:
   agv emulate --image target/firmware/an500/thumbv7em-none-eabihf/firmware/vehicle
   agv emulate --image vehicle --scenario warehouse_hall --seconds 30 --json
   agv emulate --image vehicle --untold --seconds 10
+  agv emulate --image vehicle --untold --contours hall.csv --seconds 10
   agv emulate --image vehicle --folder /tmp/vehicle && defmt-print -e vehicle < /tmp/vehicle/defmt.bin";
 
 /// Drive a vehicle whose controller runs the firmware in emulation
@@ -45,14 +48,17 @@ pub struct Emulate {
     /// Folder for the board's files: flash.bin, defmt.bin, stream.agvlog. A temporary one if absent.
     #[arg(long)]
     folder: Option<PathBuf>,
-    /// Do not tell the vehicle where it is: it finds itself by its reflectors.
+    /// Do not tell the vehicle where it is: it finds itself.
     #[arg(long)]
     untold: bool,
+    /// Drive in this map of contours instead of among reflectors.
+    #[arg(long, value_name = "FILE")]
+    contours: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
     /// Drive in virtual time instead, with the controller that this program and its arguments emulate; stands last.
-    #[arg(long, value_name = "PROGRAM", num_args = 1.., allow_hyphen_values = true, conflicts_with_all = ["image", "untold"])]
+    #[arg(long, value_name = "PROGRAM", num_args = 1.., allow_hyphen_values = true, conflicts_with = "image")]
     chip: Vec<OsString>,
 }
 
@@ -76,14 +82,18 @@ impl Emulate {
             Some(path) => Scenario::read(path)?,
             None => toml::from_str(standard::HALL).context("standard hall")?,
         };
-        let recording = simulate(&scenario)?.recording;
+        let mut recording = simulate(&scenario)?.recording;
+        let contours = self.contours.as_deref().map(contour_file::read).transpose()?;
+        if contours.is_some() {
+            recording.landmarks.clear();
+        }
         let temporary = std::env::temp_dir().join(format!("agv-emulate-{}", std::process::id()));
         let folder = self.folder.clone().unwrap_or_else(|| temporary.clone());
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let folder = folder.canonicalize()?;
         let outcome = self
-            .drive(&recording, &folder)
-            .and_then(|(driven, stack)| Ok(Outcome { stack, ..judge(&driven, &recording)? }));
+            .drive(&recording, contours.as_ref(), &folder)
+            .and_then(|(driven, stack)| Ok(Outcome { stack, ..judge(&driven, &recording, contours.as_ref())? }));
         if self.folder.is_none() {
             // What cannot be removed is left to the system.
             let _ = std::fs::remove_dir_all(&temporary);
@@ -95,7 +105,7 @@ impl Emulate {
             let Outcome { errors, records, events, is_bit_equal, damages, stack } = &outcome;
             let mut rows = vec![
                 ["poses".to_owned(), errors.poses.to_string()],
-                ["with reflectors".to_owned(), format!("{:.1} %", 100.0 * errors.localised_share)],
+                ["localised".to_owned(), format!("{:.1} %", 100.0 * errors.localised_share)],
                 ["position, 95 %".to_owned(), format!("{:.1} mm", 1e3 * errors.position_p95_m)],
                 ["position, largest".to_owned(), format!("{:.1} mm", 1e3 * errors.position_max_m)],
                 ["heading, 95 %".to_owned(), format!("{:.3} deg", errors.heading_p95_deg)],
@@ -116,26 +126,33 @@ impl Emulate {
     }
 
     /// The drive, and how much of its stack the program has used, if that is known.
-    fn drive(&self, recording: &Recording, folder: &Path) -> anyhow::Result<(Driven, Option<u32>)> {
+    fn drive(
+        &self,
+        recording: &Recording,
+        contours: Option<&ContourMap>,
+        folder: &Path,
+    ) -> anyhow::Result<(Driven, Option<u32>)> {
         let seconds = self.seconds.unwrap_or(f64::MAX);
         let Some(image) = &self.image else {
             let [program, arguments @ ..] = &self.chip[..] else { bail!("which program emulates the chip?") };
             let mut command = Command::new(program);
             command.args(arguments);
-            let InChip { driven, stack } = vehicle::drive_in_chip(recording, command, folder, seconds)?;
+            let options = InChipOptions { contours, is_not_told: self.untold };
+            let InChip { driven, stack } = vehicle::drive_in_chip(recording, command, folder, seconds, options)?;
             return Ok((driven, Some(stack)));
         };
         let image = image.canonicalize().with_context(|| image.display().to_string())?;
-        let options = VehicleOptions { image: &image, folder, key: None, provision: true, is_told: !self.untold };
+        let options =
+            VehicleOptions { image: &image, folder, key: None, provision: true, contours, is_told: !self.untold };
         Ok((vehicle::drive(recording, &options, seconds, look)?, None))
     }
 }
 
 /// How far the poses were off, and whether the log replays to the same bits.
-fn judge(driven: &Driven, recording: &Recording) -> anyhow::Result<Outcome> {
+fn judge(driven: &Driven, recording: &Recording, contours: Option<&ContourMap>) -> anyhow::Result<Outcome> {
     let errors = vehicle::errors(driven, recording).context("the controller has said no pose")?;
     let contents = log::read_contents(&driven.log, |_| ())?;
-    let again = replay::replay(&contents.recording, |_| ())?;
+    let again = replay::replay_in(&contents.recording, contours.map(ContourMap::view), |_| ())?;
     let outputs = replay::compare(&contents.outputs, &again);
     let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
     Ok(Outcome {

@@ -20,7 +20,9 @@ pub const LONGEST: usize = 6 * 1024;
 /// How long a peer may take to read what it asked for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-static PIPE: Pipe<CriticalSectionRawMutex, QUEUE> = Pipe::new();
+/// What waits for the network.
+pub type LogQueue = Pipe<CriticalSectionRawMutex, QUEUE>;
+
 static IS_HEARD: AtomicBool = AtomicBool::new(false);
 static DROPPED: AtomicU32 = AtomicU32::new(0);
 
@@ -37,14 +39,15 @@ pub fn dropped() -> u32 {
 pub struct LogWriter {
     sequence: u32,
     frame: &'static mut [u8; LONGEST],
+    queue: &'static LogQueue,
 }
 
 impl LogWriter {
     /// A writer that makes its frames in `frame`, for a map of so many landmarks.
     #[must_use]
-    pub const fn new(frame: &'static mut [u8; LONGEST], landmarks: usize) -> Self {
+    pub const fn new(frame: &'static mut [u8; LONGEST], queue: &'static LogQueue, landmarks: usize) -> Self {
         // The header and the map, which each listener is given, come first.
-        Self { sequence: 1 + landmarks.div_ceil(LANDMARKS_A_RECORD) as u32, frame }
+        Self { sequence: 1 + landmarks.div_ceil(LANDMARKS_A_RECORD) as u32, frame, queue }
     }
 
     /// Queues a record, or drops it.
@@ -54,13 +57,13 @@ impl LogWriter {
         if !IS_HEARD.load(Ordering::Relaxed) {
             return;
         }
-        let length = encode(record, sequence, self.frame).ok().filter(|length| *length <= PIPE.free_capacity());
+        let length = encode(record, sequence, self.frame).ok().filter(|length| *length <= self.queue.free_capacity());
         let Some(mut rest) = length.and_then(|length| self.frame.get(..length)) else {
             DROPPED.fetch_add(1, Ordering::Relaxed);
             return;
         };
         // There is room for all of it, as nobody else writes; at the end of the queue's memory it goes in two pieces.
-        while let Ok(count) = PIPE.try_write(rest) {
+        while let Ok(count) = self.queue.try_write(rest) {
             rest = rest.get(count..).unwrap_or_default();
             if rest.is_empty() {
                 break;
@@ -102,7 +105,13 @@ pub struct Beginning {
 }
 
 /// Gives the stream to one listener after the other, for ever.
-pub async fn run(stack: Stack<'static>, memory: &'static mut LogMemory, port: u16, beginning: Beginning) -> ! {
+pub async fn run(
+    stack: Stack<'static>,
+    memory: &'static mut LogMemory,
+    queue: &LogQueue,
+    port: u16,
+    beginning: Beginning,
+) -> ! {
     let LogMemory { receive, transmit, piece } = memory;
     let mut socket = TcpSocket::new(stack, receive, transmit);
     loop {
@@ -111,10 +120,10 @@ pub async fn run(stack: Stack<'static>, memory: &'static mut LogMemory, port: u1
             continue;
         }
         if greet(&mut socket, piece, beginning).await.is_ok() {
-            PIPE.clear();
+            queue.clear();
             IS_HEARD.store(true, Ordering::Relaxed);
             loop {
-                let count = PIPE.read(piece).await;
+                let count = queue.read(piece).await;
                 let Some(bytes) = piece.get(..count) else { continue };
                 if send(&mut socket, bytes).await.is_err() {
                     break;

@@ -2,6 +2,7 @@
 
 use agv_core::maps::{Landmark, put_reflectors_first};
 use agv_settings::Settings;
+use agv_settings::contour_store::ContourStore;
 use agv_settings::service::Controller;
 use agv_settings::store::{LANDMARKS, Store};
 use embedded_storage::nor_flash::NorFlash;
@@ -13,11 +14,17 @@ use super::log_stream::SOFTWARE;
 /// The map as the flash keeps it.
 pub type KeptMap = Vec<Landmark, LANDMARKS>;
 
-/// Reads settings and map, and makes what the service port speaks of. What is wrong is logged; the settings that cannot
+/// Reads settings and maps, and makes what the service port speaks of. What is wrong is logged; the settings that cannot
 /// be read are the default ones. `has_slots` says whether there is room for `maps.slam`.
 #[must_use]
 #[inline(never)]
-pub fn read<F: NorFlash>(flash: F, map: &'static mut KeptMap, panic: &'static str, has_slots: bool) -> Controller<F> {
+pub fn read<F: NorFlash>(
+    flash: F,
+    contour_flash: Option<F>,
+    map: &'static mut KeptMap,
+    panic: &'static str,
+    has_slots: bool,
+) -> Controller<F> {
     let mut settings = Settings::default();
     let mut store = Store::new(flash);
     let mut key = None;
@@ -61,10 +68,25 @@ pub fn read<F: NorFlash>(flash: F, map: &'static mut KeptMap, panic: &'static st
         defmt::error!("settings: maps.slam is switched off, because this image has no room for it");
         settings.parameters.maps.slam = false;
     }
+    let contours = contour_flash.and_then(ContourStore::open);
+    if let Some(found) = contours.as_ref().and_then(ContourStore::found) {
+        defmt::info!("settings: a map of contours of {} bytes", found.length);
+    }
     if !panic.is_empty() {
         defmt::error!("before this start: {}", panic);
     }
-    Controller { software: SOFTWARE, settings, store, landmarks: map, key, starts: 0, nonces: 0, panic, map: None }
+    Controller {
+        software: SOFTWARE,
+        settings,
+        store,
+        landmarks: map,
+        key,
+        starts: 0,
+        nonces: 0,
+        panic,
+        map: None,
+        contours,
+    }
 }
 
 /// Counts this start. When the page is full, this takes as long as a page of flash takes to erase.

@@ -11,7 +11,7 @@ use agv_controller::BusEvent;
 use agv_core::localizer::{self, Event, OutputPredictor, Parameters};
 use agv_core::measurement::{EncoderSample, Scan, Time};
 use agv_core::record::Record;
-use agv_firmware::app::log_stream::{LONGEST, LogWriter};
+use agv_firmware::app::log_stream::{LONGEST, LogQueue, LogWriter};
 use agv_firmware::app::{exchange, localize};
 use agv_firmware::board::an500::host_file::{HostFile, HostFileError};
 use agv_firmware::board::an500::interrupts::{self, BUS_TASKS, Interrupt};
@@ -40,6 +40,7 @@ type Localization = localize::Localization<Capacities>;
 static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new());
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 static FRAME: ConstStaticCell<[u8; LONGEST]> = ConstStaticCell::new([0; LONGEST]);
+static QUEUE: StaticCell<LogQueue> = StaticCell::new();
 
 /// Ticks between samples, and the time between them: no multiple of anything, so that they meet a scan's work everywhere.
 const STEP: u32 = 120;
@@ -83,7 +84,7 @@ async fn encoders(parameters: Parameters) {
 fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().expect("the program begins once");
     let mut file = HostFile::open(c"drive.agvlog").expect("there is a drive");
-    let mut log = Some(LogWriter::new(FRAME.take(), 0));
+    let mut log = Some(LogWriter::new(FRAME.take(), QUEUE.init_with(LogQueue::new), 0));
     let mut localization: Option<Localization> = None;
     let mut scans = 0;
     time_driver::start();

@@ -10,7 +10,7 @@ use agv_firmware::app::announced_flash::AnnouncedFlash;
 use agv_firmware::app::capacities::has_slots;
 use agv_firmware::app::exchange::RevolutionReceiver;
 use agv_firmware::app::laser::LaserMemory;
-use agv_firmware::app::log_stream::{Beginning, LONGEST, LogMemory, LogWriter};
+use agv_firmware::app::log_stream::{Beginning, LONGEST, LogMemory, LogQueue, LogWriter};
 use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::settings::KeptMap;
 use agv_firmware::app::supervision::Supervisor;
@@ -25,7 +25,7 @@ use embassy_executor::Spawner;
 use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::zerocopy_channel::Channel;
-use static_cell::{ConstStaticCell, StaticCell};
+use static_cell::StaticCell;
 
 #[panic_handler]
 fn on_panic(info: &PanicInfo) -> ! {
@@ -49,27 +49,38 @@ type Localization = localize::Localization<Capacities>;
 static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
 static SETTINGS: StaticCell<Settings> = StaticCell::new();
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
-static LOCALIZATION: StaticCell<Localization> = StaticCell::new();
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
-static LASER: StaticCell<LaserMemory> = StaticCell::new();
-static LOG: ConstStaticCell<LogMemory> = ConstStaticCell::new(LogMemory::new());
-static FRAME: ConstStaticCell<[u8; LONGEST]> = ConstStaticCell::new([0; LONGEST]);
-static SERVICES: ConstStaticCell<[ServiceMemory; CONNECTIONS]> =
-    ConstStaticCell::new([const { ServiceMemory::new() }; CONNECTIONS]);
 static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
 
 /// Large values apart from the localiser, in whichever memory the board has for them. A cell without a value is all zero, which is
 /// what that memory begins with.
 #[allow(unsafe_code, reason = "the section is that of the boards' memory for such values")]
 mod large {
+    use agv_firmware::app::laser::LaserMemory;
+    use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogQueue};
+    use agv_firmware::app::service::ServiceMemory;
     use agv_firmware::app::settings::KeptMap;
     use agv_wire::nav350::Revolution;
     use static_cell::StaticCell;
+
+    use super::{CONNECTIONS, Localization};
 
     #[unsafe(link_section = ".large")]
     pub static MAP: StaticCell<KeptMap> = StaticCell::new();
     #[unsafe(link_section = ".large")]
     pub static REVOLUTIONS: StaticCell<[Revolution; 1]> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static LOG: StaticCell<LogMemory> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static LOG_QUEUE: StaticCell<LogQueue> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static FRAME: StaticCell<[u8; LONGEST]> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static SERVICES: StaticCell<[ServiceMemory; CONNECTIONS]> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static LASER: StaticCell<LaserMemory> = StaticCell::new();
+    #[unsafe(link_section = ".large")]
+    pub static LOCALIZATION: StaticCell<Localization> = StaticCell::new();
 }
 
 /// What all tasks of the network know.
@@ -78,6 +89,7 @@ struct Shared {
     settings: &'static Settings,
     controller: &'static SharedController<Flash>,
     landmarks: &'static [agv_core::maps::Landmark],
+    log: &'static LogQueue,
 }
 
 #[embassy_executor::task]
@@ -108,14 +120,14 @@ async fn watch_task() -> ! {
 
 #[embassy_executor::task]
 async fn laser_task(stack: Stack<'static>, revolutions: exchange::RevolutionSender, settings: &'static Settings) -> ! {
-    laser::run(stack, LASER.init_with(LaserMemory::new), revolutions, &settings.network).await
+    laser::run(stack, large::LASER.init_with(LaserMemory::new), revolutions, &settings.network).await
 }
 
 #[embassy_executor::task]
 async fn log_task(stack: Stack<'static>, shared: Shared) -> ! {
-    let Shared { settings, landmarks, .. } = shared;
+    let Shared { settings, landmarks, log, .. } = shared;
     let beginning = Beginning { parameters: &settings.parameters, capacities: Localizer::CAPACITIES, landmarks };
-    log_stream::run(stack, LOG.take(), settings.network.log_port, beginning).await
+    log_stream::run(stack, large::LOG.init_with(LogMemory::new), log, settings.network.log_port, beginning).await
 }
 
 #[embassy_executor::task(pool_size = CONNECTIONS)]
@@ -143,7 +155,7 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
     spawner.spawn(network_task(runner).expect("the task runs once"));
     spawner.spawn(laser_task(stack, revolutions, shared.settings).expect("the task runs once"));
     spawner.spawn(log_task(stack, shared).expect("the task runs once"));
-    for memory in SERVICES.take() {
+    for memory in large::SERVICES.init_with(|| [const { ServiceMemory::new() }; CONNECTIONS]) {
         spawner.spawn(service_task(stack, memory, shared).expect("there are as many tasks as connections"));
     }
 }
@@ -169,7 +181,7 @@ fn build_localization(
     settings: &Settings,
     log: LogWriter,
 ) -> &'static mut Localization {
-    LOCALIZATION
+    large::LOCALIZATION
         .init_with(|| Localization { localization: agv_controller::Localization::new(localizer, settings), log })
 }
 
@@ -177,6 +189,13 @@ fn build_localization(
 fn share(controller: Controller<Flash>) -> (&'static Settings, &'static SharedController<Flash>) {
     let settings = SETTINGS.init_with(|| controller.settings.clone());
     (settings, CONTROLLER.init_with(|| SharedController::new(controller)))
+}
+
+/// The map of contours, where it lies.
+fn contour_bytes(controller: &Controller<Flash>) -> Option<&'static [u8]> {
+    let store = controller.contours.as_ref()?;
+    let found = store.found()?;
+    Current::contour_bytes(store.offset(found.copy), found.length)
 }
 
 /// What has brought this start about, if it was no good; empty if nothing was wrong.
@@ -190,24 +209,34 @@ fn failure(cause: RestartCause) -> &'static str {
 #[inline(never)]
 fn start() -> Vehicle {
     let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let Parts { can, ethernet, flash, watchdog, restart_cause, troubles } = Current::start(core);
+    let Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
     let failure = failure(restart_cause);
     let supervisor = Supervisor::start();
-    let flash = AnnouncedFlash::new(flash, !Current::RUNS_WHILE_FLASH_WORKS);
-    let mut controller = settings::read(flash, large::MAP.init_with(KeptMap::new), failure, has_slots::<Capacities>());
+    let announced = |flash| AnnouncedFlash::new(flash, !Current::RUNS_WHILE_FLASH_WORKS);
+    let map = large::MAP.init_with(KeptMap::new);
+    let (flash, contour_flash) = (announced(flash), contour_flash.map(announced));
+    let mut controller = settings::read(flash, contour_flash, map, failure, has_slots::<Capacities>());
     if !Current::RUNS_WHILE_FLASH_WORKS {
         settings::count_start(&mut controller);
     }
     let landmarks = controller.landmarks;
+    let contours = contour_bytes(&controller);
     let (settings, controller) = share(controller);
     let localizer = build_localizer(&settings.parameters);
     if localizer.lend_landmarks(landmarks).is_err() {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
         exchange::set_settings_sound(false);
     }
+    if let Some(bytes) = contours
+        && let Err(error) = localizer.lend_contours(bytes)
+    {
+        defmt::error!("the map of contours cannot be used: {}", error as u8);
+        exchange::set_settings_sound(false);
+    }
     let channel = CHANNEL.init_with(|| Channel::new(large::REVOLUTIONS.init_with(|| [Revolution::new()])));
     let (sender, revolutions) = channel.split();
-    let log = LogWriter::new(FRAME.take(), landmarks.len());
+    let queue: &LogQueue = large::LOG_QUEUE.init_with(LogQueue::new);
+    let log = LogWriter::new(large::FRAME.init_with(|| [0; LONGEST]), queue, landmarks.len());
     let localization = build_localization(localizer, settings, log);
     exchange::publish(localization.localization.estimate());
     let troubles = Troubles {
@@ -218,7 +247,7 @@ fn start() -> Vehicle {
     let can = Current::take_part(can, settings.bit_rate);
     Current::bus_tasks()
         .spawn(bus_task(can, settings, controller, carried_map(landmarks), troubles).expect("the task runs once"));
-    let shared = Shared { settings, controller, landmarks };
+    let shared = Shared { settings, controller, landmarks, log: queue };
     // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for. That may
     // take as long as a page takes to erase: so nothing else waits for it where the processor goes on meanwhile, and where it
     // does not, it is done before the bus hears anything.

@@ -49,13 +49,17 @@ pub trait Board: Sized + 'static {
     type Can: CanPort + 'static;
     /// The network.
     type Ethernet: Driver + 'static;
-    /// Where settings are kept: at least two pages.
+    /// Where settings are kept, and maps of contours: at least two pages.
     type Flash: NorFlash + 'static;
     /// The watchdog.
     type Watchdog: Watchdog;
 
     /// Starts everything but the tasks. The watchdog comes first, as what hangs behind it ends in a restart.
     fn start(core: cortex_m::Peripherals) -> Parts<Self>;
+
+    /// Bytes of the map of contours, from that offset of its flash on. None if there are none. Call once, when they have been read through the
+    /// flash; nobody writes them as long as the program runs.
+    fn contour_bytes(offset: u32, length: u32) -> Option<&'static [u8]>;
 
     /// Takes part in the bus of that many kbit/s. Call once.
     fn take_part(can: Self::CanParts, bit_rate: u16) -> Self::Can;
@@ -84,6 +88,8 @@ pub struct Parts<B: Board> {
     pub ethernet: B::Ethernet,
     /// Where settings are kept.
     pub flash: B::Flash,
+    /// Where the map of contours is kept, if the board has room for one.
+    pub contour_flash: Option<B::Flash>,
     /// The watchdog, which runs.
     pub watchdog: B::Watchdog,
     /// Why the program has started.

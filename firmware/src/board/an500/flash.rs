@@ -1,5 +1,5 @@
-//! The settings' flash of the emulated board: the file `flash.bin` in the emulating machine's folder, with the pages and
-//! words of the STM32H743.
+//! The flash of the emulated board: files in the emulating machine's folder, `flash.bin` of the settings and `contours.bin` of the map of
+//! contours, with the pages and words of the STM32H743.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
@@ -8,8 +8,8 @@ use embedded_storage::nor_flash::{
 use super::host_file::{HostFile, HostFileError};
 
 /// Bytes of a page.
-const PAGE: usize = 128 * 1024;
-/// Pages.
+pub const PAGE: usize = 128 * 1024;
+/// Pages of a file.
 const PAGES: usize = 2;
 /// Bytes of a word.
 const WORD: usize = 32;
@@ -38,17 +38,16 @@ impl From<HostFileError> for FlashError {
 impl FileFlash {
     /// Opens the file; makes it, erased, if there is none.
     #[must_use]
-    pub fn open() -> Self {
-        const NAME: &core::ffi::CStr = c"flash.bin";
-        if let Ok(file) = HostFile::open_to_change(NAME) {
+    pub fn open(name: &core::ffi::CStr) -> Self {
+        if let Ok(file) = HostFile::open_to_change(name) {
             return Self { file: Ok(file) };
         }
-        if let Ok(mut file) = HostFile::create(NAME) {
+        if let Ok(mut file) = HostFile::create(name) {
             for _ in 0..PAGES * PAGE / ERASED.len() {
                 let _ = file.write(&ERASED);
             }
         }
-        Self { file: HostFile::open_to_change(NAME) }
+        Self { file: HostFile::open_to_change(name) }
     }
 
     fn at(&mut self, offset: usize) -> Result<&mut HostFile, FlashError> {

@@ -12,9 +12,13 @@ pub mod time_driver;
 pub mod uart;
 pub mod watchdog;
 
-use agv_core::localizer::SlamWithLentMap;
+use core::ffi::CStr;
+
+use agv_core::localizer::LentCapacities;
 use defmt_semihosting as _;
 use embassy_executor::SendSpawner;
+use embedded_storage::nor_flash::ReadNorFlash;
+use static_cell::ConstStaticCell;
 
 use super::{Board, Parts, RestartCause, Troubles, large};
 use flash::FileFlash;
@@ -23,6 +27,10 @@ use lan9118::Lan9118;
 use uart::SlcanPort;
 use watchdog::ApbWatchdog;
 
+/// Files of the flash.
+const SETTINGS: &CStr = c"flash.bin";
+const CONTOURS: &CStr = c"contours.bin";
+
 /// The board, with room for what the vehicle's board has room for.
 pub struct An500;
 
@@ -30,7 +38,7 @@ impl Board for An500 {
     const NAME: &'static str = "MPS2 AN500";
     const RUNS_WHILE_FLASH_WORKS: bool = true;
 
-    type Capacities = SlamWithLentMap<'static>;
+    type Capacities = LentCapacities<'static>;
     type CanParts = SlcanPort;
     type Can = SlcanPort;
     type Ethernet = Lan9118;
@@ -51,11 +59,19 @@ impl Board for An500 {
         Parts {
             can: SlcanPort,
             ethernet,
-            flash: FileFlash::open(),
+            flash: FileFlash::open(SETTINGS),
+            contour_flash: Some(FileFlash::open(CONTOURS)),
             watchdog,
             restart_cause: RestartCause::Other,
             troubles: Troubles::NONE,
         }
+    }
+
+    fn contour_bytes(offset: u32, length: u32) -> Option<&'static [u8]> {
+        static BYTES: ConstStaticCell<[u8; flash::PAGE]> = ConstStaticCell::new([0; flash::PAGE]);
+        let bytes = BYTES.take().get_mut(..length as usize)?;
+        FileFlash::open(CONTOURS).read(offset, bytes).ok()?;
+        Some(bytes)
     }
 
     /// Its bit rate is a matter of the adapter.

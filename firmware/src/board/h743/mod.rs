@@ -1,10 +1,10 @@
 //! The vehicle's board: a Nucleo-H743ZI with an STM32H743ZI (UM1974, UM2407, RM0433).
 //!
-//! 2 MB of flash in two banks, of which the second one keeps the settings: the program goes on while it is written. 480 MHz,
+//! 2 MB of flash in two banks, of which the second one keeps settings and maps: the program goes on while it is written. 480 MHz,
 //! or 400 MHz where the silicon allows no more.
 #![allow(unsafe_code, reason = "a register of the buses has no name in the library")]
 
-use agv_core::localizer::SlamWithLentMap;
+use agv_core::localizer::LentCapacities;
 use embassy_stm32::Config;
 use embassy_stm32::pac::{DBGMCU, RCC};
 use embassy_stm32::rcc::{Pll, PllDiv, PllMul, VoltageScale};
@@ -32,18 +32,19 @@ impl Chip for Stm32h743 {
     const NAME: &'static str = "Nucleo-H743ZI";
     const SETTINGS: Bank = Bank::Second;
     const NOT_CACHED: &'static [Region] = &[
-        // SRAM1 of domain D2, where the Ethernet's DMA reads and writes.
-        Region { base: 0x3000_0000, size: 128 * 1024 },
+        // The beginning of SRAM1 of domain D2, where the Ethernet's DMA reads and writes.
+        Region { base: 0x3000_0000, size: 32 * 1024 },
         // SRAM4 of domain D3: what is kept over a reset, which throws lines of the cache away.
         Region { base: 0x3800_0000, size: 64 * 1024 },
     ];
 
-    type Capacities = SlamWithLentMap<'static>;
+    type Capacities = LentCapacities<'static>;
 
     fn enable_memories() {
         RCC.ahb2enr().modify(|enabled| {
             enabled.set_sram1en(true);
             enabled.set_sram2en(true);
+            enabled.set_sram3en(true);
         });
         // The clocks run two cycles after the store (RM0433, 8.5.10): this waits for longer.
         let _ = RCC.ahb2enr().read();

@@ -1,5 +1,6 @@
-//! The settings' flash: the last two pages of a bank (RM0433, chapter 4). A program in another bank goes on while this one is
-//! written or erased; one in the same bank stands still, as whoever reads a bank that works waits.
+//! The flash of what is kept: two pages for the settings and, where the chip has them, two for the map of contours before them, at the end of
+//! a bank (RM0433, chapter 4). A program in another bank goes on while this one is written or erased; one in the same bank stands still, as
+//! whoever reads a bank that works waits.
 //!
 //! A loss of power while a word is programmed or a page erased leaves words with a double error, and reading one is a bus
 //! fault. So words are read while such faults are ignored, and a word with a double error reads as zeros, which no checksum
@@ -8,6 +9,8 @@
 
 use core::arch::asm;
 use core::marker::PhantomData;
+use core::ops::Range;
+use core::slice;
 
 use embassy_stm32::Peri;
 use embassy_stm32::pac::FLASH as REGISTERS;
@@ -22,6 +25,8 @@ use super::Chip;
 unsafe extern "C" {
     static _settings_start: u8;
     static _settings_length: u8;
+    static _contours_start: u8;
+    static _contours_length: u8;
 }
 
 /// Where the first bank begins, bytes.
@@ -84,18 +89,28 @@ impl NorFlashError for FlashError {
 
 type FlashWord = [u32; WORD / 4];
 
-/// The pages.
-pub struct SettingsFlash<C>(Peri<'static, FLASH>, PhantomData<C>);
+/// Pages that nobody else writes.
+pub struct Pages<C> {
+    /// Their addresses.
+    at: Range<usize>,
+    chip: PhantomData<C>,
+}
 
-impl<C: Chip> SettingsFlash<C> {
-    /// The pages of the chip's flash; those whose erasure was cut short are erased.
-    #[must_use]
-    pub fn open(flash: Peri<'static, FLASH>) -> Self {
-        let mut pages = Self(flash, PhantomData);
+/// The pages of the chip's flash, of the settings and of the map of contours, if it has some; those whose erasure was cut short are
+/// erased.
+#[must_use]
+pub fn open<C: Chip>(_: Peri<'static, FLASH>) -> (Pages<C>, Option<Pages<C>>) {
+    let contours = contours();
+    (Pages::open(settings()), (!contours.is_empty()).then(|| Pages::open(contours)))
+}
+
+impl<C: Chip> Pages<C> {
+    fn open(at: Range<usize>) -> Self {
+        let mut pages = Self { at, chip: PhantomData };
         for page in 0..pages.capacity() / PAGE {
             let (mut torn, mut written) = (0_usize, 0_usize);
             for offset in (page * PAGE..(page + 1) * PAGE).step_by(WORD) {
-                match read_word(C::SETTINGS, offset) {
+                match read_word(C::SETTINGS, pages.address(offset)) {
                     None => torn += 1,
                     Some(word) => written += usize::from(word != [u32::MAX; WORD / 4]),
                 }
@@ -106,26 +121,43 @@ impl<C: Chip> SettingsFlash<C> {
         }
         pages
     }
+
+    /// The address of an offset in the pages.
+    const fn address(&self, offset: usize) -> usize {
+        self.at.start + offset
+    }
 }
 
-/// Where the pages begin.
-pub fn first_address() -> usize {
-    FLASH_START + (&raw const _settings_start) as usize
+/// Bytes of the pages of contours, from an offset on, which the processor reads where they are. None beyond the pages.
+///
+/// Nobody may write them as long as they are used; one with a double error is a fault, so they are to be read through [`Pages`] before.
+#[must_use]
+pub fn contour_bytes(offset: usize, length: usize) -> Option<&'static [u8]> {
+    let at = contours();
+    let end = offset.checked_add(length).filter(|end| *end <= at.len())?;
+    // SAFETY: these are addresses of the pages, which are flash as long as the program runs; whoever keeps maps there writes the other copy.
+    Some(unsafe { slice::from_raw_parts((at.start + offset) as *const u8, end - offset) })
 }
 
-/// Bytes of all pages.
-pub fn length() -> usize {
-    (&raw const _settings_length) as usize
+/// Where the pages of the settings are.
+pub fn settings() -> Range<usize> {
+    addresses(&raw const _settings_start, &raw const _settings_length)
 }
 
-/// The address of an offset in the pages.
-fn address(offset: usize) -> usize {
-    first_address() + offset
+/// Where the pages of the map of contours are; nowhere on a chip that has none.
+pub fn contours() -> Range<usize> {
+    addresses(&raw const _contours_start, &raw const _contours_length)
 }
 
-/// Reads the word at an offset. None if it has a double error.
-fn read_word(bank: Bank, offset: usize) -> Option<FlashWord> {
-    let place = address(offset) as *const u32;
+/// Addresses by the symbols of the linker.
+fn addresses(start: *const u8, length: *const u8) -> Range<usize> {
+    let first = FLASH_START + start as usize;
+    first..first + length as usize
+}
+
+/// Reads the word at an address in the pages. None if it has a double error.
+fn read_word(bank: Bank, address: usize) -> Option<FlashWord> {
+    let place = address as *const u32;
     let mut word = [0; WORD / 4];
     // SAFETY: the address is a whole word within the pages. Nothing else runs while faults are masked, which lasts for
     // eight loads; `memory_protection` has set that bus faults are ignored then. One that is leaves a mark, which is cleared.
@@ -176,11 +208,11 @@ fn unlocked(which: Bank, work: impl FnOnce(BankRegisters)) -> Result<(), FlashEr
     if has_failed { Err(FlashError::Refused) } else { Ok(()) }
 }
 
-impl<C: Chip> ErrorType for SettingsFlash<C> {
+impl<C: Chip> ErrorType for Pages<C> {
     type Error = FlashError;
 }
 
-impl<C: Chip> ReadNorFlash for SettingsFlash<C> {
+impl<C: Chip> ReadNorFlash for Pages<C> {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
@@ -189,7 +221,7 @@ impl<C: Chip> ReadNorFlash for SettingsFlash<C> {
         let mut rest = bytes;
         while !rest.is_empty() {
             let skipped = offset % WORD;
-            let word = read_word(C::SETTINGS, offset - skipped).unwrap_or_default();
+            let word = read_word(C::SETTINGS, self.address(offset - skipped)).unwrap_or_default();
             let count = rest.len().min(WORD - skipped);
             let (now, later) = rest.split_at_mut(count);
             let read = word.iter().flat_map(|part| part.to_le_bytes()).skip(skipped);
@@ -201,18 +233,18 @@ impl<C: Chip> ReadNorFlash for SettingsFlash<C> {
     }
 
     fn capacity(&self) -> usize {
-        length()
+        self.at.len()
     }
 }
 
-impl<C: Chip> NorFlash for SettingsFlash<C> {
+impl<C: Chip> NorFlash for Pages<C> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = PAGE;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         check_erase(self, from, to).map_err(FlashError::Place)?;
         for offset in (from as usize..to as usize).step_by(PAGE) {
-            let page = (address(offset) - C::SETTINGS.start()) / PAGE;
+            let page = (self.address(offset) - C::SETTINGS.start()) / PAGE;
             unlocked(C::SETTINGS, |bank| {
                 bank.cr().write(|control| {
                     control.set_psize(PARALLELISM);
@@ -232,6 +264,7 @@ impl<C: Chip> NorFlash for SettingsFlash<C> {
             for (part, bytes) in word.iter_mut().zip(bytes.as_chunks().0) {
                 *part = u32::from_le_bytes(*bytes);
             }
+            let address = self.address(offset);
             unlocked(C::SETTINGS, |bank| {
                 bank.cr().write(|control| {
                     control.set_psize(PARALLELISM);
@@ -240,10 +273,10 @@ impl<C: Chip> NorFlash for SettingsFlash<C> {
                 cortex_m::asm::dsb();
                 for (part, number) in word.iter().zip(0..) {
                     // SAFETY: the address is within a whole word of the pages, which are flash, unlocked to be programmed.
-                    unsafe { (address(offset) as *mut u32).add(number).write_volatile(*part) };
+                    unsafe { (address as *mut u32).add(number).write_volatile(*part) };
                 }
             })?;
-            if read_word(C::SETTINGS, offset) != Some(word) {
+            if read_word(C::SETTINGS, address) != Some(word) {
                 return Err(FlashError::Refused);
             }
         }

@@ -2,6 +2,8 @@
 //! "Memory protection unit").
 #![allow(unsafe_code, reason = "memory attributes have no safe interface")]
 
+use core::ops::Range;
+
 use cortex_m::peripheral::MPU;
 
 use super::flash;
@@ -32,11 +34,14 @@ pub struct Region {
 
 /// Sets all of it up, and that words of flash with a double error can be read. Before the caches are on.
 ///
-/// The settings' flash is device memory: after it was written, the cache would go on to give what was there before.
+/// The settings' flash is device memory: after it was written, the cache would go on to give what was there before. So it would for the map of
+/// contours, which is read where it is and at any address, as no device memory can be. A region without bytes is none.
 pub fn enable(mpu: &mut MPU, not_cached: &[Region]) {
-    let settings = Region { base: flash::first_address() as u32, size: flash::length() as u32 };
+    let region = |at: Range<usize>| Region { base: at.start as u32, size: at.len() as u32 };
+    let (settings, contours) = (region(flash::settings()), region(flash::contours()));
     let guard = Region { base: stack::bottom() as u32, size: stack::guard() as u32 };
-    let apart = [(&settings, FULL_ACCESS | DEVICE), (&guard, NO_ACCESS)];
+    let apart = [(&settings, FULL_ACCESS | DEVICE), (&contours, FULL_ACCESS | NOT_CACHED), (&guard, NO_ACCESS)];
+    let apart = apart.into_iter().filter(|(region, _)| region.size > 0);
     let regions = not_cached.iter().map(|region| (region, FULL_ACCESS | NOT_CACHED)).chain(apart);
     // SAFETY: nothing refers to these parts of memory yet: neither the Ethernet nor the settings have started, and the
     // stack has not come to its end.

@@ -34,14 +34,14 @@ use super::{Board, Parts, Troubles, large};
 use can::{CanParts, FdCanPort};
 use clocks::Source;
 use ethernet::{Ethernet, Queue, Wires};
-use flash::SettingsFlash;
+use flash::Pages;
 use watchdog::IndependentWatchdog;
 
 /// What a chip has, and its board is called.
 pub trait Chip: 'static {
     /// What the board is called on the bus.
     const NAME: &'static str;
-    /// The bank of flash that the settings are in.
+    /// The bank of flash that the settings and the map of contours are in.
     const SETTINGS: Bank;
     /// Memories that are not cached.
     const NOT_CACHED: &'static [Region];
@@ -97,7 +97,7 @@ impl<C: Chip> Board for Nucleo<C> {
     type CanParts = CanParts;
     type Can = FdCanPort;
     type Ethernet = Ethernet;
-    type Flash = SettingsFlash<C>;
+    type Flash = Pages<C>;
     type Watchdog = IndependentWatchdog;
 
     fn start(mut core: cortex_m::Peripherals) -> Parts<Self> {
@@ -145,13 +145,17 @@ impl<C: Chip> Board for Nucleo<C> {
             managed: (peripherals.PA2, peripherals.PC1),
         };
         let ethernet = Ethernet::start(queue, wires);
-        let flash = SettingsFlash::open(peripherals.FLASH);
+        let (flash, contour_flash) = flash::open(peripherals.FLASH);
         let troubles = Troubles {
             has_ethernet: ethernet.is_alive(),
             has_crystal: source.has_crystal(),
             are_options_right: option_bytes::are_right(),
         };
-        Parts { can, ethernet, flash, watchdog, restart_cause, troubles }
+        Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles }
+    }
+
+    fn contour_bytes(offset: u32, length: u32) -> Option<&'static [u8]> {
+        flash::contour_bytes(offset as usize, length as usize)
     }
 
     fn take_part(can: CanParts, bit_rate: u16) -> FdCanPort {

@@ -17,13 +17,14 @@ use agv_wire::can::frame::{Frame, Id, standard_id};
 use agv_wire::nav350::SensorFrame;
 use serde::{Deserialize, Serialize};
 
-use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose};
-use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like, write_flash};
+use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose, knows_where_it_is};
+use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like, write_contours, write_flash};
 use crate::emulate::board::{ADDRESS, HOST};
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::EmulatedMotion;
 use crate::live::stream::LogCopy;
 use crate::log::Reader;
+use crate::mapping::contour_map::ContourMap;
 use crate::recording::{Recording, truth_or_stand_at};
 use crate::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
 
@@ -37,6 +38,8 @@ const STEP: u64 = 1_000;
 struct Vehicle<'a> {
     /// The settings' flash.
     flash: &'a Path,
+    /// That of the map of contours, if there is one.
+    contours: Option<&'a Path>,
     controller: [u8; 4],
     host: [u8; 4],
     laser_port: u16,
@@ -132,6 +135,7 @@ fn bytes(text: &str) -> Result<Vec<u8>, VehicleError> {
 /// The sensors, and what was heard of the controller.
 struct Play<'a> {
     recording: &'a Recording,
+    is_told: bool,
     controller: NodeId,
     motion: EmulatedMotion,
     gyro: Option<EmulatedGyro>,
@@ -160,7 +164,16 @@ pub struct InChip {
     pub stack: u32,
 }
 
-/// Lets the vehicle drive for `seconds` of a recording, or to its end, with the controller that `program` emulates. Settings and
+/// What is in the chip beside the reflectors of the recording, and what it is told.
+#[derive(Clone, Copy, Default)]
+pub struct InChipOptions<'a> {
+    /// The map of contours.
+    pub contours: Option<&'a ContourMap>,
+    /// Whether it has to find out where it is.
+    pub is_not_told: bool,
+}
+
+/// Lets the vehicle drive for `seconds` of a recording, or to its end, with the controller that `program` emulates. Settings, map and
 /// log are in `folder`.
 ///
 /// # Errors
@@ -170,16 +183,26 @@ pub fn drive_in_chip(
     program: Command,
     folder: &Path,
     seconds: f64,
+    options: InChipOptions,
 ) -> Result<InChip, VehicleError> {
     let settings = settings_like(recording, LASER_PORT);
     let flash = write_flash(folder, &settings, &recording.landmarks, None)?;
+    let contours = write_contours(folder, options.contours)?;
     let log_port = settings.network.log_port;
-    let vehicle = Vehicle { flash: &flash, controller: ADDRESS, host: HOST, laser_port: LASER_PORT, log_port };
+    let vehicle = Vehicle {
+        flash: &flash,
+        contours: contours.as_deref(),
+        controller: ADDRESS,
+        host: HOST,
+        laser_port: LASER_PORT,
+        log_port,
+    };
     let mut chip = Chip::start(program, &vehicle)?;
     let sensor_drive = Drive::new(recording, SensorFrame::default())?;
     let controller = NodeId::new(settings.nodes.controller).unwrap_or(FIRST_NODE);
     let mut play = Play {
         recording,
+        is_told: !options.is_not_told,
         controller,
         motion: EmulatedMotion::new(recording, &EncoderNodes::of(&settings))?.standing(),
         gyro: EmulatedGyro::of(recording, &settings.gyro_frame),
@@ -250,9 +273,12 @@ impl Play<'_> {
         if self.begin.is_some() {
             return Ok(());
         }
-        if matches!(self.mode(), Some(Mode::Reflectors | Mode::Mixed)) {
+        if self.mode().is_some_and(knows_where_it_is) {
             self.drive_off(now);
-        } else if self.motion.are_operational() && now > self.last_order + BETWEEN_ORDERS.as_micros() as u64 {
+        } else if self.is_told
+            && self.motion.are_operational()
+            && now > self.last_order + BETWEEN_ORDERS.as_micros() as u64
+        {
             self.last_order = now;
             self.orders = (self.orders + 1) % 16;
             let pose = truth_or_stand_at(&self.recording.truth, self.first);

@@ -22,7 +22,7 @@ use agv_settings::Settings;
 use agv_settings::store::KEY;
 use agv_wire::nav350::SensorFrame;
 
-pub use chip::{InChip, drive_in_chip};
+pub use chip::{InChip, InChipOptions, drive_in_chip};
 pub use error::VehicleError;
 pub use pose_errors::{Errors, errors};
 pub use watch::{BusTrouble, HeardEmergency, HeardPose, Watch};
@@ -30,7 +30,8 @@ pub use watch::{BusTrouble, HeardEmergency, HeardPose, Watch};
 use super::board::{self, Board};
 use crate::live::relay::Relay;
 use crate::live::stream::StreamSummary;
-use crate::provision::flash_image;
+use crate::mapping::contour_map::ContourMap;
+use crate::provision::{contour_image, flash_image};
 use crate::recording::Recording;
 use crate::serve::nav350::{Drive, Nav350, Options};
 use stage::Stage;
@@ -46,6 +47,8 @@ pub struct VehicleOptions<'a> {
     pub key: Option<[u8; KEY]>,
     /// Whether the flash begins with settings. If not, the controller finds the file `flash.bin` that is there.
     pub provision: bool,
+    /// Its map of contours, if it has one; written if the flash begins with settings.
+    pub contours: Option<&'a ContourMap>,
     /// Whether the controller is told where it is when it starts. If not, or if the recording has no truth, it has to find out.
     pub is_told: bool,
 }
@@ -97,6 +100,19 @@ fn write_flash(
     Ok(path)
 }
 
+/// Writes the flash of the map of contours into a folder, and says where. Without a map there is none.
+fn write_contours(folder: &Path, map: Option<&ContourMap>) -> Result<Option<PathBuf>, VehicleError> {
+    let path = folder.join("contours.bin");
+    let Some(map) = map else {
+        return match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
+            _ => Ok(None),
+        };
+    };
+    std::fs::write(&path, contour_image(map)?)?;
+    Ok(Some(path))
+}
+
 /// Lets the vehicle drive for `seconds` of a recording, or to its end. `watch` is called once, at the start, to look on
 /// and make trouble.
 ///
@@ -116,6 +132,7 @@ pub fn drive(
     let settings = settings_like(recording, laser_port);
     if options.provision {
         write_flash(options.folder, &settings, &recording.landmarks, options.key.as_ref())?;
+        write_contours(options.folder, options.contours)?;
     }
     let (board, bus) = Board::start(options.image, options.folder)?;
     let log = options.folder.join("stream.agvlog");

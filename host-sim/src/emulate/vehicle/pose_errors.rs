@@ -3,18 +3,18 @@
 use std::time::Instant;
 
 use agv_core::geometry::{Pose, wrap};
-use agv_core::state::Mode;
 use serde::Serialize;
 
 use super::Driven;
+use super::stage::knows_where_it_is;
 use crate::recording::{Recording, truth_at};
 
 /// How far the poses on the bus were from the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Errors {
-    /// Poses with reflectors, while driving.
+    /// Poses that rest on what is seen, while driving.
     pub poses: usize,
-    /// Share of all poses while driving that had reflectors.
+    /// Share of all poses while driving that do.
     pub localised_share: f64,
     /// Position: 95 % mark, m.
     pub position_p95_m: f64,
@@ -57,7 +57,7 @@ pub fn errors(driven: &Driven, recording: &Recording) -> Option<Errors> {
         let Some(truth) = truth_at(&recording.truth, driven.first.offset(since)) else { continue };
         all += 1;
         longest_gap = longest_gap.max(gap);
-        if !matches!(heard.pose.mode, Mode::Reflectors | Mode::Mixed) {
+        if !knows_where_it_is(heard.pose.mode) {
             continue;
         }
         let Pose { x, y, theta } = heard.pose.pose;
