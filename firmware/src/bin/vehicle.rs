@@ -52,7 +52,7 @@ static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
 static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
 
-/// Large values apart from the localiser, in whichever memory the board has for them. A cell without a value is all zero, which is
+/// Large values apart from the localiser, and what tasks work with, in whichever memory the board has for each. A cell without a value is all zero, which is
 /// what that memory begins with.
 #[allow(unsafe_code, reason = "the section is that of the boards' memory for such values")]
 mod large {
@@ -69,17 +69,17 @@ mod large {
     pub static MAP: StaticCell<KeptMap> = StaticCell::new();
     #[unsafe(link_section = ".large")]
     pub static REVOLUTIONS: StaticCell<[Revolution; 1]> = StaticCell::new();
-    #[unsafe(link_section = ".large")]
+    #[unsafe(link_section = ".tasks")]
     pub static LOG: StaticCell<LogMemory> = StaticCell::new();
-    #[unsafe(link_section = ".large")]
+    #[unsafe(link_section = ".tasks")]
     pub static LOG_QUEUE: StaticCell<LogQueue> = StaticCell::new();
-    #[unsafe(link_section = ".large")]
+    #[unsafe(link_section = ".tasks")]
     pub static FRAME: StaticCell<[u8; LONGEST]> = StaticCell::new();
-    #[unsafe(link_section = ".large")]
+    #[unsafe(link_section = ".tasks")]
     pub static SERVICES: StaticCell<[ServiceMemory; CONNECTIONS]> = StaticCell::new();
-    #[unsafe(link_section = ".large")]
+    #[unsafe(link_section = ".tasks")]
     pub static LASER: StaticCell<LaserMemory> = StaticCell::new();
-    #[unsafe(link_section = ".large")]
+    #[unsafe(link_section = ".tasks")]
     pub static LOCALIZATION: StaticCell<Localization> = StaticCell::new();
 }
 

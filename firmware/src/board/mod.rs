@@ -2,7 +2,7 @@
 //!
 //! A board is a folder with a type that implements [`Board`], and a line here. Its `memory.x`, which `build.rs` gives to
 //! the linker, says where the stack is and how much of its end is out of reach (`_stack_start`, `_stack_end`,
-//! `_stack_guard`), where large values go (`.large`), and what outlives a restart (`.retained`).
+//! `_stack_guard`), where large values and those of the tasks go (`.large`, `.tasks`), and what outlives a restart (`.retained`).
 
 #[cfg(feature = "an500")]
 pub mod an500;
