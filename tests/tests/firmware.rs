@@ -8,6 +8,7 @@ mod reference_drive;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use agv_host_sim::mapping::contour_map::{CELL, map_contours_at};
 use agv_host_sim::{log, replay};
 use agv_lab::evaluate::demonstration;
 use agv_tests::{emulator, image};
@@ -53,7 +54,7 @@ fn the_emulated_controller_says_the_same_bits() {
 }
 
 /// Most instructions that a piece of work may take: with 480 MHz, the scan cycle ends in about 10 ms.
-const BUDGETS: [(&str, u64); 10] = [
+const BUDGETS: [(&str, u64); 12] = [
     ("prediction", 4_000),
     ("one reflector update", 25_000),
     ("solutions of a revolution of 6 reflectors", 200_000),
@@ -64,6 +65,8 @@ const BUDGETS: [(&str, u64); 10] = [
     ("scan cycle with contours of the way behind", 12_000_000),
     ("a revolution's search among 60 reflectors", 1_000_000),
     ("a revolution's search among 1000 reflectors", 50_000_000),
+    ("scan cycle in a kept map of contours", 12_000_000),
+    ("a search among contours", 40_000_000),
 ];
 
 #[test]
@@ -73,6 +76,8 @@ fn work_costs_the_instructions_that_it_did() {
     let drive = drives.iter().find(|drive| drive.name == "mixed").unwrap();
     let folder = tempfile::tempdir().unwrap();
     log::write(&folder.path().join("drive.agvlog"), &drive.recording).unwrap();
+    let contours = map_contours_at(&drive.recording, &drive.recording.truth, CELL);
+    std::fs::write(folder.path().join("contours.map"), contours.bytes()).unwrap();
     let measure = || {
         run(&images.join("measure"), folder.path(), &["-icount", "shift=6,sleep=off"]);
         std::fs::read_to_string(folder.path().join("instructions.csv")).unwrap()

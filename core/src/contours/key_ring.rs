@@ -75,7 +75,12 @@ impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
         let Some(key) = self.keys.get_mut(place) else { return };
         key.pose = *pose;
         key.points.clear();
-        key.points.extend(points.iter().filter_map(PackedPoint::of).take(POINTS));
+        for point in points.iter().filter_map(PackedPoint::of) {
+            // A scan has no more points than a key scan.
+            if key.points.push(point).is_err() {
+                break;
+            }
+        }
         // The remainder stays what it is when the count begins anew.
         self.made = if self.made >= 2 * KEYS { self.made - KEYS + 1 } else { self.made + 1 };
     }

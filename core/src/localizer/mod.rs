@@ -42,7 +42,7 @@ pub use parameters::{Limits, Parameters};
 
 pub use start_confirmation::StartRule;
 pub use start_finder::{StartFinder, StartState};
-pub use start_search::{CONTOUR_EFFORT_A_REVOLUTION, EFFORT_A_REVOLUTION, StartSearch};
+pub use start_search::{CONTOUR_EFFORT_A_REVOLUTION, CONTOUR_SLICE, EFFORT_A_REVOLUTION, StartSearch};
 
 pub use crate::measurement::PoseFix;
 pub use crate::sources::{

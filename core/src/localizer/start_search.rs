@@ -16,10 +16,10 @@ const SLICE: u32 = 2_000;
 /// that needs more goes on in the next revolution.
 pub const EFFORT_A_REVOLUTION: u32 = 1_600_000;
 
-/// Effort of a slice among contours, and at most in the time of one revolution: as long as those among reflectors.
-const CONTOUR_SLICE: u32 = 3_000;
+/// Effort of a slice among contours: as long as one among reflectors.
+pub const CONTOUR_SLICE: u32 = 3_000;
 
-/// See [`EFFORT_A_REVOLUTION`].
+/// The same at most in the time of one revolution: see [`EFFORT_A_REVOLUTION`].
 pub const CONTOUR_EFFORT_A_REVOLUTION: u32 = 2_400_000;
 
 /// Searches among the reflectors of the map, and in a map of contours, while the localiser has no pose.

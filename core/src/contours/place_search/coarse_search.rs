@@ -160,7 +160,10 @@ impl CoarseSearch {
                 continue;
             };
             if cell < coarsest.columns() * coarsest.rows() {
-                self.look(grid, (cell % coarsest.columns(), cell / coarsest.columns()), effort);
+                let (column, row) = (cell.checked_rem(coarsest.columns()), cell.checked_div(coarsest.columns()));
+                if let (Some(column), Some(row)) = (column, row) {
+                    self.look(grid, (column, row), effort);
+                }
                 self.cell = Some(cell + 1);
             } else {
                 (self.heading, self.cell) = (self.heading + 1, None);
@@ -230,7 +233,9 @@ impl CoarseSearch {
                 if let Some(offsets) = self.branch.headings.get_mut(level).and_then(|all| all.get_mut(branch)) {
                     offsets.clear();
                     // Both have the same room.
-                    offsets.extend(self.sought.iter().map(offset));
+                    for point in &self.sought {
+                        let _ = offsets.push(offset(point));
+                    }
                 }
             }
         }

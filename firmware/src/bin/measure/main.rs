@@ -3,6 +3,7 @@
 #![no_std]
 #![no_main]
 
+mod contours;
 mod search;
 mod separation;
 
@@ -27,6 +28,8 @@ use agv_wire::nav350::{
 use cortex_m_semihosting::{debug, hprintln};
 use heapless::{String, Vec};
 use static_cell::{ConstStaticCell, StaticCell};
+
+use contours::Contours;
 
 #[panic_handler]
 fn on_panic(info: &PanicInfo) -> ! {
@@ -99,6 +102,7 @@ fn main() -> ! {
     let mut slam: Option<&mut Localizer<SlamCapacities>> = None;
     let mut behind: Option<&mut Localizer> = None;
     let mut detector: Option<&mut falko::Detector<1440>> = None;
+    let mut kept: Option<Contours> = None;
     let points = POINTS.take();
     let map = MAP.init_with(FixedMap::new);
     map.extend(&thousand_reflectors()).expect("a thousand reflectors fit");
@@ -114,6 +118,7 @@ fn main() -> ! {
                 parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
                 slam = Some(SLAM.init_with(|| Localizer::new(parameters)));
                 behind = Some(BEHIND.init_with(|| Localizer::new(parameters)));
+                kept = Some(Contours::new(&parameters));
                 detector = Some(DETECTOR.init_with(|| falko::Detector::new(header.parameters.features.detector)));
             }
             (Record::Landmarks(landmarks), Some(localizer)) => {
@@ -124,6 +129,9 @@ fn main() -> ! {
                     features(&stopwatch, &mut counts, scan, points, detector, dynamic);
                 }
                 handle(&stopwatch, &mut counts, localizer, event);
+                if let Some(kept) = &mut kept {
+                    kept.handle(&stopwatch, event);
+                }
                 if let (Some(slam), Some(behind)) = (&mut slam, &mut behind) {
                     count_scan(&stopwatch, &mut counts.slam, *slam, event);
                     count_scan(&stopwatch, &mut counts.behind, *behind, event);
@@ -133,7 +141,7 @@ fn main() -> ! {
         })
         .expect("the log can be read");
     associate(&stopwatch, &mut counts, map);
-    write_table(&stopwatch, counts, map);
+    write_table(&stopwatch, counts, kept.expect("the log has a header"), map);
     debug::exit(debug::EXIT_SUCCESS);
     loop {
         cortex_m::asm::wfi();
@@ -141,12 +149,13 @@ fn main() -> ! {
 }
 
 /// Counts what needs no drive, and writes `instructions.csv`.
-fn write_table(stopwatch: &Stopwatch, counts: Counts, map: &mut FixedMap<1000>) {
+fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut FixedMap<1000>) {
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
     let Counts { prediction, reflector, scan, slam, behind, falko, association, map_update } = counts;
     let [few, many] = search::count(stopwatch, map);
+    let [in_map, slice, whole] = kept.counts();
     let [six, twenty] = separation::count(stopwatch);
     for count in [
         prediction,
@@ -162,6 +171,9 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, map: &mut FixedMap<1000>) 
         many,
         six,
         twenty,
+        in_map,
+        slice,
+        whole,
     ] {
         let mean = count.total / count.runs.max(1);
         writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");

@@ -3,7 +3,7 @@
 //! It stands still and sees one revolution after another, with default parameters and the effort that a revolution leaves.
 
 use agv_core::geometry::Pose;
-use agv_core::localizer::{CONTOUR_EFFORT_A_REVOLUTION, Event, Parameters, StartState};
+use agv_core::localizer::{CONTOUR_EFFORT_A_REVOLUTION, CONTOUR_SLICE, Event, Parameters, StartState};
 use agv_core::measurement::{PoseIncrement, Time};
 use agv_core::odometry::Vehicle;
 use agv_host_sim::accuracy::Spread;
@@ -65,9 +65,6 @@ const REVOLUTIONS: u32 = 40;
 
 /// Looks without an answer after which it is given up.
 const LOOKS: u32 = 3;
-
-/// Effort between two looks at the counter.
-const SLICE: u32 = 3000;
 
 /// What a vehicle says of its start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,9 +165,9 @@ fn switch_on<'m>(
         let fits = |pose: &Pose| !is_right(pose) && overlap.share(&scan, pose) >= AS_GOOD * overlap.share(&scan, truth);
         let mut left = CONTOUR_EFFORT_A_REVOLUTION;
         while left > 0 {
-            left = left.saturating_sub(SLICE);
-            effort += f64::from(SLICE);
-            match finder.search(&map, room, SLICE) {
+            left = left.saturating_sub(CONTOUR_SLICE);
+            effort += f64::from(CONTOUR_SLICE);
+            match finder.search(&map, room, CONTOUR_SLICE) {
                 StartState::Searching => continue,
                 StartState::Found(fix) => {
                     let said = if is_right(&fix.pose) { Said::Right } else { Said::Wrong };
