@@ -49,7 +49,7 @@ pub struct Refinement {
 
 /// Sums over points.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sums {
+struct Sums {
     information: [f32; 6],
     gradient: [f32; 3],
     directions: [f32; 3],
@@ -80,16 +80,8 @@ impl Sums {
         self.directions[2] += weighted[1] * row[1];
     }
 
-    /// Adds what a point says.
-    fn see<const ROOM: usize>(&mut self, map: &Submap<ROOM>, point: &SurfacePoint, transform: &Transform, reach: f32) {
-        let moved = point.moved(transform);
-        if let Some(surface) = map.nearest(&moved, reach) {
-            self.lay(&moved, &surface, transform);
-        }
-    }
-
     /// Adds what a point says that was moved by a transform to where that surface is near.
-    pub(super) fn lay(&mut self, moved: &SurfacePoint, surface: &SurfacePoint, transform: &Transform) {
+    fn lay(&mut self, moved: &SurfacePoint, surface: &SurfacePoint, transform: &Transform) {
         let (lever, error) = (moved.position - transform.shift(), moved.position - surface.position);
         let weight = |square: f32| 1.0 / ((1.0 + square / (TOLERANCE * TOLERANCE)) * DEVIATION * DEVIATION);
         self.inliers += 1;
@@ -114,19 +106,22 @@ impl Sums {
     }
 }
 
-/// Moving a scan to where its points lie on surfaces, an iteration at a time.
+/// Moving a scan to where its points lie on surfaces, some points at a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refining {
     start: Pose,
     pose: Pose,
     iteration: usize,
+    /// What was summed up in this iteration, of so many points.
+    sums: Sums,
+    points: usize,
     outcome: Option<Refinement>,
 }
 
 impl Refining {
-    /// A scan that is taken to be at `start` in the frame of the submap.
-    pub(super) const fn new(start: Pose) -> Self {
-        Self { start, pose: start, iteration: 0, outcome: None }
+    /// A scan that is taken to be at `start` in the frame of the map.
+    pub(super) fn new(start: Pose) -> Self {
+        Self { start, pose: start, iteration: 0, sums: Sums::default(), points: 0, outcome: None }
     }
 
     /// What was found so far.
@@ -134,24 +129,29 @@ impl Refining {
         self.outcome.filter(|found| found.pose.is_finite())
     }
 
-    /// One iteration; whether another one is due.
-    pub(super) fn step<const ROOM: usize>(&mut self, points: &[SurfacePoint], map: &Submap<ROOM>) -> bool {
-        let (transform, reach) = self.look();
-        let mut sums = Sums::default();
-        for point in points {
-            sums.see(map, point, &transform, reach);
+    /// Takes at most `count` points, and iterates when it has seen all of them; whether there is more to do. `nearest` gives the surface
+    /// that is nearest to a point within so many metres.
+    pub(super) fn step(
+        &mut self,
+        points: &[SurfacePoint],
+        count: usize,
+        mut nearest: impl FnMut(&SurfacePoint, f32) -> Option<SurfacePoint>,
+    ) -> bool {
+        let transform = Transform::of(&self.pose);
+        let reach = if self.iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
+        for point in points.iter().skip(self.points).take(count) {
+            let moved = point.moved(&transform);
+            if let Some(surface) = nearest(&moved, reach) {
+                self.sums.lay(&moved, &surface, &transform);
+            }
         }
-        self.finish(&sums)
-    }
-
-    /// Where the points are taken to be at this iteration, and how far their surfaces are looked for, m.
-    pub(super) fn look(&self) -> (Transform, f32) {
-        (Transform::of(&self.pose), if self.iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 })
-    }
-
-    /// Moves by what all points have said; whether another iteration is due.
-    pub(super) fn finish(&mut self, sums: &Sums) -> bool {
-        let goes_on = self.try_move(sums);
+        self.points = self.points.saturating_add(count);
+        if self.points < points.len() {
+            return true;
+        }
+        self.points = 0;
+        let sums = core::mem::take(&mut self.sums);
+        let goes_on = self.try_move(&sums);
         if goes_on.is_none() {
             self.outcome = None;
         }
@@ -190,7 +190,7 @@ impl Refining {
 pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, start: &Pose) -> Option<Refinement> {
     let mut refining = Refining::new(*start);
     for _ in 0..ITERATIONS {
-        if !refining.step(points, map) {
+        if !refining.step(points, points.len(), |point, reach| map.nearest(point, reach)) {
             break;
         }
     }

@@ -4,9 +4,9 @@ use core::f64::consts::TAU;
 
 use heapless::Vec;
 
-use super::place_grid::{LEVELS, Offset, PlaceGrid, facing};
+use super::place_grid::{LEVELS, Offset, PlaceGrid, direction, facing};
 use crate::contours::SurfacePoint;
-use crate::geometry::{Pose, Transform, difference, wrap};
+use crate::geometry::{Pose, ScanPoint, Transform, difference, wrap};
 use crate::order::insertion_sort_by;
 
 /// Points that are looked for.
@@ -45,6 +45,9 @@ const STRIDE: usize = 19;
 /// What a heading of the coarsest scale costs, in points that are looked up: its offsets.
 const HEADING_EFFORT: i64 = 2500;
 
+/// What a cell costs beside the points that are looked up for it.
+const CELL_EFFORT: i64 = 4;
+
 /// A place, and how many of the points may lie on surfaces there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
@@ -56,6 +59,11 @@ pub(super) struct Place {
 #[derive(Clone, Debug)]
 struct Branch {
     headings: [[Vec<Offset, SOUGHT>; FINE]; LEVELS],
+}
+
+/// The whole number nearest to one of less than a thousand: a conversion, which cuts off, is one instruction.
+fn nearest(number: f32) -> i16 {
+    ((number + 1024.5) as i16).wrapping_sub(1024)
 }
 
 /// A cell at a scale and a heading, by its number within that of the coarsest scale.
@@ -70,14 +78,23 @@ struct Node {
 /// Nodes that wait: seven of each scale but the coarsest, and one more.
 const NODES: usize = 7 * (LEVELS - 1) + 1;
 
+/// A point that is looked for, and the direction in which its surface faces, rad; none of a corner.
+#[derive(Clone, Copy, Debug)]
+struct Sought {
+    position: ScanPoint,
+    direction: Option<f32>,
+}
+
 /// Searches a grid.
 #[derive(Clone, Debug)]
 pub(super) struct CoarseSearch {
-    sought: Vec<SurfacePoint, SOUGHT>,
+    sought: Vec<Sought, SOUGHT>,
     branch: Branch,
     /// The heading of the coarsest scale that is looked at, and its next cell there; none before the points are turned to it.
     heading: u16,
     cell: Option<i32>,
+    /// Cells within those before that wait to be looked at.
+    nodes: Vec<Node, NODES>,
     places: Vec<Place, PLACES>,
     /// Hits of the best place that was left out.
     left_out: usize,
@@ -91,6 +108,7 @@ impl CoarseSearch {
             branch: Branch { headings: [const { [const { Vec::new() }; FINE] }; LEVELS] },
             heading: 0,
             cell: None,
+            nodes: Vec::new(),
             places: Vec::new(),
             left_out: 0,
         }
@@ -100,13 +118,14 @@ impl CoarseSearch {
     pub(super) fn begin(&mut self, points: &[SurfacePoint]) -> bool {
         self.sought.clear();
         self.places.clear();
+        self.nodes.clear();
         (self.heading, self.cell, self.left_out) = (0, None, 0);
         for spacing in SPACINGS {
             self.sought.clear();
             let is_all = points.iter().filter(|point| point.position.norm() <= REACH).all(|point| {
-                let is_near =
-                    |other: &SurfacePoint| (other.position - point.position).norm_squared() < spacing * spacing;
-                self.sought.iter().any(is_near) || self.sought.push(*point).is_ok()
+                let is_near = |other: &Sought| (other.position - point.position).norm_squared() < spacing * spacing;
+                let sought = Sought { position: point.position, direction: direction(point) };
+                self.sought.iter().any(is_near) || self.sought.push(sought).is_ok()
             });
             if is_all {
                 break;
@@ -146,12 +165,16 @@ impl CoarseSearch {
         share(LEAST_SHARE, self.sought.len()).max(share(AS_GOOD, best))
     }
 
-    /// Looks at cells of the coarsest scale, as far as the effort goes: points that are looked up. Whether there is more to do.
+    /// Looks at cells, as far as the effort goes: points that are looked up. Whether there is more to do.
     pub(super) fn advance<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, effort: &mut i64) -> bool {
         let coarsest = grid.level(LEVELS - 1);
         while usize::from(self.heading) * FINE < usize::from(HEADINGS) {
             if *effort <= 0 {
                 return true;
+            }
+            if let Some(node) = self.nodes.pop() {
+                self.look(grid, node, effort);
+                continue;
             }
             let Some(cell) = self.cell else {
                 *effort -= HEADING_EFFORT;
@@ -162,7 +185,8 @@ impl CoarseSearch {
             if cell < coarsest.columns() * coarsest.rows() {
                 let (column, row) = (cell.checked_rem(coarsest.columns()), cell.checked_div(coarsest.columns()));
                 if let (Some(column), Some(row)) = (column, row) {
-                    self.look(grid, (column, row), effort);
+                    // None waits.
+                    let _ = self.nodes.push(Node { level: LEVELS - 1, branch: 0, column, row });
                 }
                 self.cell = Some(cell + 1);
             } else {
@@ -174,35 +198,29 @@ impl CoarseSearch {
         false
     }
 
-    /// Looks at one cell of the coarsest scale, and at those within it that cannot be excluded: each has two headings and four cells.
-    fn look<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, (column, row): (i32, i32), effort: &mut i64) {
-        let mut nodes: Vec<Node, NODES> = Vec::new();
-        let _ = nodes.push(Node { level: LEVELS - 1, branch: 0, column, row });
-        // No more than all nodes within the first one.
-        while let Some(node) = nodes.pop() {
-            let Node { level, branch, column, row } = node;
-            let Some(offsets) = self.branch.headings.get(level).and_then(|headings| headings.get(branch)) else {
-                return;
-            };
-            let (hits, looked_up) = grid.level(level).hits(offsets, (column, row), self.needed().max(1));
-            *effort -= i64::from(looked_up);
-            if hits == 0 {
-                continue;
-            }
-            let Some(finer) = level.checked_sub(1) else {
-                let middle = grid.middle(column, row);
-                let theta = wrap(self.heading_of(0, branch));
-                self.keep(Place { pose: Pose { x: middle.x, y: middle.y, theta }, hits }, grid.cell());
-                continue;
-            };
-            let within = grid.level(finer);
-            for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                let (column, row) = (2 * column + x, 2 * row + y);
-                if column < within.columns() && row < within.rows() {
-                    for branch in [2 * branch, 2 * branch + 1] {
-                        // There is room: one is taken before eight come.
-                        let _ = nodes.push(Node { level: finer, branch, column, row });
-                    }
+    /// Looks at a cell. Those within it wait if it cannot be excluded: each has two headings and four cells.
+    fn look<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, node: Node, effort: &mut i64) {
+        let Node { level, branch, column, row } = node;
+        let Some(offsets) = self.branch.headings.get(level).and_then(|headings| headings.get(branch)) else {
+            return;
+        };
+        let (hits, looked_up) = grid.level(level).hits(offsets, (column, row), self.needed().max(1));
+        *effort -= i64::from(looked_up) + CELL_EFFORT;
+        if hits == 0 {
+            return;
+        }
+        let Some(finer) = level.checked_sub(1) else {
+            let middle = grid.middle(column, row);
+            let theta = wrap(self.heading_of(0, branch));
+            return self.keep(Place { pose: Pose { x: middle.x, y: middle.y, theta }, hits }, grid.cell());
+        };
+        let within = grid.level(finer);
+        for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let (column, row) = (2 * column + x, 2 * row + y);
+            if column < within.columns() && row < within.rows() {
+                for branch in [2 * branch, 2 * branch + 1] {
+                    // There is room: one is taken before eight come.
+                    let _ = self.nodes.push(Node { level: finer, branch, column, row });
                 }
             }
         }
@@ -220,15 +238,14 @@ impl CoarseSearch {
         for level in 0..LEVELS {
             let per_metre = (1.0 / (cell * f64::from(1 << level))) as f32;
             for branch in 0..FINE >> level {
-                let turned = Transform::of(&Pose { theta: self.heading_of(level, branch), ..Pose::default() });
-                let offset = |point: &SurfacePoint| {
-                    let moved = point.moved(&turned);
-                    let count = |length: f32| libm::floorf(length * per_metre + 0.5) as i16;
-                    Offset {
-                        column: count(moved.position.x),
-                        row: count(moved.position.y),
-                        facing: facing(&moved.normal),
-                    }
+                let heading = self.heading_of(level, branch);
+                let turned = Transform::of(&Pose { theta: heading, ..Pose::default() });
+                let offset = |point: &Sought| {
+                    let moved = turned.apply(&point.position);
+                    let count = |length: f32| nearest(length * per_metre);
+                    // The finest scale does not ask.
+                    let turned = point.direction.filter(|_| level > 0).map(|direction| direction + heading as f32);
+                    Offset { column: count(moved.x), row: count(moved.y), facing: facing(turned) }
                 };
                 if let Some(offsets) = self.branch.headings.get_mut(level).and_then(|all| all.get_mut(branch)) {
                     offsets.clear();

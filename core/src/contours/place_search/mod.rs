@@ -62,11 +62,14 @@ const PROMISING: f32 = 0.5;
 /// Points of a map, or of a submap, that are taken in one step.
 const POINTS_A_STEP: usize = 64;
 
+/// Points of a scan that are laid onto a submap in one step.
+const REFINED_A_STEP: usize = 32;
+
 /// What the steps cost, in points that are looked up in a grid, about 15 instructions each.
 const MARK_EFFORT: i64 = 40 * POINTS_A_STEP as i64;
 const LOAD_EFFORT: i64 = 25 * POINTS_A_STEP as i64;
 const TURN_EFFORT: i64 = 2_500;
-const REFINE_EFFORT: i64 = 4_000;
+const REFINE_EFFORT: i64 = 40 * REFINED_A_STEP as i64;
 const LOOK_EFFORT: i64 = 15 * POINTS_A_STEP as i64;
 
 /// What a point of a scan costs that is laid onto all of the map, beside the points of the map that are looked at.
@@ -333,7 +336,7 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
         left: &mut i64,
     ) -> Step {
         *left -= REFINE_EFFORT;
-        if refining.step(&self.points, submap) {
+        if refining.step(&self.points, REFINED_A_STEP, |point, reach| submap.nearest(point, reach)) {
             return Step::Refine(place, refining);
         }
         let Some(found) = refining.outcome() else { return Step::Choose };

@@ -8,7 +8,7 @@
 use core::f32::consts::TAU;
 
 use crate::contours::{KeptMap, SurfacePoint, TILE};
-use crate::geometry::{Point, ScanPoint};
+use crate::geometry::Point;
 
 /// Scales.
 pub(super) const LEVELS: usize = 4;
@@ -29,15 +29,20 @@ const CORNER: u8 = 1 << 7;
 /// A surface belongs to the sectors within this of the direction in which it faces, rad.
 const BESIDE: f32 = 16.0 * TAU / 360.0;
 
+/// The direction in which a surface faces, rad; none of a corner.
+pub(super) fn direction(surface: &SurfacePoint) -> Option<f32> {
+    (!surface.is_corner()).then(|| libm::atan2f(surface.normal.y, surface.normal.x))
+}
+
 /// The bit of the direction in which a surface faces.
-pub(super) fn facing(normal: &ScanPoint) -> u8 {
-    if *normal == ScanPoint::zeros() { CORNER } else { sector(libm::atan2f(normal.y, normal.x)) }
+pub(super) fn facing(direction: Option<f32>) -> u8 {
+    direction.map_or(CORNER, sector)
 }
 
 fn sector(angle: f32) -> u8 {
-    let turns = angle * (1.0 / TAU);
-    let sector = (turns - libm::floorf(turns)) * SECTORS;
-    // What is no number has no direction.
+    // No angle is further below zero.
+    let turns = angle * (1.0 / TAU) + 2.0;
+    let sector = (turns - turns as u32 as f32) * SECTORS;
     1_u8.checked_shl(sector as u32).unwrap_or(0) & !CORNER
 }
 
@@ -110,12 +115,8 @@ impl<const CELLS: usize> PlaceGrid<CELLS> {
 
     /// Adds a surface at a position, m.
     pub(super) fn add(&mut self, position: &Point, surface: &SurfacePoint) {
-        let mask = if surface.is_corner() {
-            CORNER
-        } else {
-            let angle = libm::atan2f(surface.normal.y, surface.normal.x);
-            sector(angle) | sector(angle - BESIDE) | sector(angle + BESIDE)
-        };
+        let beside = |angle: f32| sector(angle) | sector(angle - BESIDE) | sector(angle + BESIDE);
+        let mask = direction(surface).map_or(CORNER, beside);
         let place = position - self.corner;
         for (level, area) in self.areas.iter().enumerate() {
             let cell = self.cell * f64::from(1 << level);
