@@ -21,7 +21,7 @@ Examples:
   agv map drive.agvlog --output features.csv --poses truth
   agv map drive.agvlog --output reflectors.csv --kind reflectors
   agv map drive.agvlog --output features.csv --slam
-  agv map drive.agvlog --output contours.csv --kind contours --poses references
+  agv map drive.agvlog --output contours.csv --kind contours --poses localiser
 
 A map of contours has the first line 'x_m,y_m,facing_deg', with one point of a surface a line.
 A map of landmarks has the first line 'id,kind,x_m,y_m,deviation_m', with one landmark a line.
@@ -40,7 +40,8 @@ pub struct Map {
     /// What to map.
     #[arg(long, default_value = "features")]
     kind: Kind,
-    /// Where the poses come from; for reflectors the truth if there is any, else the references.
+    /// Where the poses come from; for reflectors and contours the truth if there is any, else the references, for features and else for
+    /// contours the localiser.
     #[arg(long)]
     poses: Option<Poses>,
     /// Find the poses too, from odometry, scans and the loops that are recognised; nothing is known of the hall.
@@ -101,13 +102,10 @@ impl Map {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());
         }
         if self.kind == Kind::Contours {
-            let Some((poses, _)) = &poses else {
-                bail!("contours are mapped from known poses; choose --poses truth or references, or --slam")
-            };
             for damage in &damages {
                 output::note(&format!("{}: {damage}", self.log.display()));
             }
-            return self.map_contours(&recording, poses, slam);
+            return self.map_contours(&recording, poses.as_ref().map(|(poses, _)| &**poses), slam);
         }
         let landmarks = self.landmarks(&recording, poses.as_ref().map(|(poses, _)| &**poses))?;
         ensure!(!landmarks.is_empty(), "{}: no landmark was seen often enough from known poses", self.log.display());
@@ -151,8 +149,9 @@ impl Map {
             Kind::Features => Poses::Localiser,
             Kind::Reflectors if recording.truth.is_empty() => Poses::References,
             Kind::Reflectors => Poses::Truth,
-            Kind::Contours if recording.truth.is_empty() => Poses::References,
-            Kind::Contours => Poses::Truth,
+            Kind::Contours if !recording.truth.is_empty() => Poses::Truth,
+            Kind::Contours if recording.referenced_poses().len() > 1 => Poses::References,
+            Kind::Contours => Poses::Localiser,
         };
         let poses = match self.poses.unwrap_or(default) {
             _ if self.slam => {
@@ -188,10 +187,19 @@ impl Map {
         Ok(landmarks)
     }
 
-    fn map_contours(&self, recording: &Recording, poses: &[Truth], slam: Option<SlamCounts>) -> anyhow::Result<()> {
+    fn map_contours(
+        &self,
+        recording: &Recording,
+        poses: Option<&[Truth]>,
+        slam: Option<SlamCounts>,
+    ) -> anyhow::Result<()> {
         let mapping = progress::spinner().with_message("mapping contours");
         mapping.tick();
-        let map = contour_map::map_contours_at(recording, poses, self.cell.unwrap_or(contour_map::CELL));
+        let cell = self.cell.unwrap_or(contour_map::CELL);
+        let map = match poses {
+            Some(poses) => contour_map::map_contours_at(recording, poses, cell),
+            None => contour_map::map_contours(recording, cell).with_context(|| self.log.display().to_string())?,
+        };
         mapping.finish_and_clear();
         ensure!(!map.is_empty(), "{}: no surface was seen from known poses", self.log.display());
         contour_file::write(&self.output, &map)?;

@@ -16,6 +16,9 @@ pub const HALF: f32 = 0.5 * SIDE as f32 * CELL;
 /// Bytes.
 const BYTES: usize = SIDE * SIDE / 4;
 
+/// Cells near which nothing is.
+const NOTHING: [u8; 1024] = [0; 1024];
+
 /// Cells around that of a point, and their least value: three times the density of a Gaussian of 12 cm at the distance of their centres, rounded.
 const STAMP: [[u8; 5]; 5] = [[0, 1, 1, 1, 0], [1, 1, 2, 1, 1], [1, 2, 3, 2, 1], [1, 1, 2, 1, 1], [0, 1, 1, 1, 0]];
 
@@ -37,8 +40,15 @@ impl LikelihoodGrid {
     /// Forgets all.
     pub fn clear(&mut self) {
         self.cells.fill(0);
-        // As many as there is room for.
-        let _ = self.cells.resize(BYTES, 0);
+        // Once, by pieces: to add one cell after the other takes ten times as long.
+        while let Some(rest) = BYTES.checked_sub(self.cells.len())
+            && rest > 0
+        {
+            let piece = NOTHING.get(..rest.min(NOTHING.len())).unwrap_or_default();
+            if self.cells.extend_from_slice(piece).is_err() {
+                break;
+            }
+        }
     }
 
     /// Column and row of a point, m; outside of the grid they are negative or too large.

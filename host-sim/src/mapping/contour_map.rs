@@ -4,11 +4,14 @@ use std::collections::BTreeMap;
 
 use agv_core::contours::{KeptMap, KeptMapError, KeptPoint, SurfacePoint, TILE, Tile, find_surface_points};
 use agv_core::geometry::{Point, Pose};
+use agv_core::measurement::Time;
 use agv_core::sensing::{PointScan, SensorPath};
 use heapless::Vec as BoundedVec;
 
+use super::poses_by_reflectors;
 use crate::import::RANGES;
 use crate::recording::{RecordedEvent, RecordedScan, Recording, Truth, truth_at};
+use crate::replay::ReplayError;
 
 /// Beams of the longest scan that is looked at.
 const BEAMS: usize = 1440;
@@ -181,17 +184,38 @@ impl ContourMapper {
 /// A map of the scans of a recording that were taken between the first and the last of the known poses of R.
 #[must_use]
 pub fn map_contours_at(recording: &Recording, poses: &[Truth], cell: f64) -> ContourMap {
+    map_contours_where(recording, |time| truth_at(poses, time), cell)
+}
+
+/// A map of the scans that were taken while reflectors told where the vehicle was.
+///
+/// # Errors
+/// [`ReplayError`] if the recording cannot be replayed.
+pub fn map_contours(recording: &Recording, cell: f64) -> Result<ContourMap, ReplayError> {
+    let poses = poses_by_reflectors(recording)?;
+    let at = |time: Time| {
+        let next = poses.partition_point(|pose| pose.time < time);
+        let (before, after) = (poses.get(next.checked_sub(1)?)?, poses.get(next)?);
+        (after.time.since(before.time) <= LONGEST_GAP).then(|| truth_at(&poses, time)).flatten()
+    };
+    Ok(map_contours_where(recording, at, cell))
+}
+
+/// Poses by reflectors that are further apart, s, tell nothing of the time between them.
+const LONGEST_GAP: f64 = 0.25;
+
+/// A map of the scans during which the pose of R is known.
+fn map_contours_where(recording: &Recording, pose_at: impl Fn(Time) -> Option<Pose>, cell: f64) -> ContourMap {
     let mut mapper = ContourMapper::new(cell);
     for event in &recording.events {
         let RecordedEvent::Scan(scan) = event else { continue };
         let Some(mount) = recording.parameters.lasers.mount(scan.laser) else { continue };
-        let Some(start) = truth_at(poses, scan.start) else { continue };
+        let Some(start) = pose_at(scan.start) else { continue };
         let end = scan.view().end();
         let steps = if end > scan.start { PATH_STEPS } else { 0 };
         let times =
             (0..=steps).map(|step| scan.start.offset(end.since(scan.start) * f64::from(step) / f64::from(PATH_STEPS)));
-        let displacements: Option<Vec<_>> =
-            times.map(|time| Some((time, start.between(&truth_at(poses, time)?)))).collect();
+        let displacements: Option<Vec<_>> = times.map(|time| Some((time, start.between(&pose_at(time)?)))).collect();
         let Some(displacements) = displacements else { continue };
         let mut path = SensorPath::default();
         path.set(scan.start, mount, displacements.into_iter());

@@ -54,6 +54,24 @@ fn variance_from_pose(pose: &PoseOutput, located: &[f64; 2]) -> f64 {
     0.5 * (xx + yy + (dx * dx + dy * dy) * tt) - dy * xt + dx * yt
 }
 
+/// Where the vehicle was while reflectors told it.
+///
+/// # Errors
+/// [`ReplayError`] if the recording cannot be replayed.
+pub fn poses_by_reflectors(recording: &Recording) -> Result<Vec<Truth>, ReplayError> {
+    let mut recording = recording.clone();
+    recording.landmarks.retain(|landmark| landmark.kind == LandmarkKind::Reflector);
+    recording.parameters.maps = MapUse { reflectors: true, features: false, dynamic: false, slam: false };
+    let replay = replay(&recording, |_| {})?;
+    let reliable = replay.poses.iter().filter(|pose| pose.mode == Mode::Reflectors);
+    let mut poses: Vec<Truth> = reliable.map(|pose| Truth { time: pose.time, pose: pose.pose }).collect();
+    // Of outputs for the same time the last one has seen most.
+    poses.reverse();
+    poses.dedup_by_key(|pose| pose.time);
+    poses.reverse();
+    Ok(poses)
+}
+
 /// Builds a map of natural features from scans whose poses of R are known.
 ///
 /// # Errors

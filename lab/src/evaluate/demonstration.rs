@@ -22,7 +22,7 @@ use agv_host_sim::simulate::{SimulateError, simulate};
 struct Way {
     name: &'static str,
     maps: MapUse,
-    /// Whether contours correct the pose. The boards' usual images have no room for those of the way behind.
+    /// Whether contours correct the pose.
     contours: bool,
 }
 
