@@ -8,14 +8,13 @@ use agv_core::localizer::Reason;
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_lab::campaign::Shard;
-use agv_lab::equipment::Equipment;
 use agv_lab::evaluate::levels;
 use agv_lab::trust::figures::figures;
 use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
 use agv_lab::trust::outcome::Outcome;
 use agv_lab::trust::row::{self, Row, RowsError};
-use agv_lab::trust::trial::Trial;
+use agv_lab::trust::trial::{Tested, Trial};
 use agv_lab::trust::{hall, pair, sweep};
 use agv_wire::can::controller::{Health, PublishedPose};
 
@@ -260,13 +259,13 @@ fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
     let sound: Vec<_> = kinds.into_iter().filter(|kind| kind.name == NOTHING).collect();
     let counts: Vec<usize> = (1..=20).map(|seed| hall::draw(seed).scenario.build_world().reflectors.len()).collect();
     assert!(counts.iter().min() < counts.iter().max(), "{counts:?}");
-    let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, Equipment::default(), &|_| (), || ()).unwrap();
+    let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, &Tested::default(), || ()).unwrap();
     let found = figures(&rows, &kinds::read(&scenarios("trust.toml")).unwrap());
     assert_eq!((found.runs, found.panics, found.seeds), (2, 0, [1, 2]));
     assert!(found.first_claim_s[1] < 30.0 && found.nominal_mi == 0 && found.nominal_hmi == 0, "{found:?}");
     // The same run is the same row.
     let parts = [0, 1].map(|number| {
-        sweep::run(&sweep::sweep(&sound, 2, 1), Shard { number, of: 2 }, Equipment::default(), &|_| (), || ()).unwrap()
+        sweep::run(&sweep::sweep(&sound, 2, 1), Shard { number, of: 2 }, &Tested::default(), || ()).unwrap()
     });
     assert_eq!(parts.concat(), rows);
 }
@@ -382,7 +381,7 @@ fn a_knock_by_which_the_vehicle_was_lost_is_held_once_it_has_found_itself() {
     let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
     for (name, size, seed) in [("laser shifted to the left", 0.3, 20), ("laser shifted forward", 0.6, 50_209)] {
         let kind = catalogue.kinds.iter().find(|kind| kind.name == name).unwrap();
-        let tried = Trial { kind, size, with: None, seed }.run(Equipment::default(), &|_| {}).unwrap();
+        let tried = Trial { kind, size, with: None, seed }.run(&Tested::default()).unwrap();
         assert_eq!(tried.outcome.failures, 0, "{name}: {} s", tried.outcome.worst_hazard_s);
         assert!(tried.outcome.found.is_some(), "{name}");
     }
@@ -393,7 +392,7 @@ fn a_knock_by_which_the_vehicle_was_lost_is_held_once_it_has_found_itself() {
 fn a_vehicle_that_is_carried_to_where_no_reflector_is_says_so() {
     let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
     let kind = catalogue.kinds.iter().find(|kind| kind.name == "carried on").unwrap();
-    let tried = Trial { kind, size: 9.0, with: None, seed: 50_216 }.run(Equipment::default(), &|_| {}).unwrap();
+    let tried = Trial { kind, size: 9.0, with: None, seed: 50_216 }.run(&Tested::default()).unwrap();
     assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
 }
 
@@ -405,7 +404,7 @@ fn sound_drives_are_available_all_the_time() {
     let kind = catalogue.kinds.iter().find(|kind| kind.name == NOTHING).unwrap();
     for seed in [50_776, 50_793, 915_048, 915_081, 915_084, 915_096] {
         let Outcome { judged, available, losses, alarms, .. } =
-            Trial { kind, size: 0.0, with: None, seed }.run(Equipment::default(), &|_| {}).unwrap().outcome;
+            Trial { kind, size: 0.0, with: None, seed }.run(&Tested::default()).unwrap().outcome;
         assert_eq!((available, losses, alarms.len()), (judged, 0, 0), "{seed}: {alarms:?}");
     }
 }
@@ -416,7 +415,7 @@ fn sound_drives_are_available_all_the_time() {
 fn what_has_not_fitted_is_not_forgotten_where_the_vehicle_looks_for_itself() {
     let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
     let kind = catalogue.kinds.iter().find(|kind| kind.name == "layout mirrored").unwrap();
-    let tried = Trial { kind, size: 1.0, with: None, seed: 50_508 }.run(Equipment::default(), &|_| {}).unwrap();
+    let tried = Trial { kind, size: 1.0, with: None, seed: 50_508 }.run(&Tested::default()).unwrap();
     assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
 }
 

@@ -6,11 +6,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use agv_lab::campaign::Shard;
-use agv_lab::equipment::Equipment;
 use agv_lab::trust::kinds::{self, Kind};
 use agv_lab::trust::row::Row;
 use agv_lab::trust::sweep;
-use agv_lab::trust::trial::Trial;
+use agv_lab::trust::trial::{Tested, Trial};
 use agv_tests::repository;
 
 const SEEDS: [u64; 2] = [1, 2];
@@ -46,7 +45,7 @@ fn the_worst_size_of_each_kind_is_judged_as_it_was() {
     assert!(missing.is_empty(), "the table has no line of {missing:?}");
     let trials: Vec<Trial> =
         named.iter().flat_map(|&(kind, size)| SEEDS.map(|seed| Trial { kind, size, with: None, seed })).collect();
-    let rows = sweep::run(&trials, Shard::ALL, Equipment::default(), &|_| (), || ()).unwrap();
+    let rows = sweep::run(&trials, Shard::ALL, &Tested::default(), || ()).unwrap();
     let mut found = String::from("kind,worst size,runs that fail,hazardous events,misleading\n");
     for (&(kind, size), rows) in named.iter().zip(rows.chunks(SEEDS.len())) {
         writeln!(found, "{}", line(&kind.name, size, &rows.iter().collect::<Vec<_>>())).unwrap();

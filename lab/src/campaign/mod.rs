@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use agv_host_sim::replay::ReplayError;
 use agv_host_sim::simulate::SimulateError;
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, ScenarioError, toml_complaint};
@@ -79,6 +80,9 @@ pub enum CampaignError {
     /// The drive cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// The hall cannot be mapped.
+    #[error("the drive before cannot be replayed: {0}")]
+    Map(ReplayError),
     /// The run cannot be made.
     #[error(transparent)]
     Rig(#[from] RigError),
@@ -213,7 +217,7 @@ impl Campaign {
             fault.mislead(&mut recording, &mut random);
         }
         let mut judge = Judge::new(self.limits, window(&faults).0);
-        let options = RigOptions { seconds: self.seconds, seed: run.seed, is_told: true };
+        let options = RigOptions { seconds: self.seconds, seed: run.seed, is_told: true, contours: None };
         rig::drive(&recording, &faults, &options, |heard| {
             // The vehicle is told where it is when it drives off.
             if heard.time >= 0.0 {

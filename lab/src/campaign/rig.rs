@@ -48,14 +48,16 @@ const BUS_LATENCY: f64 = 0.000_3;
 const CLOCK_RANGE: f64 = 4_294_967_296.0;
 
 /// How a drive is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RigOptions {
+#[derive(Clone, Copy, Debug)]
+pub struct RigOptions<'a> {
     /// How long it lasts, s.
     pub seconds: f64,
     /// Seed of the faults of the lines.
     pub seed: u64,
     /// Whether the controller is told where it starts.
     pub is_told: bool,
+    /// Its map of contours, if it has one.
+    pub contours: Option<KeptMap<'a>>,
 }
 
 /// What is heard a hundred times a second, from when everything was switched on.
@@ -138,20 +140,7 @@ pub fn drive_listening(
     hear: impl FnMut(&Heard),
     listen: impl FnMut(Time, Given),
 ) -> Result<(), RigError> {
-    drive_rig(Rig::new(recording, None, faults, options.seed)?, options, hear, listen)
-}
-
-/// Drives a recorded drive in a map of contours.
-///
-/// # Errors
-/// See [`RigError`].
-pub fn drive_in_contours(
-    recording: &Recording,
-    contours: KeptMap<'_>,
-    options: &RigOptions,
-    hear: impl FnMut(&Heard),
-) -> Result<(), RigError> {
-    drive_rig(Rig::new(recording, Some(contours), &[], options.seed)?, options, hear, |_, _| ())
+    drive_rig(Rig::new(recording, options.contours, faults, options.seed)?, options, hear, listen)
 }
 
 fn drive_rig(

@@ -312,9 +312,8 @@ fn run(site: Site, sensor: SensorKind, seconds: Option<f64>, seed: u64) -> Resul
     let fix = PoseFix { time: START, pose, position_deviation: FIRST.0, heading_deviation: FIRST.1 };
     recording.events.insert(0, RecordedEvent::SetPose(fix));
     let length = drive.truth.last().map_or(0.0, |last| last.time.since(START));
-    let options = RigOptions { seconds: length, seed, is_told: true };
-    let view = contours.view();
-    rig::drive_in_contours(&recording, view, &options, |heard| {
+    let options = RigOptions { seconds: length, seed, is_told: true, contours: Some(contours.view()) };
+    rig::drive(&recording, &[], &options, |heard| {
         if heard.time < SETTLED {
             return;
         }

@@ -4,15 +4,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 
-use agv_core::localizer::Parameters;
 use agv_host_sim::simulate::random::{Random, Stream};
 
 use super::kinds::Kind;
 use super::pair;
 use super::row::{Row, by_size, worst_size};
-use super::trial::Trial;
+use super::trial::{Tested, Trial};
 use crate::campaign::{CampaignError, Shard};
-use crate::equipment::Equipment;
 
 /// Between the seeds of the sweep and those of the worst sizes.
 pub const OTHER_SEEDS: u64 = 50_000;
@@ -66,24 +64,17 @@ pub fn worst<'a>(kinds: &'a [Kind], rows: &[Row], runs: u64, first_seed: u64) ->
     kinds.iter().flat_map(of_kind).collect()
 }
 
-/// Makes those runs that are in a shard with that vehicle, on all cores, and returns them in order. `settings` changes what the
-/// controller believes from its defaults, and `done` is called after each run.
+/// Makes those runs that are in a shard, on all cores, and returns them in order. `done` is called after each run.
 ///
 /// # Errors
 /// See [`CampaignError`]. A panic is no error but a row.
-pub fn run(
-    trials: &[Trial],
-    shard: Shard,
-    equipment: Equipment,
-    settings: &(dyn Fn(&mut Parameters) + Sync),
-    done: impl Fn() + Sync,
-) -> Result<Vec<Row>, CampaignError> {
+pub fn run(trials: &[Trial], shard: Shard, tested: &Tested, done: impl Fn() + Sync) -> Result<Vec<Row>, CampaignError> {
     let of_shard: Vec<&Trial> =
         trials.iter().enumerate().filter(|(number, _)| shard.has(*number)).map(|(_, trial)| trial).collect();
     of_shard
         .into_par_iter()
         .map(|trial| {
-            let tried = catch_unwind(AssertUnwindSafe(|| trial.run(equipment, settings))).ok().transpose()?;
+            let tried = catch_unwind(AssertUnwindSafe(|| trial.run(tested))).ok().transpose()?;
             done();
             Ok(Row {
                 kind: trial.kind.name.clone(),

@@ -3,6 +3,7 @@
 use agv_core::geometry::{Point, Pose};
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::Parameters;
+use agv_host_sim::mapping::contour_map::{CELL, ContourMap, map_contours};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, Shapes, WorldOptions};
 use agv_host_sim::simulate::{START, simulate};
@@ -30,6 +31,39 @@ pub struct Trial<'a> {
     pub seed: u64,
 }
 
+/// What is put to the test.
+#[derive(Clone, Copy)]
+pub struct Tested<'a> {
+    /// The vehicle.
+    pub equipment: Equipment,
+    /// Whether it has a map of the contours of its hall, which it has made among the reflectors on the same way before.
+    pub has_contours: bool,
+    /// What changes that which the controller believes, from its defaults.
+    pub settings: &'a (dyn Fn(&mut Parameters) + Sync),
+}
+
+impl Default for Tested<'_> {
+    fn default() -> Self {
+        Self { equipment: Equipment::default(), has_contours: false, settings: &|_| {} }
+    }
+}
+
+impl Tested<'_> {
+    /// The map of contours that it has of the hall of a scenario.
+    fn contours(&self, scenario: &Scenario) -> Result<Option<ContourMap>, CampaignError> {
+        if !self.has_contours {
+            return Ok(None);
+        }
+        let mut before = scenario.clone();
+        before.seed = before.seed.wrapping_add(MAPPING);
+        let map = map_contours(&simulate(&before)?.recording, CELL);
+        Ok(Some(map.map_err(CampaignError::Map)?))
+    }
+}
+
+/// From the seed of a drive to that of the one on which its hall was mapped.
+const MAPPING: u64 = 1 << 40;
+
 /// A run that was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tried {
@@ -47,17 +81,14 @@ impl Trial<'_> {
         [(self.kind, self.size)].into_iter().chain(self.with)
     }
 
-    /// Makes the run with that vehicle; `settings` changes what the controller believes from its defaults.
+    /// Makes the run.
     ///
     /// # Errors
     /// See [`CampaignError`].
-    pub fn run(
-        &self,
-        equipment: Equipment,
-        settings: &(dyn Fn(&mut Parameters) + Sync),
-    ) -> Result<Tried, CampaignError> {
+    pub fn run(&self, tested: &Tested) -> Result<Tried, CampaignError> {
         let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
-        equipment.apply(&mut scenario);
+        tested.equipment.apply(&mut scenario);
+        let contours = tested.contours(&scenario)?;
         let mut random = Random::new(self.seed, Stream::Faults);
         let timetable = Timetable::of(&scenario)?;
         let seconds = timetable.seconds;
@@ -69,7 +100,7 @@ impl Trial<'_> {
         let faults = enter(&drawn, &mut scenario);
         let simulation = simulate_with(&scenario, &faults, &mut random)?;
         let mut recording = simulation.recording;
-        settings(&mut recording.parameters);
+        (tested.settings)(&mut recording.parameters);
         let sight = Sight::of(&recording, [station.x, station.y]);
         for fault in &faults {
             fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);
@@ -85,7 +116,8 @@ impl Trial<'_> {
         let mut hidden: Vec<Hidden> =
             of_drawn.filter_map(|((kind, _), (from, drawn))| kind.hidden(*from, drawn)).collect();
         let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
-        let options = RigOptions { seconds, seed: self.seed, is_told };
+        let contours = contours.as_ref().map(ContourMap::view);
+        let options = RigOptions { seconds, seed: self.seed, is_told, contours };
         rig::drive(&recording, &faults, &options, |heard| {
             let before = here;
             here = (heard.truth)(heard.now).or(before);

@@ -11,7 +11,7 @@ use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
 use agv_lab::trust::page::{diagrams, page};
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
-use agv_lab::trust::trial::Trial;
+use agv_lab::trust::trial::{Tested, Trial};
 use agv_settings::Settings;
 use anyhow::{Context as _, ensure};
 
@@ -55,6 +55,9 @@ pub struct Trust {
     first_seed: u64,
     #[command(flatten)]
     equipment: Equipment,
+    /// Whether the vehicle has a map of the contours of its hall, which it has made among the reflectors on the same way before.
+    #[arg(long)]
+    contours: bool,
     /// Make only the runs of part I of N, counted from 0, and write their rows to --output: those of the sweep, or with --swept
     /// those of the worst sizes, without a fault and of pairs.
     #[arg(long, value_name = "I/N", requires = "output", conflicts_with = "set")]
@@ -89,6 +92,7 @@ Examples:
   agv evaluate trust --only nothing --sound-runs 30 --set odometry.slip=0.003
   agv evaluate trust --vehicle differential --gyro --sweep-runs 1 --runs 2 --sound-runs 10
   agv evaluate trust --vehicle omni4 --slip 0.001 --set odometry.slip=0.002 --only nothing --sound-runs 15
+  agv evaluate trust --contours --sample 100 --seed 7
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
@@ -100,7 +104,7 @@ continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_sh
 [95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
 worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
 pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
-and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro, slip [if --slip],
+and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro, contours, slip [if --slip],
 gyro_scale_error [if --gyro-scale-error].";
 
 /// The Stanford diagrams: without faults, and with them.
@@ -169,7 +173,8 @@ impl Trust {
         let bar = progress::bar(what, (0..trials.len()).filter(|run| shard.has(*run)).count() as u64);
         // Whatever can be refused was refused before.
         let settings = |parameters: &mut Parameters| _ = self.settings.apply(parameters);
-        let rows = run(trials, shard, self.equipment, &settings, || bar.inc(1)).context("a run cannot be made")?;
+        let tested = Tested { equipment: self.equipment, has_contours: self.contours, settings: &settings };
+        let rows = run(trials, shard, &tested, || bar.inc(1)).context("a run cannot be made")?;
         bar.finish_and_clear();
         Ok(rows)
     }
@@ -191,6 +196,7 @@ impl Trust {
             told["settings"] = self.settings.texts().into();
             told["vehicle"] = serde_json::to_value(self.equipment.vehicle)?;
             told["gyro"] = self.equipment.gyro.into();
+            told["contours"] = self.contours.into();
             for (name, value) in [("slip", self.equipment.slip), ("gyro_scale_error", self.equipment.gyro_scale_error)]
             {
                 if let Some(value) = value {
