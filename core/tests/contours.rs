@@ -198,6 +198,15 @@ fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
     assert_eq!(error(&[&[0], &bytes[1..]].concat()), KeptMapError::Format);
     assert_eq!(error(&[&bytes[..4], &[0xFF; 4], &bytes[8..]].concat()), KeptMapError::Format);
 
+    // Two of a tile, of which the first is further along.
+    let far = KeptPoint::of(&SurfacePoint { position: ScanPoint::new(2.0, 0.0), normal: ScanPoint::zeros() });
+    let two = |points: [&KeptPoint; 2]| {
+        let tile_bytes = tile(0, 0, 2).bytes();
+        [&KeptMap::header(1)[..], &tile_bytes, &points[0].bytes(), &points[1].bytes()].concat()
+    };
+    assert_eq!(error(&two([&far, &point])), KeptMapError::Order);
+    assert!(KeptMap::read(&two([&point, &far])).is_ok() && KeptMap::read(&two([&point, &point])).is_ok());
+
     let map = KeptMap::read(&bytes).unwrap();
     assert_eq!((map.len(), KeptMap::EMPTY.len(), KeptMap::read(&KeptMap::header(0)).unwrap().len()), (3, 0, 0));
     let places: Vec<_> = map.surfaces().map(|(corner, surface)| corner + surface.position.cast::<f64>()).collect();

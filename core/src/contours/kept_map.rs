@@ -1,7 +1,8 @@
 //! A map of contours that is kept: points of surfaces in square tiles, of which those around the vehicle are loaded.
 //!
 //! It is bytes in memory that somebody else holds, as in flash: a header ([`KeptMap::header`]: what it is, and the number of tiles), the
-//! tiles in order of their places ([`Tile::bytes`]), and the points in order of their tiles ([`KeptPoint::bytes`]).
+//! tiles in order of their places ([`Tile::bytes`]), and the points in order of their tiles, and within them of their columns
+//! ([`KeptPoint::bytes`]).
 
 use super::{KeptPoint, Submap, SurfacePoint, TILE, Tile};
 use crate::geometry::{Point, Pose, ScanPoint};
@@ -20,7 +21,7 @@ const FORMAT: u32 = 0x0143_4741;
 pub enum KeptMapError {
     /// The bytes do not begin as a map, or end within a tile or a point.
     Format,
-    /// Tiles are not in order of their rows and columns, each once.
+    /// Tiles are not in order of their rows and columns, each once, or points of a tile not in order of their columns.
     Order,
     /// The tiles have more or fewer points than there are, or end before they begin.
     Points,
@@ -64,11 +65,11 @@ impl<'a> KeptMap<'a> {
             return Err(KeptMapError::Order);
         }
         let ends = each().map(|tile| tile.end as usize);
-        if ends.clone().is_sorted() && ends.last().unwrap_or(0) == points.len() {
-            Ok(map)
-        } else {
-            Err(KeptMapError::Points)
+        if !ends.clone().is_sorted() || ends.last().unwrap_or(0) != points.len() {
+            return Err(KeptMapError::Points);
         }
+        let is_in_order = (0..tiles.len()).all(|number| map.points_of(number).columns().is_sorted());
+        if is_in_order { Ok(map) } else { Err(KeptMapError::Order) }
     }
 
     /// Number of points.
@@ -123,8 +124,8 @@ impl<'a> KeptMap<'a> {
         let mut looked_at: u32 = 0;
         for down in steps(position.y - reach)..=steps(position.y + reach) {
             for right in steps(position.x - reach)..=steps(position.x + reach) {
-                let points = self.beside(place, (down, right));
                 let shift = corner_of(down, right);
+                let points = self.beside(place, (down, right)).between(position.x - shift.x, reach);
                 for point in points.some(0, usize::MAX) {
                     let position_of_it = point.position + shift;
                     if (position_of_it - position).amax() <= reach {
@@ -182,6 +183,20 @@ pub(super) struct Points<'a>(&'a [[u8; KeptPoint::BYTES]]);
 impl<'a> Points<'a> {
     pub(super) const fn len(self) -> usize {
         self.0.len()
+    }
+
+    /// The counts of each along the first axis.
+    fn columns(self) -> impl Iterator<Item = u16> + use<'a> {
+        self.0.iter().map(|bytes| KeptPoint::of_bytes(*bytes).column())
+    }
+
+    /// Those within `reach` of a coordinate along the first axis, from the corner of the tile, m.
+    fn between(self, middle: f32, reach: f32) -> Self {
+        let column = |bytes: &[u8; KeptPoint::BYTES]| KeptPoint::of_bytes(*bytes).column();
+        let (low, high) = (KeptPoint::column_of(middle - reach), KeptPoint::column_of(middle + reach));
+        let first = self.0.partition_point(|bytes| column(bytes) < low);
+        let end = self.0.partition_point(|bytes| column(bytes) <= high);
+        Self(self.0.get(first..end).unwrap_or_default())
     }
 
     /// At most `count` of them from number `first` on, each from the corner of the tile.

@@ -6,6 +6,9 @@ use crate::geometry::ScanPoint;
 /// Counts of a coordinate for a metre: 4 m in 12 bits.
 const COUNTS: f32 = 1023.0;
 
+/// Most counts of a coordinate.
+const MOST: f32 = 4095.0;
+
 /// Counts for the length of a normal.
 const UNIT: f32 = 127.0;
 
@@ -22,7 +25,7 @@ impl KeptPoint {
     /// Packs a point, given from the corner of its tile.
     #[must_use]
     pub fn of(point: &SurfacePoint) -> Self {
-        let count = |length: f32| libm::roundf(length * COUNTS).clamp(0.0, 4095.0) as u16;
+        let count = Self::column_of;
         let normal = |share: f32| (libm::roundf(share * UNIT) as i8).to_le_bytes()[0];
         let (x, y) = (count(point.position.x), count(point.position.y));
         let high = ((x >> 8) | ((y >> 8) << 4)) as u8;
@@ -39,6 +42,18 @@ impl KeptPoint {
     #[must_use]
     pub const fn bytes(&self) -> [u8; Self::BYTES] {
         self.bytes
+    }
+
+    /// Counts from the corner of its tile along the first axis: points of a tile are in order of them.
+    #[must_use]
+    pub const fn column(&self) -> u16 {
+        let [x, _, high, ..] = self.bytes;
+        u16::from_le_bytes([x, high & 15])
+    }
+
+    /// The column in which a coordinate from the corner of a tile lies, m; the nearest one of a coordinate beside the tile.
+    pub(super) fn column_of(length: f32) -> u16 {
+        libm::roundf(length * COUNTS).clamp(0.0, MOST) as u16
     }
 
     /// The point from the corner of its tile.

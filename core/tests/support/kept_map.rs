@@ -19,7 +19,8 @@ pub fn kept_map(walls: &Walls, moved: &Pose) -> KeptMap<'static> {
         by_tile.entry(place).or_default().push(KeptPoint::of(&point));
     }
     let (mut bytes, mut points) = (KeptMap::header(by_tile.len() as u32).to_vec(), Vec::new());
-    for (place, found) in by_tile {
+    for (place, mut found) in by_tile {
+        found.sort_by_key(KeptPoint::column);
         points.extend(found);
         bytes.extend(Tile { place, end: points.len() as u32 }.bytes());
     }

@@ -54,6 +54,7 @@ impl ContourMap {
             let point = SurfacePoint { position: (position - corner).cast(), normal: normal.cast() };
             by_tile.entry(place).or_default().push(KeptPoint::of(&point));
         }
+        by_tile.values_mut().for_each(|points| points.sort_by_key(KeptPoint::column));
         let mut bytes = KeptMap::header(by_tile.len() as u32).to_vec();
         let mut end = 0;
         for (place, points) in &by_tile {
