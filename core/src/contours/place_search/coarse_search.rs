@@ -98,6 +98,8 @@ pub(super) struct CoarseSearch {
     places: Vec<Place, PLACES>,
     /// Hits of the best place that was left out.
     left_out: usize,
+    /// Fewest points that must be able to lie on surfaces.
+    needed: usize,
 }
 
 impl CoarseSearch {
@@ -111,6 +113,7 @@ impl CoarseSearch {
             nodes: Vec::new(),
             places: Vec::new(),
             left_out: 0,
+            needed: 0,
         }
     }
 
@@ -132,6 +135,7 @@ impl CoarseSearch {
             }
         }
         self.mix();
+        self.needed = self.fewest();
         self.sought.len() >= FEWEST
     }
 
@@ -155,14 +159,14 @@ impl CoarseSearch {
 
     /// Whether a place was left out that is about as good as those that are kept.
     pub(super) fn is_crowded(&self) -> bool {
-        self.left_out >= self.needed()
+        self.left_out >= self.needed
     }
 
-    /// Fewest points that must be able to lie on surfaces.
-    fn needed(&self) -> usize {
+    /// Fewest points that must be able to lie on surfaces, by the best place that was found so far.
+    fn fewest(&self) -> usize {
         let best = self.places.first().map_or(0, |best| best.hits);
         let share = |share: f32, of: usize| libm::ceilf(share * of as f32) as usize;
-        share(LEAST_SHARE, self.sought.len()).max(share(AS_GOOD, best))
+        share(LEAST_SHARE, self.sought.len()).max(share(AS_GOOD, best)).max(1)
     }
 
     /// Looks at cells, as far as the effort goes: points that are looked up. Whether there is more to do.
@@ -193,7 +197,7 @@ impl CoarseSearch {
                 (self.heading, self.cell) = (self.heading + 1, None);
             }
         }
-        let needed = self.needed();
+        let needed = self.needed;
         self.places.retain(|place| place.hits >= needed);
         false
     }
@@ -204,7 +208,7 @@ impl CoarseSearch {
         let Some(offsets) = self.branch.headings.get(level).and_then(|headings| headings.get(branch)) else {
             return;
         };
-        let (hits, looked_up) = grid.level(level).hits(offsets, (column, row), self.needed().max(1));
+        let (hits, looked_up) = grid.level(level).hits(offsets, (column, row), self.needed);
         *effort -= i64::from(looked_up) + CELL_EFFORT;
         if hits == 0 {
             return;
@@ -277,5 +281,6 @@ impl CoarseSearch {
             self.left_out = self.left_out.max(worse.hits);
         }
         insertion_sort_by(&mut self.places, |a, b| b.hits.cmp(&a.hits));
+        self.needed = self.fewest();
     }
 }
