@@ -65,7 +65,7 @@ impl<'a> KeptMap<'a> {
             return Err(KeptMapError::Order);
         }
         let ends = each().map(|tile| tile.end as usize);
-        if !ends.clone().is_sorted() || ends.last().unwrap_or(0) != points.len() {
+        if !ends.clone().is_sorted() || ends.max().unwrap_or(0) != points.len() {
             return Err(KeptMapError::Points);
         }
         let is_in_order = (0..tiles.len()).all(|number| map.points_of(number).columns().is_sorted());
