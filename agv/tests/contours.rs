@@ -1,8 +1,8 @@
 //! A map of contours, and a drive that is localised in it, by the command line.
 
 use agv_core::geometry::Point;
+use agv_host_sim::contour_map::{ContourMap, MapPoint};
 use agv_host_sim::mapping::contour_file;
-use agv_host_sim::mapping::contour_map::{ContourMap, MapPoint};
 use agv_tests::recordings;
 
 use crate::support::{Files, agv, json_keys, refusal, text};

@@ -4,6 +4,7 @@ pub mod acceptance;
 pub mod accuracy;
 pub mod bus;
 pub mod calibrate;
+pub mod contour_map;
 pub mod data;
 pub mod drive;
 pub mod drive_check;

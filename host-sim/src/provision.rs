@@ -8,7 +8,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
-use crate::mapping::contour_map::ContourMap;
+use crate::contour_map::ContourMap;
 
 /// Bytes of a page of the STM32H743's flash.
 const PAGE: usize = 128 * 1024;

@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::emulate::vehicle::{InChip, InChipOptions, drive_in_chip, errors};
-use agv_host_sim::mapping::contour_map::{CELL, ContourMap, map_contours_at};
+use agv_host_sim::mapping::contour_mapper::{CELL, map_contours_at};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};

@@ -8,7 +8,7 @@ mod reference_drive;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use agv_host_sim::mapping::contour_map::{CELL, map_contours_at};
+use agv_host_sim::mapping::contour_mapper::{CELL, map_contours_at};
 use agv_host_sim::{log, replay};
 use agv_lab::evaluate::demonstration;
 use agv_tests::{emulator, image};

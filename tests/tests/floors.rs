@@ -62,6 +62,7 @@ const HOUSES: [House; 8] = [
             &["leaf"],
             &["leaves"],
             &["store"],
+            &["contour_store"],
             &["service"],
         ],
     },
@@ -80,6 +81,7 @@ const HOUSES: [House; 8] = [
     House {
         folder: "host-sim",
         floors: &[
+            &["contour_map"],
             &[
                 "bus",
                 "data",

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, PORT, ServiceError, Setting};
 use agv_host_sim::link::with_port;
 use agv_host_sim::mapping::contour_file;
-use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::Refusal;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
+use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::emulate::vehicle::{self, Driven, Errors, InChip, InChipOptions, VehicleOptions, Watch};
 use agv_host_sim::mapping::contour_file;
-use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{simulate, standard};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_host_sim::log;
 use agv_host_sim::mapping::{
-    Clustering, contour_file, contour_map, map_features, map_features_at, map_file, map_reflectors_at,
+    Clustering, contour_file, contour_mapper, map_features, map_features_at, map_file, map_reflectors_at,
     reflector_clustering, slam::SlamParameters, slam_poses,
 };
 use agv_host_sim::recording::{Recording, Truth};
@@ -195,10 +195,10 @@ impl Map {
     ) -> anyhow::Result<()> {
         let mapping = progress::spinner().with_message("mapping contours");
         mapping.tick();
-        let cell = self.cell.unwrap_or(contour_map::CELL);
+        let cell = self.cell.unwrap_or(contour_mapper::CELL);
         let map = match poses {
-            Some(poses) => contour_map::map_contours_at(recording, poses, cell),
-            None => contour_map::map_contours(recording, cell).with_context(|| self.log.display().to_string())?,
+            Some(poses) => contour_mapper::map_contours_at(recording, poses, cell),
+            None => contour_mapper::map_contours(recording, cell).with_context(|| self.log.display().to_string())?,
         };
         mapping.finish_and_clear();
         ensure!(!map.is_empty(), "{}: no surface was seen from known poses", self.log.display());

@@ -13,7 +13,7 @@ use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, PROTOCOL, Refusal, Request, Response, encode};
 use agv_settings::store::{KEY, PIECE, StoreError};
 
-use crate::mapping::contour_map::ContourMap;
+use crate::contour_map::ContourMap;
 
 /// Port of the service.
 pub const PORT: u16 = 5351;

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use agv_core::geometry::Point;
 
-use super::contour_map::{ContourMap, MapPoint};
+use crate::contour_map::{ContourMap, MapPoint};
 use crate::output_file;
 use crate::text_file::{self, TextFileError};
 

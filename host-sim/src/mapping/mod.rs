@@ -2,7 +2,7 @@
 
 mod clustering;
 pub mod contour_file;
-pub mod contour_map;
+pub mod contour_mapper;
 mod known_poses;
 pub mod map_file;
 pub mod odometry_noise;

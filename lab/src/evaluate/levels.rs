@@ -9,7 +9,7 @@ use agv_core::geometry::Pose;
 use agv_core::integrity::{AlertLimits, ProtectionLevel};
 use agv_core::localizer::{Mode, PoseOutput};
 use agv_host_sim::accuracy::{Spread, pose_at};
-use agv_host_sim::mapping::contour_map::CELL;
+use agv_host_sim::mapping::contour_mapper::CELL;
 use agv_host_sim::replay::ReplayError;
 use serde::Serialize;
 

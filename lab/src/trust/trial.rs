@@ -3,7 +3,8 @@
 use agv_core::geometry::{Point, Pose};
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::Parameters;
-use agv_host_sim::mapping::contour_map::{CELL, ContourMap, map_contours};
+use agv_host_sim::contour_map::ContourMap;
+use agv_host_sim::mapping::contour_mapper::{CELL, map_contours};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, Shapes, WorldOptions};
 use agv_host_sim::simulate::{START, simulate};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use agv_host_sim::mapping::contour_map::CELL;
+use agv_host_sim::mapping::contour_mapper::CELL;
 use agv_lab::evaluate::contour_map::{Localised, localise};
 
 use super::office_drive::DriveChoice;

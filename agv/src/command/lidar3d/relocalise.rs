@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::PoseFix;
+use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::lidar3d::Source;
 use agv_host_sim::lidar3d::place_map;
 use agv_host_sim::lidar3d::place_search::PlaceSearch;
-use agv_host_sim::mapping::contour_map::ContourMap;
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::replay::{find_start, find_start_by_contours};
 use anyhow::{Context, bail};

@@ -19,12 +19,12 @@ use serde::{Deserialize, Serialize};
 
 use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose, knows_where_it_is};
 use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like, write_contours, write_flash};
+use crate::contour_map::ContourMap;
 use crate::emulate::board::{ADDRESS, HOST};
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::EmulatedMotion;
 use crate::live::stream::LogCopy;
 use crate::log::Reader;
-use crate::mapping::contour_map::ContourMap;
 use crate::recording::{Recording, truth_or_stand_at};
 use crate::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
 

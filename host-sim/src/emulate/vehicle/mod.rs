@@ -28,9 +28,9 @@ pub use pose_errors::{Errors, errors};
 pub use watch::{BusTrouble, HeardEmergency, HeardPose, Watch};
 
 use super::board::{self, Board};
+use crate::contour_map::ContourMap;
 use crate::live::relay::Relay;
 use crate::live::stream::StreamSummary;
-use crate::mapping::contour_map::ContourMap;
 use crate::provision::{contour_image, flash_image};
 use crate::recording::Recording;
 use crate::serve::nav350::{Drive, Nav350, Options};

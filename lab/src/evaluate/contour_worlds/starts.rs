@@ -7,7 +7,7 @@ use agv_core::localizer::{CONTOUR_EFFORT_A_REVOLUTION, CONTOUR_SLICE, Event, Par
 use agv_core::measurement::{PoseIncrement, Time};
 use agv_core::odometry::Vehicle;
 use agv_host_sim::accuracy::Spread;
-use agv_host_sim::mapping::contour_map::ContourMap;
+use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::recording::RecordedScan;
 use agv_host_sim::replay::{ContourFinder, ContourRoom};
 use agv_host_sim::simulate::random::{Random, Stream};

@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::{Point, Pose};
 use agv_core::measurement::{LaserId, Time};
-use agv_host_sim::mapping::contour_map::{CELL, ContourMap, ContourMapper};
+use agv_host_sim::contour_map::ContourMap;
+use agv_host_sim::mapping::contour_mapper::{CELL, ContourMapper};
 use agv_host_sim::recording::RecordedScan;
 use agv_host_sim::simulate::random::Random;
 use agv_host_sim::simulate::raycast::RayCaster;
