@@ -410,14 +410,7 @@ fn the_board_localises_among_foreign_frames() {
     // A machine that is too busy for encoders in real time is given some tries.
     for _ in 0..5 {
         let folder = tempfile::tempdir().unwrap();
-        let options = VehicleOptions {
-            image: &image,
-            folder: folder.path(),
-            key: None,
-            provision: true,
-            contours: None,
-            is_told: true,
-        };
+        let options = VehicleOptions::new(&image, folder.path());
         let mut sent = 0;
         let look = |watch: &Watch| {
             let start = Instant::now();

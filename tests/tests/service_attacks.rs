@@ -486,14 +486,7 @@ fn strangers_change_nothing_and_stop_nothing() {
     let Some(image) = image(NAME, "an500", "vehicle").filter(|_| emulator(NAME)) else { return };
     let recording = standing();
     let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions {
-        image: &image,
-        folder: folder.path(),
-        key: Some(KEY),
-        provision: true,
-        contours: None,
-        is_told: true,
-    };
+    let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(&image, folder.path()) };
     let mut seen = None;
     let look = |watch: &Watch| {
         // Ends the emulation even if something is found.

@@ -50,8 +50,7 @@ struct Drive {
 
 fn drive(image: &Path, recording: &Recording, seconds: f64, watch: impl FnOnce(&Watch) + Send) -> Drive {
     let folder = tempfile::tempdir().unwrap();
-    let options =
-        VehicleOptions { image, folder: folder.path(), key: Some(KEY), provision: true, contours: None, is_told: true };
+    let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(image, folder.path()) };
     let driven = vehicle::drive(recording, &options, seconds, watch).unwrap();
     Drive { driven, folder }
 }
@@ -191,14 +190,7 @@ fn a_vehicle_that_is_told_nothing_finds_itself() {
     let Some((image, _alone)) = image("a_vehicle_that_is_told_nothing_finds_itself") else { return };
     let recording = hall();
     let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions {
-        image: &image,
-        folder: folder.path(),
-        key: None,
-        provision: true,
-        contours: None,
-        is_told: false,
-    };
+    let options = VehicleOptions { is_told: false, ..VehicleOptions::new(&image, folder.path()) };
     let driven = vehicle::drive(&recording, &options, 5.0, |_| ()).unwrap();
     assert!(driven.poses.first().is_some_and(|heard| heard.pose.mode == Mode::NotLocalised));
     let last = driven.poses.last().unwrap().pose;
@@ -302,14 +294,7 @@ fn it_is_commissioned_over_the_service_port() {
     let (Some((image, _alone)), Some(agv)) = (image(TEST), agv_tests::agv(TEST)) else { return };
     let recording = hall();
     let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions {
-        image: &image,
-        folder: folder.path(),
-        key: Some(KEY),
-        provision: true,
-        contours: None,
-        is_told: true,
-    };
+    let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(&image, folder.path()) };
     let driven = vehicle::drive(&recording, &options, 6.0, |watch| {
         let host = format!("127.0.0.1:{}", watch.ports.service);
         until(60.0, "poses", || watch.pose().is_some());

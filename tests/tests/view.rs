@@ -202,14 +202,7 @@ fn a_drive_in_emulation_is_looked_at() {
     let recording = hall("speed = 1.2");
     let folder = tempfile::tempdir().unwrap();
     let image = image.canonicalize().unwrap();
-    let options = VehicleOptions {
-        image: &image,
-        folder: folder.path(),
-        key: None,
-        provision: true,
-        contours: None,
-        is_told: true,
-    };
+    let options = VehicleOptions::new(&image, folder.path());
     let copy = folder.path().join("copy.agvlog");
     let mut found = Value::Null;
     let driven = vehicle::drive(&recording, &options, 45.0, |watch| {

@@ -142,8 +142,7 @@ impl Emulate {
             return Ok((driven, Some(stack)));
         };
         let image = image.canonicalize().with_context(|| image.display().to_string())?;
-        let options =
-            VehicleOptions { image: &image, folder, key: None, provision: true, contours, is_told: !self.untold };
+        let options = VehicleOptions { contours, is_told: !self.untold, ..VehicleOptions::new(&image, folder) };
         Ok((vehicle::drive(recording, &options, seconds, look)?, None))
     }
 }

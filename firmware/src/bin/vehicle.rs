@@ -52,8 +52,8 @@ static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
 static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
 
-/// Large values apart from the localiser, and what tasks work with, in whichever memory the board has for each. A cell without a value is all zero, which is
-/// what that memory begins with.
+/// Large values apart from the localiser, and what tasks work with, in whichever memory the board has for each. A cell without a value is
+/// all zero, which is what that memory begins with.
 #[allow(unsafe_code, reason = "the section is that of the boards' memory for such values")]
 mod large {
     use agv_firmware::app::laser::LaserMemory;

@@ -53,6 +53,14 @@ pub struct VehicleOptions<'a> {
     pub is_told: bool,
 }
 
+impl<'a> VehicleOptions<'a> {
+    /// A vehicle whose flash begins with settings but no key, and which is told where it is.
+    #[must_use]
+    pub const fn new(image: &'a Path, folder: &'a Path) -> Self {
+        Self { image, folder, key: None, provision: true, contours: None, is_told: true }
+    }
+}
+
 /// What a drive has brought.
 pub struct Driven {
     /// The log that the controller streamed.
