@@ -77,7 +77,7 @@ pub const H743: Board = Board {
     flash: 1024 * 1024 / 10 * 9,
     ram: &[
         Region::of_chip("AXI", 0x2400_0000, 512 * 1024),
-        Region::of_chip("D2", 0x3000_0000, 288 * 1024),
+        Region::of_chip("D2", 0x3000_0000, 256 * 1024),
         Region::of_chip("D3", 0x3800_0000, 64 * 1024),
     ],
 };

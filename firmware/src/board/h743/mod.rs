@@ -44,7 +44,6 @@ impl Chip for Stm32h743 {
         RCC.ahb2enr().modify(|enabled| {
             enabled.set_sram1en(true);
             enabled.set_sram2en(true);
-            enabled.set_sram3en(true);
         });
         // The clocks run two cycles after the store (RM0433, 8.5.10): this waits for longer.
         let _ = RCC.ahb2enr().read();
