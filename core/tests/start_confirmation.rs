@@ -137,6 +137,25 @@ fn five_reflectors_are_believed_after_eight_revolutions() {
     assert_eq!(start.told_after(&places([0, 2, 4, 7, 9]), 20), Some(8));
 }
 
+/// What is seen is forgotten once the vehicle has driven ten metres since, and not all of it at once.
+#[test]
+fn what_did_not_fit_a_few_metres_ago_counts_wherever_the_vehicle_was_switched_on() {
+    let elsewhere = [Point::new(-2.5, 3.0), Point::new(-1.0, -3.5), Point::new(1.5, 3.2), Point::new(2.0, -3.0)];
+    for (before, after, is_told) in [(400, 150, false), (375, 150, false), (0, 150, false), (0, 550, true)] {
+        let mut start = Start::new(&reflectors());
+        start.pose = Pose::new(-12.0, 0.5, 0.0);
+        // At a metre a second: ten metres are fifty times ten samples.
+        start.drive(1.0, before);
+        for _ in 0..4 {
+            start.drive(1.0, 6);
+            start.see(&elsewhere);
+            let _ = start.search();
+        }
+        start.drive(1.0, after);
+        assert_eq!(start.told_after(&places([0, 2, 4, 7, 9]), 12).is_some(), is_told, "{before}, {after}");
+    }
+}
+
 #[test]
 fn four_reflectors_are_believed_once_they_were_seen_from_two_metres_further_on() {
     let four = places([0, 2, 5, 7]);

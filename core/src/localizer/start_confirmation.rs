@@ -45,7 +45,7 @@ pub(super) struct Look {
     /// Where the odometry had R then.
     pub odometry: Pose,
     /// How many revolutions had been seen then.
-    pub revolutions: u16,
+    pub revolutions: u32,
 }
 
 impl Look {
@@ -68,6 +68,8 @@ pub(super) enum Belief {
 
 /// Two looks find the same place within this distance, m, and turn, rad, by the odometry between them.
 const SAME: (f64, f64) = (0.3, 0.05);
+/// A look is forgotten this far behind, m, as what it saw is.
+const REMEMBERED: f64 = super::start_finder::REMEMBERED as f64;
 /// A reflector is explained if the map has one within so many standard deviations.
 const GATE: f32 = 3.5;
 
@@ -144,8 +146,10 @@ impl StartConfirmation {
         reflectors: &IndexedReflectors,
     ) -> Belief {
         let is_same = |first: &Look| {
-            let off = first.moved_to(&look.odometry).between(&look.pose);
-            libm::hypot(off.x, off.y) < SAME.0 && libm::fabs(difference(off.theta, 0.0)) < SAME.1
+            let since = first.odometry.between(&look.odometry);
+            let off = first.pose.compose(&since).between(&look.pose);
+            let is_there = libm::hypot(off.x, off.y) < SAME.0 && libm::fabs(difference(off.theta, 0.0)) < SAME.1;
+            is_there && libm::hypot(since.x, since.y) <= REMEMBERED
         };
         let first = self.first.filter(is_same).unwrap_or_else(|| {
             self.seen_through.forget();
@@ -154,7 +158,7 @@ impl StartConfirmation {
         self.first = Some(first);
         let StartRule { revolutions, reflectors: enough, for_unexplained, apart, times, explained } = self.rule;
         let between = first.odometry.between(&look.odometry);
-        let is_long = look.revolutions.saturating_sub(first.revolutions).saturating_add(1) >= revolutions;
+        let is_long = look.revolutions.saturating_sub(first.revolutions).saturating_add(1) >= u32::from(revolutions);
         let pose = look.moved_to(odometry);
         let (fitting, seen) = reflectors.explained(snapshot, &pose, times, GATE);
         let unexplained = seen.saturating_sub(fitting);

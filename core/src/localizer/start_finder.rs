@@ -38,6 +38,9 @@ pub enum StartState {
 /// Most reflectors of one revolution.
 const OBSERVATIONS: usize = 64;
 
+/// Distance over which what was seen is carried on, m: then the odometry has carried it too far.
+pub(super) const REMEMBERED: f32 = 10.0;
+
 /// A found pose is not surer than this, m and rad: reflectors are passed by a moving vehicle.
 const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
 
@@ -50,10 +53,10 @@ pub struct StartFinder<const SEEN: usize = 64> {
     snapshot: ReflectorSnapshot<SEEN>,
     relocalizer: ReflectorRelocalizer<SEEN>,
     /// Where the odometry had R when the search began, and how many revolutions had been seen; none if no search is under way.
-    begun: Option<(Pose, u16)>,
+    begun: Option<(Pose, u32)>,
     confirmation: StartConfirmation,
     /// How many revolutions were seen since nothing was known.
-    revolutions: u16,
+    revolutions: u32,
     found: Vec<ReflectorObservation, OBSERVATIONS>,
 }
 
@@ -81,6 +84,7 @@ impl<const SEEN: usize> StartFinder<SEEN> {
                 let covariance = &motion.covariance;
                 let shift = 0.5 * (covariance.m11 + covariance.m22);
                 self.snapshot.travel(&motion.displacement, shift as f32, covariance.m33 as f32);
+                self.snapshot.forget_behind(REMEMBERED);
             }
             Moved::Anew => self.begin_anew(),
             Moved::Nothing => {}

@@ -5,9 +5,6 @@ use crate::geometry::Pose;
 use crate::measurement::Time;
 use crate::odometry::{Motion, OdometryError, RecentMotion, VehicleOdometer};
 
-/// Distance after which what was seen before is forgotten, m: the odometry has then carried it too far.
-const LONGEST_DISTANCE: f64 = 10.0;
-
 /// Silence after which the odometry says nothing of the present, s.
 const LONGEST_SILENCE: f64 = 0.3;
 
@@ -42,9 +39,8 @@ pub(super) struct StartOdometry {
     known_from: Option<Time>,
     /// Whether an encoder fails: then nobody knows how the vehicle moves.
     is_blind: bool,
-    /// Where the odometry has R, and how far it has come, m.
+    /// Where the odometry has R.
     pose: Pose,
-    distance: f64,
     /// Whether the odometry has said something since something was seen.
     has_spoken: bool,
 }
@@ -57,7 +53,6 @@ impl StartOdometry {
             known_from: None,
             is_blind: false,
             pose: Pose::default(),
-            distance: 0.0,
             has_spoken: false,
         }
     }
@@ -105,7 +100,6 @@ impl StartOdometry {
                 self.forget();
                 Moved::Anew
             }
-            // What was seen is carried for ten metres at most.
             Event::Gyro(_) | Event::Reflectors(_) | Event::Scan(_) => Moved::Nothing,
         }
     }
@@ -121,7 +115,6 @@ impl StartOdometry {
     /// Begins with a vehicle that stands at `time`, as nobody says otherwise.
     fn stand(&mut self, time: Time) {
         self.pose = Pose::default();
-        self.distance = 0.0;
         self.recent = RecentMotion::standing(time);
         self.known_from = Some(time);
     }
@@ -132,13 +125,8 @@ impl StartOdometry {
         match motion {
             Ok(motion) => {
                 self.pose = self.pose.compose(&motion.displacement);
-                self.distance += motion.distance;
                 self.recent.add(&motion);
                 self.known_from.get_or_insert(motion.start);
-                if self.distance > LONGEST_DISTANCE {
-                    self.forget();
-                    return Moved::Anew;
-                }
                 Moved::By(motion)
             }
             Err(OdometryError::First | OdometryError::Implausible | OdometryError::Pause) => {

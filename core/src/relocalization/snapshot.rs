@@ -30,6 +30,8 @@ pub struct SeenReflector {
     pub variance: f32,
     /// In how many revolutions it was seen.
     pub times: u8,
+    /// How far the vehicle has gone since, m.
+    pub gone: f32,
 }
 
 /// Up to `SEEN` reflectors in one frame.
@@ -61,11 +63,18 @@ impl<const SEEN: usize> ReflectorSnapshot<SEEN> {
 
     /// Moves the frame by the vehicle's own motion; `shift_variance` (m^2) and `turn_variance` (rad^2) are its errors.
     pub fn travel(&mut self, motion: &Pose, shift_variance: f32, turn_variance: f32) {
+        let gone = libm::hypot(motion.x, motion.y) as f32;
         for seen in &mut self.reflectors {
+            seen.gone += gone;
             seen.position = motion.inverse_transform(&seen.position.cast()).cast();
             // Half of the error of a turn falls on each axis, on average.
             seen.variance += shift_variance + 0.5 * turn_variance * seen.position.norm_squared();
         }
+    }
+
+    /// Forgets the reflectors that were last seen so far behind, m.
+    pub fn forget_behind(&mut self, distance: f32) {
+        self.reflectors.retain(|seen| seen.gone <= distance);
     }
 
     /// Adds a reflector at `position` (m, in the frame of the snapshot) that was seen at `range` (m): joins it to one seen
@@ -92,8 +101,9 @@ impl<const SEEN: usize> ReflectorSnapshot<SEEN> {
             // What map and bearing err does not average out quickly.
             seen.variance = (seen.variance * (1.0 - share)).max(0.5 * variance);
             seen.times = seen.times.saturating_add(1);
+            seen.gone = 0.0;
         } else {
-            let _ = self.reflectors.push(SeenReflector { position, variance, times: 1 });
+            let _ = self.reflectors.push(SeenReflector { position, variance, times: 1, gone: 0.0 });
         }
     }
 }

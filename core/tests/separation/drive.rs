@@ -32,11 +32,9 @@ impl Drive {
             (0..14).map(|_| Point::new(random.uniform(-12.0, 12.0), random.uniform(-12.0, 12.0))).collect();
         let truth = Pose::new(-4.0, 0.0, 0.0);
         let mount = Pose::new(0.8, 0.0, 0.0);
-        let mut monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
-        monitor.begin(Time::from_seconds(1.0), &truth, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &truth);
         let time = Time::from_seconds(1.0);
-        Self {
-            monitor,
+        let mut drive = Self {
+            monitor: SolutionSeparation::new(AssumedDeviations::default(), Some(1.4)),
             reflectors,
             truth,
             odometry: truth,
@@ -46,7 +44,17 @@ impl Drive {
             true_mount: mount,
             published: truth,
             shear: 0.0,
-        }
+        };
+        drive.begin();
+        // It has its pose while it stands, so its clock is not in doubt.
+        drive.revolve(&Pose::default());
+        drive
+    }
+
+    /// Switches the monitor on, with the pose that is published.
+    pub fn begin(&mut self) {
+        self.monitor = SolutionSeparation::new(AssumedDeviations::default(), Some(1.4));
+        self.monitor.begin(self.time, &self.published, &[1e-4, 0.0, 1e-4, 0.0, 0.0, 1e-5], &self.odometry);
     }
 
     /// The pose of least squares in the map, with the weights of the monitor, near the published one.

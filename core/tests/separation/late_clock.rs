@@ -52,3 +52,40 @@ fn a_clock_in_order_costs_no_availability() {
         });
     }
 }
+
+/// Where the vehicle was so long before, in R now, that goes by so much in a revolution, on an arc.
+fn before(late: f64, along: f64, turn: f64) -> Pose {
+    let share = -late / 0.125;
+    let (way, angle) = (share * along, share * turn);
+    if angle == 0.0 {
+        return Pose::new(way, 0.0, 0.0);
+    }
+    Pose::new(way / angle * angle.sin(), way / angle * (1.0 - angle.cos()), angle)
+}
+
+/// A controller whose power was cut finds itself on the way: the pose is where the vehicle was then, and nothing shows it on a straight.
+#[test]
+fn a_laser_that_is_late_of_a_vehicle_that_finds_itself_while_it_moves_is_held() {
+    for seed in 1..6 {
+        for late in [0.0, 0.05, 0.1, 0.25, -0.05] {
+            let mut drive = Drive::new(seed);
+            let mount = drive.mount;
+            let parts = [(60, 0.125, 0.0), (20, 0.125, 0.04), (4, 0.06, 0.0), (8, 0.0, 0.0), (30, 0.125, 0.0)];
+            // Where the laser was when it saw, the vehicle is taken to be.
+            let behind = Pose::new(-late, 0.0, 0.0);
+            drive.published = drive.truth.compose(&behind);
+            drive.begin();
+            let mut last = f64::INFINITY;
+            for (count, along, turn) in parts {
+                for _ in 0..count {
+                    drive.true_mount = before(late, along, turn).compose(&mount);
+                    drive.revolve(&Pose::new(along, 0.0, turn));
+                    drive.assert_held(format_args!("{late} s"));
+                    last = drive.monitor.level().position;
+                }
+            }
+            // A turn and a stop have shown it.
+            assert!(last < 0.1 + 1.1 * late.abs(), "{late} s: {last}");
+        }
+    }
+}

@@ -334,7 +334,7 @@ fn a_vehicle_that_does_not_know_its_heading_bounds_no_position() {
 fn a_doubted_laser_may_creep_as_fast_as_is_assumed() {
     let straight = Pose::new(0.125, 0.0, 0.0);
     let mut drive = Drive::new(7);
-    (0..80).for_each(|_| drive.revolve(&straight));
+    (0..79).for_each(|_| drive.revolve(&straight));
     let before = drive.monitor.level();
     assert!(before.position < 0.08, "{before:?}");
     for (is_doubted, least, most) in [(true, 0.12, 3.0), (false, 0.005, 0.08)] {

@@ -1,6 +1,9 @@
 //! A laser whose clock was off when the vehicle was switched on: at rest that does nothing, so the pose was found right then, and the first
-//! metre shows how late it is. A clock that is off later is a matter of the free mounting.
+//! metre shows how late it is. Who finds itself while it moves has found where it was, until it stands, or moves otherwise. A clock that is
+//! off later is a matter of the free mounting.
 
+use super::UNKNOWN_POSE;
+use super::assumed::AssumedDeviations;
 use super::hypothesis::is_refuted;
 use super::sensor_information::SensorInformation;
 use super::solution::{Laser, Solution};
@@ -8,17 +11,19 @@ use super::solution::{Laser, Solution};
 /// A vehicle stands that moves and turns no faster than this, m/s and rad/s: its pose is off by a millimetre at most.
 const AT_REST: (f64, f64) = (5e-3, 5e-3);
 
-/// The solution with a clock that is free since the vehicle stood; none before.
+/// The solution with a clock that is free since the vehicle stood, or since its first pose; none before.
 #[derive(Clone, Debug)]
 pub struct LateClock {
     solution: Option<Solution>,
+    /// Whether it begins with what is seen next, even if the vehicle moves.
+    is_first: bool,
 }
 
 impl LateClock {
-    /// Nothing is known before the vehicle stands.
+    /// Nothing is known before the vehicle stands; or, with its first pose, before it sees something.
     #[must_use]
-    pub const fn new() -> Self {
-        Self { solution: None }
+    pub const fn new(is_first: bool) -> Self {
+        Self { solution: None, is_first }
     }
 
     /// The solution.
@@ -33,7 +38,14 @@ impl LateClock {
     }
 
     /// Takes what landmarks say; `all` has taken it.
-    pub fn correct(&mut self, told: &SensorInformation, laser: &Laser, all: &Solution) {
+    pub fn correct(
+        &mut self,
+        told: &SensorInformation,
+        laser: &Laser,
+        all: &Solution,
+        assumed: &AssumedDeviations,
+    ) {
+        let is_first = core::mem::take(&mut self.is_first);
         if let Some(solution) = &mut self.solution
             && is_refuted(solution.correct(told, laser))
         {
@@ -42,6 +54,12 @@ impl LateClock {
         if self.solution.is_none() && is_at_rest(laser) {
             let mut solution = all.clone();
             solution.free_clock();
+            self.solution = Some(solution);
+        } else if self.solution.is_none() && is_first {
+            // The pose and the clock are known by one another alone.
+            let mut solution = Solution::new(*all.pose(), &UNKNOWN_POSE, assumed);
+            solution.free_clock();
+            let _ = solution.correct(told, laser);
             self.solution = Some(solution);
         }
     }

@@ -165,7 +165,7 @@ impl SolutionSeparation {
             next_mounting: None,
             yaw: None,
             creeps: Creeps::new(&nowhere),
-            late_clock: LateClock::new(),
+            late_clock: LateClock::new(false),
             is_laser_doubted: false,
             odometry: nowhere.clone(),
             told: SensorInformation::NONE,
@@ -226,7 +226,7 @@ impl SolutionSeparation {
             gyro.begin(pose, covariance, &self.assumed);
         }
         self.creeps.begin(&self.all);
-        self.late_clock = LateClock::new();
+        self.late_clock = LateClock::new(self.mounting.is_none());
         self.restart_odometry();
         self.leave_outs.clear();
         if self.mounting.is_none() {
@@ -456,7 +456,8 @@ impl SolutionSeparation {
             }
         }
         self.creeps.correct(&told, laser, &self.all);
-        self.late_clock.correct(&told, laser, &self.all);
+        let assumed = *self.assumed();
+        self.late_clock.correct(&told, laser, &self.all, &assumed);
         let [scale, steering, turn] = CHANGE.map(|deviation| deviation * deviation * self.unseen.0);
         let change = if self.gyro.is_some() { [scale, 0.0, 0.0] } else { [scale, steering, turn] };
         self.odometry.loosen_odometry(&change);
