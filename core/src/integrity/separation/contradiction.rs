@@ -21,7 +21,7 @@ const COMPARED: usize = 8;
 /// What they count from one event to the next.
 const FADING: f64 = 0.8;
 /// Over this distance, m, a widening that lasts is forgotten by 1/e.
-const MEMORY: f64 = 5.0;
+const MEMORY: f64 = 10.0;
 
 /// What fits the pose and what contradicts it.
 #[derive(Clone, Copy, Debug)]
