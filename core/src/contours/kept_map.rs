@@ -138,6 +138,19 @@ impl<'a> KeptMap<'a> {
         looked_at
     }
 
+    /// The nearest point of the same kind that faces the same way, if it is within `reach` (m), and how many points were looked at; all in
+    /// the frame in the middle of a tile.
+    pub(super) fn nearest(&self, place: (i16, i16), point: &SurfacePoint, reach: f32) -> (Option<SurfacePoint>, u32) {
+        let (mut square, mut nearest) = (reach * reach, None);
+        let looked_at = self.for_each_near(place, &point.position, reach, |other| {
+            let square_of_it = (other.position - point.position).norm_squared();
+            if square_of_it < square && other.is_like(point) {
+                (square, nearest) = (square_of_it, Some(other));
+            }
+        });
+        (nearest, looked_at)
+    }
+
     /// The points of the tile so many rows and columns from a place; none if there is no such tile.
     fn beside(&self, place: (i16, i16), (down, right): (i32, i32)) -> Points<'a> {
         let place_beside = || {

@@ -3,8 +3,9 @@
 use heapless::Vec;
 use nalgebra::Matrix3;
 
+use super::refinement::Refining;
 use super::{KeyRing, Prediction, Refinement, SearchWindow, Submap, SurfacePoint, find_surface_points, refine, search};
-use crate::geometry::{Pose, ScanPoint};
+use crate::geometry::{Pose, ScanPoint, Transform};
 use crate::sensing::PointView;
 
 /// If the surfaces say less than this share along one axis of what they say across it, that axis is free.
@@ -124,6 +125,29 @@ pub fn align_nearby<const ROOM: usize>(
     let inside = map.origin().between(predicted);
     let found = refine(points, map, &inside)?;
     Some(in_map(points, map, &inside, &found))
+}
+
+/// A match in a submap, moved to where the points lie on surfaces further away as well, which `nearest` gives in the frame of the submap: from
+/// where it has them and from where they were predicted, as a thing nearby that was moved takes the match along. None if all of them are in
+/// the submap.
+pub(super) fn settle<const ROOM: usize>(
+    points: &[SurfacePoint],
+    map: &Submap<ROOM>,
+    predicted: &Pose,
+    found: &ContourMatch,
+    nearest: impl Fn(&SurfacePoint, f32) -> Option<SurfacePoint>,
+) -> Option<ContourMatch> {
+    let start = map.origin().between(&found.pose);
+    let transform = Transform::of(&start);
+    let is_beyond = |point: &SurfacePoint| !Submap::<ROOM>::reaches(&point.moved(&transform).position);
+    if !points.iter().any(is_beyond) {
+        return None;
+    }
+    let inside = map.origin().between(predicted);
+    let [matched, expected] = [start, inside].map(|start| Refining::near(start).run(points, &nearest));
+    let inliers = |settled: &Option<Refinement>| settled.map_or(0, |settled| settled.inliers);
+    let settled = if inliers(&matched) > inliers(&expected) { matched } else { expected }?;
+    Some(in_map(points, map, &inside, &settled))
 }
 
 /// Share of the points that lie on surfaces.

@@ -124,6 +124,25 @@ impl Refining {
         Self { start, pose: start, iteration: 0, sums: Sums::default(), points: 0, outcome: None }
     }
 
+    /// A scan that was laid onto some of the surfaces at `start`: the others are not far away.
+    pub(super) fn near(start: Pose) -> Self {
+        Self { iteration: FAR_ITERATIONS, ..Self::new(start) }
+    }
+
+    /// Iterates to the end.
+    pub(super) fn run(
+        mut self,
+        points: &[SurfacePoint],
+        nearest: impl Fn(&SurfacePoint, f32) -> Option<SurfacePoint>,
+    ) -> Option<Refinement> {
+        for _ in 0..ITERATIONS {
+            if !self.step(points, points.len(), &nearest) {
+                break;
+            }
+        }
+        self.outcome()
+    }
+
     /// What was found so far.
     pub(super) fn outcome(&self) -> Option<Refinement> {
         self.outcome.filter(|found| found.pose.is_finite())
@@ -188,11 +207,5 @@ impl Refining {
 /// Moves a scan, which is taken to be at `start` in the frame of the submap, to where its points lie on surfaces. None if too few do.
 #[must_use]
 pub fn refine<const ROOM: usize>(points: &[SurfacePoint], map: &Submap<ROOM>, start: &Pose) -> Option<Refinement> {
-    let mut refining = Refining::new(*start);
-    for _ in 0..ITERATIONS {
-        if !refining.step(points, points.len(), |point, reach| map.nearest(point, reach)) {
-            break;
-        }
-    }
-    refining.outcome()
+    Refining::new(*start).run(points, |point, reach| map.nearest(point, reach))
 }

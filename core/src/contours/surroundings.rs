@@ -1,6 +1,7 @@
 //! What is loaded of a kept map, or of key scans, around the vehicle.
 
-use super::{KeptMap, KeyRing, LARGEST_REACH, Submap, TILE, Tile};
+use super::matcher::settle;
+use super::{ContourMatch, KeptMap, KeyRing, LARGEST_REACH, Prediction, Submap, SurfacePoint, TILE, Tile, align};
 use crate::geometry::Pose;
 
 /// What is around the vehicle of a map that is larger, in a submap with room for `ROOM` points.
@@ -42,6 +43,20 @@ impl<const ROOM: usize> Surroundings<ROOM> {
     #[must_use]
     pub const fn loaded(&self) -> &Submap<ROOM> {
         &self.submap
+    }
+
+    /// Where points were seen by the surfaces of the map: those around, and then by those further away as well. None if they say nothing of
+    /// it.
+    #[must_use]
+    pub fn align(&mut self, map: &KeptMap, points: &[SurfacePoint], predicted: &Prediction) -> Option<ContourMatch> {
+        let submap = self.around(map, &predicted.pose);
+        let found = align(points, submap, predicted)?;
+        let Some(place) = self.place else { return Some(found) };
+        let submap = &self.submap;
+        let nearest = |point: &SurfacePoint, reach: f32| {
+            if Submap::<ROOM>::reaches(&point.position) { submap.nearest(point, reach) } else { map.nearest(place, point, reach).0 }
+        };
+        Some(settle(points, submap, &predicted.pose, &found, nearest).unwrap_or(found))
     }
 
     /// The surfaces of the map around a pose.

@@ -169,7 +169,7 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
     #[inline(never)]
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch> {
         self.see(scan);
-        align(&self.points, self.surroundings.around(&self.map?, &predicted.pose), predicted)
+        self.surroundings.align(&self.map?, &self.points, predicted)
     }
 
     fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch> {

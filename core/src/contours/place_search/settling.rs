@@ -27,13 +27,7 @@ impl Settling {
     pub(super) fn step(&mut self, points: &[SurfacePoint], map: &KeptMap) -> (u32, bool) {
         let (place, mut looked_at) = (self.place, 0_u32);
         let goes_on = self.refining.step(points, POINTS_A_STEP, |moved, reach| {
-            let (mut nearest, mut surface) = (reach * reach, None);
-            let seen = map.for_each_near(place, &moved.position, reach, |other| {
-                let square = (other.position - moved.position).norm_squared();
-                if square < nearest && other.is_like(moved) {
-                    (nearest, surface) = (square, Some(other));
-                }
-            });
+            let (surface, seen) = map.nearest(place, moved, reach);
             looked_at = looked_at.saturating_add(seen);
             surface
         });
