@@ -243,6 +243,36 @@ fn walls_that_have_moved_do_not_take_the_pose_along() {
     }
 }
 
+/// In an open hall all that is near are goods, and goods move; its walls are farther away than what is searched.
+#[test]
+fn the_walls_of_an_open_hall_hold_the_pose_where_all_that_is_near_has_moved() {
+    let goods = |by: f64| -> Walls {
+        [(3.0, 4.0), (-4.0, 3.0), (2.0, -5.0)]
+            .into_iter()
+            .flat_map(|(x, y): (f64, f64)| {
+                let (x, y) = (x + by, y - 0.5 * by);
+                [[x, y, x + 1.2, y], [x + 1.2, y, x + 1.2, y + 0.8], [x, y + 0.8, x + 1.2, y + 0.8], [x, y, x, y + 0.8]]
+            })
+            .collect()
+    };
+    let outline = [
+        [-24.0, -19.0, 24.0, -19.0],
+        [24.0, -19.0, 24.0, 19.0],
+        [24.0, 19.0, -24.0, 19.0],
+        [-24.0, 19.0, -24.0, -19.0],
+    ];
+    let hall = |by: f64| -> Walls { outline.into_iter().chain(goods(by)).collect() };
+    for by in [0.0, 0.06, 0.12, 0.4] {
+        let mut drive = Drive::told(parameters(), hall(by), Some(kept_map(&hall(0.0), &Pose::default())), 3);
+        for number in 0..60 {
+            drive.revolve((0.6, 0.3), 1.0);
+            let error = drive.error();
+            let is_settled = number >= 10;
+            assert!(!is_settled || error.position().norm() < 0.02 && error.theta.abs() < 0.004, "by {by}: {error:?}");
+        }
+    }
+}
+
 #[test]
 fn a_start_that_is_wrong_is_put_right_and_said() {
     let map = kept_map(&room(), &Pose::default());

@@ -54,7 +54,11 @@ impl<const ROOM: usize> Surroundings<ROOM> {
         let Some(place) = self.place else { return Some(found) };
         let submap = &self.submap;
         let nearest = |point: &SurfacePoint, reach: f32| {
-            if Submap::<ROOM>::reaches(&point.position) { submap.nearest(point, reach) } else { map.nearest(place, point, reach).0 }
+            if Submap::<ROOM>::reaches(&point.position) {
+                submap.nearest(point, reach)
+            } else {
+                map.nearest(place, point, reach).0
+            }
         };
         Some(settle(points, submap, &predicted.pose, &found, nearest).unwrap_or(found))
     }

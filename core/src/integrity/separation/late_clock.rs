@@ -38,13 +38,7 @@ impl LateClock {
     }
 
     /// Takes what landmarks say; `all` has taken it.
-    pub fn correct(
-        &mut self,
-        told: &SensorInformation,
-        laser: &Laser,
-        all: &Solution,
-        assumed: &AssumedDeviations,
-    ) {
+    pub fn correct(&mut self, told: &SensorInformation, laser: &Laser, all: &Solution, assumed: &AssumedDeviations) {
         let is_first = core::mem::take(&mut self.is_first);
         if let Some(solution) = &mut self.solution
             && is_refuted(solution.correct(told, laser))
