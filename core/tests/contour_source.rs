@@ -273,6 +273,44 @@ fn the_walls_of_an_open_hall_hold_the_pose_where_all_that_is_near_has_moved() {
     }
 }
 
+/// The annex of a corridor is not mapped: what is seen there holds the pose until the map does again, and the deviation grows meanwhile.
+#[test]
+fn what_nobody_has_mapped_is_learnt_over_the_map() {
+    let mapped = room();
+    // Beyond the wall on the right, which is gone, are three more metres with a pillar.
+    let mut walls = mapped.clone();
+    walls.remove(1);
+    walls.extend([
+        [10.0, -3.0, 19.0, -3.0],
+        [19.0, -3.0, 19.0, 6.0],
+        [19.0, 6.0, 10.0, 6.0],
+        [14.0, 1.0, 14.4, 1.0],
+        [14.4, 1.0, 14.4, 1.4],
+    ]);
+    let map = kept_map(&mapped, &Pose::default());
+    let drives = |learns: bool| {
+        let mut drive = Drive::told(parameters(), walls.clone(), Some(map), 3);
+        let (mut deviation, mut worst): (f64, f64) = (0.0, 0.0);
+        for number in 0..170 {
+            // Into the annex and back on an arc; the wheels tell a tenth too much.
+            drive.revolve(if number < 100 { (1.0, 0.0) } else { (0.8, 0.5) }, 1.1);
+            let (error, said) = (drive.error(), drive.said());
+            assert!(said.level.position >= error.position().norm(), "{number}: {error:?} {said:?}");
+            worst = worst.max(error.position().norm());
+            deviation = deviation.max(said.covariance[0].sqrt());
+            if !learns {
+                drive.localizer.set_contours(Some(map));
+            }
+        }
+        (worst, deviation)
+    };
+    let (with, without) = (drives(true), drives(false));
+    assert!(with.0 < 0.1, "{with:?}");
+    assert!(without.0 > 2.0 * with.0, "{with:?} {without:?}");
+    // The way is not free of error.
+    assert!(with.1 > 0.006, "{with:?}");
+}
+
 #[test]
 fn a_start_that_is_wrong_is_put_right_and_said() {
     let map = kept_map(&room(), &Pose::default());

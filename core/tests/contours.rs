@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use agv_core::contours::{
-    ContourMatcher, KeptMap, KeptMapError, KeptPoint, Prediction, SurfacePoint, Surroundings, TILE, Tile,
+    ContourMatcher, KeptMap, KeptMapError, KeptPoint, KeyRing, Prediction, SurfacePoint, Surroundings, TILE, Tile,
 };
 use agv_core::geometry::{Pose, ScanPoint, difference};
 use agv_core::measurement::{LaserId, Scan, Time};
@@ -214,10 +214,11 @@ fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
         assert!((place.x - known[0]).hypot(place.y - known[1]) < 1e-3, "{place:?}");
     }
     let mut surroundings: Box<Surroundings> = Box::default();
+    let none = KeyRing::<1, 1>::new();
     // The three points are at (1, 3), (29, 3) and (21, -5).
-    assert_eq!(surroundings.around(&map, &Pose::new(2.0, 2.0, 0.3)).len(), 1);
-    assert_eq!(surroundings.around(&map, &Pose::new(25.0, 2.0, 0.3)).len(), 2);
-    let around = surroundings.around(&map, &Pose::new(14.0, 2.0, 0.3));
+    assert_eq!(surroundings.around(&map, &none, &Pose::new(2.0, 2.0, 0.3)).len(), 1);
+    assert_eq!(surroundings.around(&map, &none, &Pose::new(25.0, 2.0, 0.3)).len(), 2);
+    let around = surroundings.around(&map, &none, &Pose::new(14.0, 2.0, 0.3));
     assert_eq!(around.len(), 3);
     let at = |x: f64, y: f64| {
         let position = ScanPoint::new((x - around.origin().x) as f32, (y - around.origin().y) as f32);
@@ -225,6 +226,6 @@ fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
         around.nearest(&sought, 0.01).is_some_and(|found| (found.position - position).norm() < 2e-3)
     };
     assert!(at(1.0, 3.0) && at(29.0, 3.0) && at(21.0, -5.0) && !at(21.0, -4.9));
-    assert_eq!(surroundings.around(&map, &Pose::new(1e9, f64::NAN, 0.3)).len(), 3, "nowhere is no other place");
+    assert_eq!(surroundings.around(&map, &none, &Pose::new(1e9, f64::NAN, 0.3)).len(), 3, "nowhere is no other place");
     assert!((TILE - 4.0).abs() < 1e-12);
 }

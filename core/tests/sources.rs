@@ -173,8 +173,14 @@ fn key_scans_are_compared_where_the_vehicle_was_in_the_middle_of_the_scan() {
 #[test]
 fn a_match_of_contours_says_how_far_it_is_from_the_pose() {
     let share = 0.6;
-    let found =
-        |pose| ContourMatch { pose, information: Matrix3::identity() * 1e4, free_axis: None, share, scatter: 1.0 };
+    let found = |pose| ContourMatch {
+        pose,
+        information: Matrix3::identity() * 1e4,
+        free_axis: None,
+        share,
+        scatter: 1.0,
+        of_overlay: [0.0; 2],
+    };
     // A laser half a metre in front and turned by a quarter, seen at (2, 3) looking back along x, belongs to a vehicle that
     // looks down along y from (2, 3.5).
     let mount = Pose::new(0.5, 0.0, -FRAC_PI_2);

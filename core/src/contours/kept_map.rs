@@ -84,9 +84,11 @@ impl<'a> KeptMap<'a> {
         self.points.is_empty()
     }
 
-    /// Fills a submap with what is around a place, from near to far. The submap says whether there was room for all.
-    pub fn load<const ROOM: usize>(&self, place: (i16, i16), submap: &mut Submap<ROOM>) {
+    /// Fills a submap with what is around a place, from near to far, at most so many points. The submap says whether there was room for
+    /// all.
+    pub fn load<const ROOM: usize>(&self, place: (i16, i16), most: usize, submap: &mut Submap<ROOM>) {
         submap.begin(&middle(place));
+        submap.leave_room(most);
         for number in 0..TILES_AROUND {
             let _ = self.load_part(place, number, (0, usize::MAX), submap);
         }

@@ -10,12 +10,14 @@ use crate::geometry::{Pose, difference};
 pub struct KeyScan<const POINTS: usize> {
     /// Pose of the laser.
     pub pose: Pose,
+    /// Standard deviation of its position along an axis, m, and of its heading, rad, where that matters.
+    pub deviation: [f32; 2],
     /// Points of its surfaces, in the frame of the laser.
     pub points: Vec<PackedPoint, POINTS>,
 }
 
 impl<const POINTS: usize> KeyScan<POINTS> {
-    const EMPTY: Self = Self { pose: Pose { x: 0.0, y: 0.0, theta: 0.0 }, points: Vec::new() };
+    const EMPTY: Self = Self { pose: Pose { x: 0.0, y: 0.0, theta: 0.0 }, deviation: [0.0; 2], points: Vec::new() };
 }
 
 /// Distance after which a scan becomes a key scan, m.
@@ -67,15 +69,15 @@ impl<const KEYS: usize, const POINTS: usize> KeyRing<KEYS, POINTS> {
     }
 
     /// Keeps a scan in place of the oldest.
-    pub fn keep(&mut self, pose: &Pose, points: &[SurfacePoint]) {
+    pub fn keep(&mut self, pose: &Pose, deviation: [f32; 2], points: impl Iterator<Item = SurfacePoint>) {
         let Some(place) = self.made.checked_rem(KEYS) else { return };
         if place >= self.keys.len() && self.keys.push(KeyScan::EMPTY).is_err() {
             return;
         }
         let Some(key) = self.keys.get_mut(place) else { return };
-        key.pose = *pose;
+        (key.pose, key.deviation) = (*pose, deviation);
         key.points.clear();
-        for point in points.iter().filter_map(PackedPoint::of) {
+        for point in points.filter_map(|point| PackedPoint::of(&point)) {
             // A scan has no more points than a key scan.
             if key.points.push(point).is_err() {
                 break;

@@ -30,6 +30,8 @@ pub struct ContourMatch {
     pub share: f32,
     /// Mean square of their distances from the surfaces in that which `information` takes it to be.
     pub scatter: f32,
+    /// What of its error is that of an overlay: standard deviation of the position along an axis, m, and of the heading, rad.
+    pub of_overlay: [f32; 2],
 }
 
 /// Surfaces of the last `KEYS` key scans of at most `POINTS` points, and of the present one, in a submap with room for `ROOM`.
@@ -81,7 +83,7 @@ impl<const POINTS: usize, const KEYS: usize, const ROOM: usize> ContourMatcher<P
     pub fn keep(&mut self, pose: &Pose) -> bool {
         let is_kept = self.ring.wants(pose);
         if is_kept {
-            self.ring.keep(pose, &self.points);
+            self.ring.keep(pose, [0.0; 2], self.points.iter().copied());
             self.submap.surround(pose, &self.ring);
         }
         is_kept
@@ -139,7 +141,7 @@ pub(super) fn settle<const ROOM: usize>(
 ) -> Option<ContourMatch> {
     let start = map.origin().between(&found.pose);
     let transform = Transform::of(&start);
-    let is_beyond = |point: &SurfacePoint| !Submap::<ROOM>::reaches(&point.moved(&transform).position);
+    let is_beyond = |point: &SurfacePoint| !map.holds(&point.moved(&transform).position);
     if !points.iter().any(is_beyond) {
         return None;
     }
@@ -178,6 +180,7 @@ fn in_map<const ROOM: usize>(
         free_axis,
         share: share(points, found),
         scatter: found.scatter,
+        of_overlay: [0.0; 2],
     }
 }
 

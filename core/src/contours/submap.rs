@@ -37,6 +37,10 @@ pub struct Submap<const ROOM: usize> {
     /// Nothing before the submap is begun for the first time: what would be built here would be built on the stack.
     first: Vec<[u16; SIDE], SIDE>,
     grid: LikelihoodGrid,
+    /// The points from this number on have moved since the others were mapped.
+    overlay: usize,
+    /// How many points may be in it now.
+    room: usize,
     has_cut: bool,
 }
 
@@ -51,6 +55,8 @@ impl<const ROOM: usize> Submap<ROOM> {
             entries: Vec::new(),
             first: Vec::new(),
             grid: LikelihoodGrid::new(),
+            overlay: ROOM,
+            room: ROOM,
             has_cut: false,
         }
     }
@@ -63,7 +69,18 @@ impl<const ROOM: usize> Submap<ROOM> {
         // As many as there is room for.
         let _ = self.first.resize(SIDE, [NONE; SIDE]);
         self.grid.clear();
+        (self.overlay, self.room) = (ROOM, ROOM);
         self.has_cut = false;
+    }
+
+    /// Leaves room for an overlay: no more than so many points are added before it begins.
+    pub fn leave_room(&mut self, points: usize) {
+        self.room = points.min(ROOM);
+    }
+
+    /// What is added from now on lies over what was added before: it counts where nothing else is near.
+    pub fn begin_overlay(&mut self) {
+        (self.overlay, self.room) = (self.entries.len(), ROOM);
     }
 
     /// Begins at a pose with the surfaces of key scans around it.
@@ -72,6 +89,12 @@ impl<const ROOM: usize> Submap<ROOM> {
         for key in keys.iter() {
             self.add(&key.pose, key.points.iter());
         }
+    }
+
+    /// Whether something lies over the rest.
+    #[must_use]
+    pub fn has_overlay(&self) -> bool {
+        self.entries.len() > self.overlay
     }
 
     /// Where its frame is.
@@ -104,6 +127,12 @@ impl<const ROOM: usize> Submap<ROOM> {
         libm::fabsf(position.x) < HALF && libm::fabsf(position.y) < HALF
     }
 
+    /// Whether all that is at a position of its own frame is in it: it is not too far away, and there was room.
+    #[must_use]
+    pub fn holds(&self, position: &ScanPoint) -> bool {
+        !self.has_cut && Self::reaches(position)
+    }
+
     /// Some of its points: at most `count` from number `first` on.
     pub(super) fn points(&self, first: usize, count: usize) -> impl Iterator<Item = SurfacePoint> + '_ {
         self.entries.iter().skip(first).take(count).map(|entry| entry.point.unpacked())
@@ -130,7 +159,7 @@ impl<const ROOM: usize> Submap<ROOM> {
         }
         let (Some(packed), Some(first)) = (PackedPoint::of(point), self.first_mut(&point.position)) else { return };
         let next = *first;
-        if self.entries.len() >= ROOM {
+        if self.entries.len() >= self.room {
             self.has_cut = true;
             return;
         }
@@ -143,13 +172,19 @@ impl<const ROOM: usize> Submap<ROOM> {
         self.grid.add(&point.position);
     }
 
-    /// The nearest point of the same kind that faces the same way, if it is within `reach` (m, at most [`LARGEST_REACH`]).
+    /// The nearest point of the same kind that faces the same way, if it is within `reach` (m, at most [`LARGEST_REACH`]); one of the overlay
+    /// only if there is no other.
     #[must_use]
     pub fn nearest(&self, point: &SurfacePoint, reach: f32) -> Option<SurfacePoint> {
+        self.nearest_below(point, reach).map(|(point, _)| point)
+    }
+
+    /// The same, and whether it is of the overlay.
+    pub(super) fn nearest_below(&self, point: &SurfacePoint, reach: f32) -> Option<(SurfacePoint, bool)> {
         let sought = PackedPoint::of(point)?;
         let reach_in_counts = reach * 1000.0;
-        let mut nearest = (reach_in_counts * reach_in_counts) as u32;
-        let mut best = None;
+        let farthest = (reach_in_counts * reach_in_counts) as u32;
+        let (mut below, mut over) = ((farthest, None), (farthest, None));
         let (low, high) = (Self::column(point.position.x - reach), Self::column(point.position.x + reach));
         let (bottom, top) = (Self::column(point.position.y - reach), Self::column(point.position.y + reach));
         for row in self.first.get(bottom..=top)? {
@@ -158,15 +193,17 @@ impl<const ROOM: usize> Submap<ROOM> {
                 // A chain is no longer than there are points.
                 for _ in 0..ROOM {
                     let Some(entry) = self.entries.get(usize::from(number)) else { break };
+                    let best = if usize::from(number) < self.overlay { &mut below } else { &mut over };
                     number = entry.next;
                     let square = entry.point.square(&sought);
-                    if square < nearest && entry.point.is_like(&sought) {
-                        (nearest, best) = (square, Some(entry.point));
+                    if square < best.0 && entry.point.is_like(&sought) {
+                        *best = (square, Some(entry.point));
                     }
                 }
             }
         }
-        best.map(|point| point.unpacked())
+        let unpacked = |(_, point): (u32, Option<PackedPoint>)| point.map(|point| point.unpacked());
+        unpacked(below).map(|point| (point, false)).or_else(|| unpacked(over).map(|point| (point, true)))
     }
 
     /// The column, or row, of a coordinate, the nearest one if it is outside.

@@ -1,25 +1,36 @@
 //! What is loaded of a kept map, or of key scans, around the vehicle.
+//!
+//! Over the map lies what has been seen of late where it has nothing: things that were moved, or that nobody has mapped. It is learnt in key
+//! scans, and forgotten with them; the map stays as it is.
 
 use super::matcher::settle;
 use super::{ContourMatch, KeptMap, KeyRing, LARGEST_REACH, Prediction, Submap, SurfacePoint, TILE, Tile, align};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Transform};
 
 /// What is around the vehicle of a map that is larger, in a submap with room for `ROOM` points.
 #[derive(Clone, Debug, Default)]
 pub struct Surroundings<const ROOM: usize = 6144> {
     submap: Submap<ROOM>,
     place: Option<(i16, i16)>,
+    /// Key scans that were learnt since it was loaded.
+    learnt: usize,
 }
 
 /// The submap is loaded anew where the vehicle has come so far out of the tile in whose middle it stands, m.
 const OUTSIDE: f64 = LARGEST_REACH as f64;
+
+/// The share of the room that is left for the overlay is one in so many.
+const OF_OVERLAY: usize = 8;
+
+/// Fewer points that are not of the map are not worth a key scan.
+const WORTH_A_KEY: usize = 10;
 
 impl<const ROOM: usize> Surroundings<ROOM> {
     /// Nothing is loaded.
     #[must_use]
     #[inline(always)]
     pub const fn new() -> Self {
-        Self { submap: Submap::new(), place: None }
+        Self { submap: Submap::new(), place: None, learnt: 0 }
     }
 
     /// The surfaces are loaded anew before they are matched with again: the map has been replaced, or the memory was lent.
@@ -45,26 +56,81 @@ impl<const ROOM: usize> Surroundings<ROOM> {
         &self.submap
     }
 
-    /// Where points were seen by the surfaces of the map: those around, and then by those further away as well. None if they say nothing of
-    /// it.
+    /// Where points were seen by the surfaces of the map with `keys` over it: by those around, and then by those further away as well. None
+    /// if they say nothing of it.
     #[must_use]
-    pub fn align(&mut self, map: &KeptMap, points: &[SurfacePoint], predicted: &Prediction) -> Option<ContourMatch> {
-        let submap = self.around(map, &predicted.pose);
-        let found = align(points, submap, predicted)?;
-        let Some(place) = self.place else { return Some(found) };
+    pub fn align<const KEYS: usize, const POINTS: usize>(
+        &mut self,
+        (map, keys): (&KeptMap, &KeyRing<KEYS, POINTS>),
+        points: &[SurfacePoint],
+        predicted: &Prediction,
+    ) -> Option<ContourMatch> {
+        let found = align(points, self.around(map, keys, &predicted.pose), predicted)?;
         let submap = &self.submap;
+        let Some(place) = self.place else { return Some(found) };
         let nearest = |point: &SurfacePoint, reach: f32| {
-            if Submap::<ROOM>::reaches(&point.position) {
-                submap.nearest(point, reach)
-            } else {
-                map.nearest(place, point, reach).0
-            }
+            let loaded = submap.nearest(point, reach);
+            let is_elsewhere = loaded.is_none() && !submap.holds(&point.position);
+            if is_elsewhere { map.nearest(place, point, reach).0 } else { loaded }
         };
-        Some(settle(points, submap, &predicted.pose, &found, nearest).unwrap_or(found))
+        let found = settle(points, submap, &predicted.pose, &found, nearest).unwrap_or(found);
+        let share = self.share_of_overlay(points, &found.pose);
+        let newest = keys.newest().map_or([0.0; 2], |key| key.deviation);
+        Some(ContourMatch { of_overlay: newest.map(|deviation| share * deviation), ..found })
     }
 
-    /// The surfaces of the map around a pose.
-    pub fn around(&mut self, map: &KeptMap, pose: &Pose) -> &Submap<ROOM> {
+    /// Learns what of a scan, whose points were seen from a pose that is known that well (m and rad), is not of the map, if it was taken far
+    /// enough from the last one.
+    pub fn learn<const KEYS: usize, const POINTS: usize>(
+        &mut self,
+        keys: &mut KeyRing<KEYS, POINTS>,
+        points: &[SurfacePoint],
+        (pose, deviation): (&Pose, [f32; 2]),
+    ) {
+        if self.place.is_none() || !keys.wants(pose) {
+            return;
+        }
+        let transform = Transform::of(&self.submap.origin().between(pose));
+        let submap = &self.submap;
+        let is_mapped = |point: &SurfacePoint| {
+            let moved = point.moved(&transform);
+            !Submap::<ROOM>::reaches(&moved.position)
+                || submap.nearest_below(&moved, LARGEST_REACH).is_some_and(|(_, is_over)| !is_over)
+        };
+        let unmapped = || points.iter().filter(|point| !is_mapped(point)).copied();
+        if unmapped().count() < WORTH_A_KEY {
+            return;
+        }
+        keys.keep(pose, deviation, unmapped());
+        self.learnt += 1;
+        if self.learnt >= KEYS {
+            // What has been forgotten is to go.
+            self.load_anew();
+        } else if let Some(key) = keys.newest() {
+            self.submap.add(pose, key.points.iter());
+        }
+    }
+
+    /// Share of points, seen from a pose, that lie on the overlay alone.
+    fn share_of_overlay(&self, points: &[SurfacePoint], pose: &Pose) -> f32 {
+        if !self.submap.has_overlay() {
+            return 0.0;
+        }
+        let transform = Transform::of(&self.submap.origin().between(pose));
+        let near = points.iter().filter_map(|point| self.submap.nearest_below(&point.moved(&transform), LARGEST_REACH));
+        let (count, over) = near.fold((0_u16, 0_u16), |(count, over), (_, is_over)| {
+            (count.saturating_add(1), over.saturating_add(u16::from(is_over)))
+        });
+        f32::from(over) / f32::from(count.max(1))
+    }
+
+    /// The surfaces of the map around a pose, with key scans over it.
+    pub fn around<const KEYS: usize, const POINTS: usize>(
+        &mut self,
+        map: &KeptMap,
+        keys: &KeyRing<KEYS, POINTS>,
+        pose: &Pose,
+    ) -> &Submap<ROOM> {
         let from = self.submap.origin();
         let reach = 0.5 * TILE + OUTSIDE;
         let is_inside = libm::fabs(pose.x - from.x) < reach && libm::fabs(pose.y - from.y) < reach;
@@ -72,8 +138,13 @@ impl<const ROOM: usize> Surroundings<ROOM> {
         if (self.place.is_none() || !is_inside)
             && let Some(place) = wanted
         {
-            map.load(place, &mut self.submap);
+            map.load(place, ROOM - ROOM / OF_OVERLAY, &mut self.submap);
+            self.submap.begin_overlay();
+            for key in keys.iter() {
+                self.submap.add(&key.pose, key.points.iter());
+            }
             self.place = wanted;
+            self.learnt = 0;
         }
         &self.submap
     }

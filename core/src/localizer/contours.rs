@@ -79,8 +79,12 @@ impl<C: Capacities> Localizer<C> {
             return status.add(time, Verdict::OutOfTime, false, None);
         };
         let place = self.workspace.path.place(time.since(scan.start));
-        let outcome = self.see_contours(time, &mount.compose(&place.inverse()), &state);
+        let frame = mount.compose(&place.inverse());
+        let outcome = self.see_contours(time, &frame, &state);
         let is_used = outcome.wanted().is_some_and(|seen| self.timeline.fuse_pose(time, &seen) == Ok(true));
+        if let Ok(state) = self.timeline.state_at(time) {
+            self.learn_contours(&outcome, is_used, &frame, &state);
+        }
         self.tell_contours(time, scan.laser, &outcome, is_used);
     }
 
@@ -90,8 +94,11 @@ impl<C: Capacities> Localizer<C> {
             return;
         }
         let (time, state) = (self.slam.time(), self.slam.state());
-        let outcome = self.see_contours(time, &mount.compose(&place.inverse()), &state);
+        let frame = mount.compose(&place.inverse());
+        let outcome = self.see_contours(time, &frame, &state);
         let is_used = outcome.wanted().is_some_and(|seen| seen.apply(self.slam.parts().0));
+        let state = self.slam.state();
+        self.learn_contours(&outcome, is_used, &frame, &state);
         self.tell_contours(time, laser, &outcome, is_used);
     }
 
@@ -101,6 +108,14 @@ impl<C: Capacities> Localizer<C> {
             && state.position_deviation() <= BY_REFLECTORS;
         let step = self.step_until(time);
         see_contours(&mut self.contours, self.features.points(), frame, (state, &step), is_led)
+    }
+
+    /// Learns what the scan shows beside the map, from a pose that it has corrected, or that reflectors know better and it does not contradict.
+    fn learn_contours(&mut self, outcome: &ContourOutcome, is_used: bool, frame: &Pose, state: &Ekf) {
+        if is_used || outcome.agrees() {
+            let deviation = (state.position_deviation(), state.heading_deviation());
+            self.contours.learn(&state.pose.compose(frame), deviation);
+        }
     }
 
     /// The motion since the scan that was compared with contours before.

@@ -47,7 +47,7 @@ impl<C: Capacities> Localizer<C> {
             gyro.begin_pose();
         }
         // Whoever has searched for it may have used the room of what was loaded.
-        self.contours.load_anew();
+        self.contours.begin_anew();
         self.lost = None;
         self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
         if !is_past {

@@ -110,11 +110,15 @@ pub trait FindContours: Clone + Debug {
     /// The map, and memory for who searches a start in it. What was loaded is loaded anew afterwards.
     fn for_search(&mut self) -> Option<(Self::Map, &mut <Self::Places as FindPlaces>::Room)>;
 
-    /// What is around is loaded anew when the next scan is compared with the map.
-    fn load_anew(&mut self);
+    /// The vehicle is elsewhere: what is around is loaded anew when the next scan is compared with the map, and what was learnt beside the
+    /// map is forgotten.
+    fn begin_anew(&mut self);
 
     /// Takes the points of a scan and finds where it was taken. None if the map says nothing of it.
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch>;
+
+    /// Learns what of the scan taken last, from a pose of its points that is known that well (m and rad), is not of the map.
+    fn learn(&mut self, pose: &Pose, deviation: (f64, f64));
 
     /// Where the scan taken last fits nearest to a pose, without a search.
     fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch>;
@@ -162,14 +166,25 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
         Some((self.map?, self.surroundings.lend()))
     }
 
-    fn load_anew(&mut self) {
+    fn begin_anew(&mut self) {
         self.surroundings.load_anew();
+        if self.map.is_some() {
+            self.keys.clear();
+        }
     }
 
     #[inline(never)]
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch> {
         self.see(scan);
-        self.surroundings.align(&self.map?, &self.points, predicted)
+        self.surroundings.align((&self.map?, &self.keys), &self.points, predicted)
+    }
+
+    #[inline(never)]
+    fn learn(&mut self, pose: &Pose, deviation: (f64, f64)) {
+        if self.map.is_some() {
+            let deviation = [deviation.0 as f32, deviation.1 as f32];
+            self.surroundings.learn(&mut self.keys, &self.points, (pose, deviation));
+        }
     }
 
     fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch> {
@@ -193,7 +208,7 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
     fn keep(&mut self, pose: &Pose) -> bool {
         let is_kept = self.keys.wants(pose);
         if is_kept {
-            self.keys.keep(pose, &self.points);
+            self.keys.keep(pose, [0.0; 2], self.points.iter().copied());
             self.surroundings.of_keys(pose, &self.keys);
         }
         is_kept
@@ -225,11 +240,13 @@ impl FindContours for NoContours {
         None
     }
 
-    fn load_anew(&mut self) {}
+    fn begin_anew(&mut self) {}
 
     fn locate(&mut self, _: PointView<'_>, _: &Prediction) -> Option<ContourMatch> {
         None
     }
+
+    fn learn(&mut self, _: &Pose, _: (f64, f64)) {}
 
     fn locate_nearby(&self, _: &Pose) -> Option<ContourMatch> {
         None
@@ -257,8 +274,10 @@ impl FindContours for NoContours {
 #[must_use]
 pub fn pose_by_contours(found: &ContourMatch, mount: &Pose) -> Option<PoseObservation> {
     let free = Matrix3::from_diagonal_element(1.0 / (FREE * FREE));
-    let shared =
-        [SHARED_POSITION * SHARED_POSITION, SHARED_POSITION * SHARED_POSITION, SHARED_HEADING * SHARED_HEADING];
+    // What has been learnt beside the map is as wrong as the pose was then.
+    let [position, heading] = found.of_overlay.map(f64::from);
+    let position = SHARED_POSITION * SHARED_POSITION + position * position;
+    let shared = [position, position, SHARED_HEADING * SHARED_HEADING + heading * heading];
     let own = (found.information / INFLATION + free).try_inverse()?;
     let back = mount.inverse();
     // Position and heading of the laser are those of R with the lever between them.
@@ -293,6 +312,11 @@ impl ContourOutcome {
 
     fn is_expected(&self) -> bool {
         self.test_ratio.is_none_or(|ratio| ratio <= 1.0)
+    }
+
+    /// Whether it was compared with a pose that is known better, and agrees with it.
+    pub(crate) fn agrees(&self) -> bool {
+        self.verdict == Verdict::Unknown && self.test_ratio.is_some_and(|ratio| ratio <= 1.0)
     }
 
     /// The pose that is to correct the filter, if one is.
