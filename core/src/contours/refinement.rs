@@ -14,8 +14,11 @@ const FAR_ITERATIONS: usize = 2;
 /// How far a surface is looked for, m: at first, and then.
 const REACH: (f32, f32) = (0.3, 0.15);
 
-/// Points further from their surface than this weigh half, m.
-const TOLERANCE: f32 = 0.05;
+/// Points further from their surface than this weigh half, m: at first, and at least.
+const TOLERANCE: (f32, f32) = (0.05, 0.015);
+
+/// Later it is so many times their distance, root mean square, weighted.
+const TOLERATED: f32 = 2.5;
 
 /// Standard deviation of a point across its surface, m.
 const DEVIATION: f32 = 0.03;
@@ -81,9 +84,9 @@ impl Sums {
     }
 
     /// Adds what a point says that was moved by a transform to where that surface is near.
-    fn lay(&mut self, moved: &SurfacePoint, surface: &SurfacePoint, transform: &Transform) {
+    fn lay(&mut self, moved: &SurfacePoint, surface: &SurfacePoint, (transform, tolerance): (&Transform, f32)) {
         let (lever, error) = (moved.position - transform.shift(), moved.position - surface.position);
-        let weight = |square: f32| 1.0 / ((1.0 + square / (TOLERANCE * TOLERANCE)) * DEVIATION * DEVIATION);
+        let weight = |square: f32| 1.0 / ((1.0 + square / (tolerance * tolerance)) * DEVIATION * DEVIATION);
         self.inliers += 1;
         if surface.is_corner() {
             let weight = CORNER * weight(error.norm_squared());
@@ -112,6 +115,7 @@ pub(super) struct Refining {
     start: Pose,
     pose: Pose,
     iteration: usize,
+    tolerance: f32,
     /// What was summed up in this iteration, of so many points.
     sums: Sums,
     points: usize,
@@ -121,7 +125,7 @@ pub(super) struct Refining {
 impl Refining {
     /// A scan that is taken to be at `start` in the frame of the map.
     pub(super) fn new(start: Pose) -> Self {
-        Self { start, pose: start, iteration: 0, sums: Sums::default(), points: 0, outcome: None }
+        Self { start, pose: start, iteration: 0, tolerance: TOLERANCE.0, sums: Sums::default(), points: 0, outcome: None }
     }
 
     /// A scan that was laid onto some of the surfaces at `start`: the others are not far away.
@@ -161,7 +165,7 @@ impl Refining {
         for point in points.iter().skip(self.points).take(count) {
             let moved = point.moved(&transform);
             if let Some(surface) = nearest(&moved, reach) {
-                self.sums.lay(&moved, &surface, &transform);
+                self.sums.lay(&moved, &surface, (&transform, self.tolerance));
             }
         }
         self.points = self.points.saturating_add(count);
@@ -192,6 +196,10 @@ impl Refining {
         let pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
         self.pose = pose;
         self.iteration += 1;
+        if iteration >= FAR_ITERATIONS {
+            let distance = DEVIATION * libm::sqrtf(sums.scatter());
+            self.tolerance = (TOLERATED * distance).clamp(TOLERANCE.1, TOLERANCE.0);
+        }
         self.outcome = Some(Refinement {
             pose,
             information,
