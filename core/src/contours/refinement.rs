@@ -125,7 +125,15 @@ pub(super) struct Refining {
 impl Refining {
     /// A scan that is taken to be at `start` in the frame of the map.
     pub(super) fn new(start: Pose) -> Self {
-        Self { start, pose: start, iteration: 0, tolerance: TOLERANCE.0, sums: Sums::default(), points: 0, outcome: None }
+        Self {
+            start,
+            pose: start,
+            iteration: 0,
+            tolerance: TOLERANCE.0,
+            sums: Sums::default(),
+            points: 0,
+            outcome: None,
+        }
     }
 
     /// A scan that was laid onto some of the surfaces at `start`: the others are not far away.

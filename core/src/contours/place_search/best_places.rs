@@ -51,8 +51,11 @@ pub enum PlaceAnswer {
 /// Poses closer than this are one place, m and rad.
 const SAME: (f64, f64) = (0.3, 0.1);
 
-/// A place is as good as the best one if they agree there this much as well.
+/// A place is as good as the best one if they agree there this much as well,
 const AS_GOOD: f32 = 0.9;
+
+/// and less so by this much of what does not agree at the best one: things that were moved may speak for a wrong place, too.
+const BY_DISAGREEING: f32 = 0.3;
 
 /// Places that are looked at closely.
 const CANDIDATES: usize = 4;
@@ -123,8 +126,8 @@ impl BestPlaces {
         let Some((Candidate { fix: best, held }, others)) = self.places.split_first() else {
             return PlaceAnswer::Unknown;
         };
-        let is_second =
-            |other: &&Candidate| !best.is_same(&other.fix.pose) && other.fix.overlap() >= AS_GOOD * best.overlap();
+        let as_good = (AS_GOOD - BY_DISAGREEING * (1.0 - best.overlap())) * best.overlap();
+        let is_second = |other: &&Candidate| !best.is_same(&other.fix.pose) && other.fix.overlap() >= as_good;
         let at = |pose: Pose| PlaceFix { pose, ..*best };
         match (others.iter().find(is_second), best.free_axis, held) {
             (Some(second), ..) => PlaceAnswer::Ambiguous(*best, second.fix),

@@ -54,7 +54,7 @@ const TURNS: i32 = 3;
 const TURN: f64 = 0.03;
 
 /// What is searched at each of them.
-const WINDOW: SearchWindow = SearchWindow { shifts: 2, shift: 3, turns: 0, turn: 0.0, distance: 10.0 };
+const WINDOW: SearchWindow = SearchWindow { shifts: 2, shift: 3, turns: 0, turn: 0.0, distance: 1.0 };
 
 /// A place is laid onto the surfaces if the search gives it so much of what it gave the best one before.
 const PROMISING: f32 = 0.5;
