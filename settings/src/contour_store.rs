@@ -71,6 +71,7 @@ pub struct ContourStore<F: NorFlash> {
     flash: F,
     /// What was found at the start.
     found: Option<KeptContours>,
+    is_damaged: bool,
     writing: Option<Writing>,
 }
 
@@ -83,7 +84,7 @@ impl<F: NorFlash> ContourStore<F> {
         if !is_usable || !HEADER.is_multiple_of(F::WRITE_SIZE) {
             return None;
         }
-        let mut store = Self { flash, found: None, writing: None };
+        let mut store = Self { flash, found: None, is_damaged: false, writing: None };
         let copies = [store.copy(0), store.copy(1)];
         // The numbers go on from each other.
         let newer = |one: &KeptContours, other: &KeptContours| one.generation.wrapping_sub(other.generation) == 1;
@@ -91,6 +92,7 @@ impl<F: NorFlash> ContourStore<F> {
             [Some(one), Some(other)] => Some(if newer(&other, &one) { other } else { one }),
             [one, other] => one.or(other),
         };
+        store.is_damaged = store.found.is_none() && [0, 1].into_iter().any(|copy| !store.is_blank(copy));
         Some(store)
     }
 
@@ -98,6 +100,12 @@ impl<F: NorFlash> ContourStore<F> {
     #[must_use]
     pub fn found(&self) -> Option<KeptContours> {
         self.found.filter(|found| found.length > 0)
+    }
+
+    /// Whether there was a map, and no copy of it is whole any more. One whose first writing was cut off was none.
+    #[must_use]
+    pub const fn is_damaged(&self) -> bool {
+        self.is_damaged
     }
 
     /// Most bytes of a map.
@@ -192,10 +200,21 @@ impl<F: NorFlash> ContourStore<F> {
         self.flash.capacity() / 2
     }
 
-    /// What a copy holds, if that is whole.
-    fn copy(&mut self, copy: u8) -> Option<KeptContours> {
+    /// The header of a copy; none if the flash cannot be read.
+    fn header(&mut self, copy: u8) -> Option<[u8; HEADER]> {
         let mut header = [0; HEADER];
         self.flash.read(self.offset(copy) - HEADER as u32, &mut header).ok()?;
+        Some(header)
+    }
+
+    /// Whether the header of a copy has never been written since its pages were erased.
+    fn is_blank(&mut self, copy: u8) -> bool {
+        self.header(copy).is_some_and(|header| header == [0xFF; HEADER])
+    }
+
+    /// What a copy holds, if that is whole.
+    fn copy(&mut self, copy: u8) -> Option<KeptContours> {
+        let header = self.header(copy)?;
         let kept = KeptContours::of_header(copy, &header)?;
         let is_whole = kept.length as usize <= self.room()
             && self.checksum_in(copy, kept.length).is_ok_and(|checksum| checksum == kept.checksum);

@@ -165,6 +165,29 @@ fn a_changed_byte_costs_the_copy_and_the_other_one_is_found() {
     }
 }
 
+#[test]
+fn a_map_of_which_no_copy_is_whole_is_damaged_and_one_that_never_was_is_not() {
+    let mut store = open(Flash::new());
+    assert!(!store.is_damaged());
+    store.begin(2500, checksum(&map(2500, 1))).unwrap();
+    store.write(&map(2500, 1)[..CONTOUR_PIECE]).unwrap();
+    store = again(store);
+    assert!(!store.is_damaged(), "it was never whole");
+    write(&mut store, &map(2500, 1)).unwrap();
+    store = again(store);
+    write(&mut store, &map(2500, 2)).unwrap();
+    let mut flash = again(store).into_flash();
+    for (copy, is_damaged) in [(0, false), (1, true)] {
+        flash.bytes[copy * PAGE + HEADER + 1000] ^= 1;
+        let store = open(flash.clone());
+        assert_eq!((store.is_damaged(), store.found().is_none()), (is_damaged, is_damaged), "{copy}");
+    }
+    // A map of no bytes takes its place.
+    let mut store = open(flash);
+    write(&mut store, &[]).unwrap();
+    assert!(!again(store).is_damaged());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -178,7 +201,7 @@ proptest! {
             state as u8
         });
         let mut store = open(Flash::filled(bytes.collect()));
-        prop_assert_eq!(store.found(), None);
+        prop_assert_eq!((store.found(), store.is_damaged()), (None, true));
         write(&mut store, &map(2000, 7)).unwrap();
         prop_assert_eq!(read(&mut again(store), 300), map(2000, 7));
     }

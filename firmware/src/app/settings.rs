@@ -72,6 +72,10 @@ pub fn read<F: NorFlash>(
     if let Some(found) = contours.as_ref().and_then(ContourStore::found) {
         defmt::info!("settings: a map of contours of {} bytes", found.length);
     }
+    if contours.as_ref().is_some_and(ContourStore::is_damaged) {
+        exchange::set_settings_sound(false);
+        defmt::error!("settings: the map of contours is damaged and was left out");
+    }
     if !panic.is_empty() {
         defmt::error!("before this start: {}", panic);
     }
