@@ -57,17 +57,18 @@ impl<const BEAMS: usize> Detector<BEAMS> {
             return 0;
         }
         let crosses_seam = scan.is_full_circle && self.parameters.crosses_seam;
-        match self.parameters.jump {
+        let parameters = &self.parameters.for_beams(scan.bearing_step);
+        match parameters.jump {
             Some(jump) => self.runs.find(scan, crosses_seam, jump),
             None => self.runs.set_unbroken(count, crosses_seam),
         }
         let runs = self.runs.lengths(count);
-        let candidates = Candidates { scan, runs, crosses_seam, parameters: &self.parameters, sectors: &self.sectors };
+        let candidates = Candidates { scan, runs, crosses_seam, parameters, sectors: &self.sectors };
 
         let costs = self.costs.get_mut(..count).unwrap_or_default();
         let worst = candidates.weigh(costs);
-        let (radius, share) = (self.parameters.suppression_radius, self.parameters.score_share);
-        match self.parameters.suppression {
+        let (radius, share) = (parameters.suppression_radius, parameters.score_share);
+        match parameters.suppression {
             SuppressionRule::Distance => {
                 for (index, cost) in costs.iter().enumerate() {
                     if cost.is_candidate()
@@ -86,9 +87,9 @@ impl<const BEAMS: usize> Detector<BEAMS> {
                 }
             }),
         }
-        if let Some(wanted) = &self.parameters.end_points {
+        if let Some(wanted) = &parameters.end_points {
             let beams = Beams { points, ranges, crosses_seam };
-            let faces = Faces { beams, bearing_step: scan.bearing_step, runs, parameters: &self.parameters, wanted };
+            let faces = Faces { beams, bearing_step: scan.bearing_step, runs, parameters, wanted };
             faces.find_ends(&mut keep);
         }
         left_out

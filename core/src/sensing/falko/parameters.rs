@@ -2,6 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Beams that are no further apart than this, 0.4 deg, put enough points on the sides of a corner for any gate, rad.
+const FINE: f32 = 0.007;
+
+/// What both lines of a corner need not fulfil better where beams are further apart. It was chosen on two offices, at 0.5 and 1 deg.
+const COARSE: LineGate = LineGate { residual: 0.05, sine: 0.35, deviation: 0.05, beams: 2.0, concave_spacing: 0.3 };
+
+/// How many neighbours a side are enough there.
+const COARSE_POINTS: u16 = 2;
+
+/// The smallest departure from the surface that ends a neighbourhood there, m.
+const COARSE_JUMP: f32 = 0.2;
+
+/// The least standard deviation of a keypoint in every direction there, m.
+const COARSE_DEVIATION: f32 = 0.02;
+
 /// How neighbouring candidates compete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SuppressionRule {
@@ -150,6 +165,27 @@ impl Parameters {
                 depth: 0.06,
             }),
             ..Self::thesis()
+        }
+    }
+
+    /// What is looked for in a scan whose beams are so far apart, rad: where they are too few for this gate a wider one, and keypoints that are
+    /// as much less precise.
+    #[must_use]
+    pub(super) fn for_beams(&self, step: f32) -> Self {
+        let Some(gate) = self.gate.filter(|_| step > FINE) else { return *self };
+        let gate = LineGate {
+            residual: gate.residual.max(COARSE.residual),
+            sine: gate.sine.min(COARSE.sine),
+            deviation: gate.deviation.max(COARSE.deviation),
+            beams: gate.beams.max(COARSE.beams),
+            concave_spacing: gate.concave_spacing.max(COARSE.concave_spacing),
+        };
+        Self {
+            points_a_side: self.points_a_side.min(COARSE_POINTS),
+            jump: self.jump.map(|jump| jump.max(COARSE_JUMP)),
+            gate: Some(gate),
+            deviation_floor: self.deviation_floor.max(COARSE_DEVIATION),
+            ..*self
         }
     }
 
