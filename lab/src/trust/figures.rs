@@ -37,8 +37,8 @@ pub struct Figures {
     pub nominal_mi: u64,
     /// Hazardous events without faults, in all halls.
     pub nominal_hmi: u64,
-    /// Share of the halls that commissioning refuses.
-    pub refused_halls: f64,
+    /// Share of the halls that commissioning refuses, of runs without faults; none if there was none.
+    pub refused_halls: Option<f64>,
     /// Share of the time in which the pose was available for travelling.
     pub availability_travel: Option<f64>,
     /// Share of the time at stations in which it was available for docking.
@@ -109,7 +109,7 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
         nominal_km: km,
         nominal_mi: sound.sum(|outcome| outcome.misleading),
         nominal_hmi: sound.sum(|outcome| u64::from(outcome.hazards)),
-        refused_halls: 1.0 - accepted.rows.len() as f64 / sound.rows.len().max(1) as f64,
+        refused_halls: share((sound.rows.len() - accepted.rows.len()) as u64, sound.rows.len() as u64),
         availability_travel: share(accepted.sum(|outcome| outcome.available), accepted.sum(|outcome| outcome.judged)),
         availability_docking: share(
             accepted.sum(|outcome| outcome.docking_available),
