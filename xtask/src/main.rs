@@ -4,6 +4,7 @@ mod audit;
 mod chip;
 mod dist;
 mod emulate;
+mod figures;
 mod firmware;
 mod fuzz;
 mod requirements;
@@ -28,6 +29,7 @@ enum Command {
     Chip(chip::Chip),
     Dist(dist::Dist),
     Emulate(emulate::Emulate),
+    Figures(figures::Figures),
     Firmware(firmware::Firmware),
     Fuzz(fuzz::Fuzz),
     Seeds(seeds::Seeds),
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         Command::Chip(chip) => chip.run(),
         Command::Dist(dist) => dist.run(),
         Command::Emulate(emulate) => emulate.run(),
+        Command::Figures(figures) => figures.run(),
         Command::Firmware(firmware) => firmware.run(),
         Command::Fuzz(fuzz) => fuzz.run(),
         Command::Seeds(seeds) => seeds.run(),
