@@ -273,7 +273,7 @@ fn the_walls_of_an_open_hall_hold_the_pose_where_all_that_is_near_has_moved() {
     }
 }
 
-/// The annex of a corridor is not mapped: what is seen there holds the pose until the map does again, and the deviation grows meanwhile.
+/// The annex of a room is not mapped: what is seen there holds the pose until the map does again, and the deviation grows meanwhile.
 #[test]
 fn what_nobody_has_mapped_is_learnt_over_the_map() {
     let mapped = room();

@@ -38,6 +38,25 @@ fn reference_profile_finds_what_the_reference_program_finds() {
 }
 
 #[test]
+fn the_default_profile_is_at_least_as_repeatable_as_the_printed_one() {
+    let test = "the_default_profile_is_at_least_as_repeatable_as_the_printed_one";
+    let Some(_) = recordings(test, "scans2d") else { return };
+    for (name, set) in SETS {
+        let scans = set.scans().unwrap();
+        let pairs = repeatability::overlapping_pairs(&scans);
+        let score = |parameters| {
+            let keypoints: Vec<_> = detect(&scans, parameters).collect();
+            let found = keypoints.iter().map(Vec::len).sum::<usize>();
+            (repeatability::score(&scans, &positions(&keypoints), &pairs), found as f64 / scans.len() as f64)
+        };
+        let ((usual, per_scan), (printed, _)) = (score(Parameters::default()), score(Parameters::thesis()));
+        println!("{name}: {per_scan:.1} keypoints a scan, {usual:?}, as printed {printed:?}");
+        assert!(usual.excluding_empty >= printed.excluding_empty && usual.counting_empty >= printed.counting_empty);
+        assert!(per_scan <= 12.0);
+    }
+}
+
+#[test]
 fn repeatability_beats_the_reference_program_by_the_independent_score() {
     let test = "repeatability_beats_the_reference_program_by_the_independent_score";
     let Some(_) = recordings(test, "scans2d") else { return };

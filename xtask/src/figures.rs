@@ -26,7 +26,7 @@ const BLIND: [&str; 15] = [
     "drives",
 ];
 
-/// Make the tables of the chapter on driving by features and contours, by `agv evaluate`, one after the other: ten minutes
+/// Make the tables of the chapter on driving by features and contours, by `agv evaluate`, one after the other, from the recordings in AGV_DATA: some minutes
 #[derive(clap::Args)]
 pub struct Figures {
     /// Only those whose command contains this.

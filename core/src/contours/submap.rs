@@ -37,7 +37,7 @@ pub struct Submap<const ROOM: usize> {
     /// Nothing before the submap is begun for the first time: what would be built here would be built on the stack.
     first: Vec<[u16; SIDE], SIDE>,
     grid: LikelihoodGrid,
-    /// The points from this number on have moved since the others were mapped.
+    /// The points from this number on lie over the others: they count where none of those is near.
     overlay: usize,
     /// How many points may be in it now.
     room: usize,
@@ -176,11 +176,11 @@ impl<const ROOM: usize> Submap<ROOM> {
     /// only if there is no other.
     #[must_use]
     pub fn nearest(&self, point: &SurfacePoint, reach: f32) -> Option<SurfacePoint> {
-        self.nearest_below(point, reach).map(|(point, _)| point)
+        self.nearest_of_either(point, reach).map(|(point, _)| point)
     }
 
     /// The same, and whether it is of the overlay.
-    pub(super) fn nearest_below(&self, point: &SurfacePoint, reach: f32) -> Option<(SurfacePoint, bool)> {
+    pub(super) fn nearest_of_either(&self, point: &SurfacePoint, reach: f32) -> Option<(SurfacePoint, bool)> {
         let sought = PackedPoint::of(point)?;
         let reach_in_counts = reach * 1000.0;
         let farthest = (reach_in_counts * reach_in_counts) as u32;

@@ -95,7 +95,7 @@ impl<const ROOM: usize> Surroundings<ROOM> {
         let is_mapped = |point: &SurfacePoint| {
             let moved = point.moved(&transform);
             !Submap::<ROOM>::reaches(&moved.position)
-                || submap.nearest_below(&moved, LARGEST_REACH).is_some_and(|(_, is_over)| !is_over)
+                || submap.nearest_of_either(&moved, LARGEST_REACH).is_some_and(|(_, is_over)| !is_over)
         };
         let unmapped = || points.iter().filter(|point| !is_mapped(point)).copied();
         if unmapped().count() < WORTH_A_KEY {
@@ -117,7 +117,8 @@ impl<const ROOM: usize> Surroundings<ROOM> {
             return 0.0;
         }
         let transform = Transform::of(&self.submap.origin().between(pose));
-        let near = points.iter().filter_map(|point| self.submap.nearest_below(&point.moved(&transform), LARGEST_REACH));
+        let near =
+            points.iter().filter_map(|point| self.submap.nearest_of_either(&point.moved(&transform), LARGEST_REACH));
         let (count, over) = near.fold((0_u16, 0_u16), |(count, over), (_, is_over)| {
             (count.saturating_add(1), over.saturating_add(u16::from(is_over)))
         });
