@@ -53,6 +53,7 @@ mod start_search;
 mod state_slots;
 mod support;
 mod surface_check;
+mod surroundings;
 mod timeline;
 mod traction_check;
 mod tricycle_speed;

@@ -66,24 +66,18 @@ impl<const ROOM: usize> Surroundings<ROOM> {
         predicted: &Prediction,
     ) -> Option<ContourMatch> {
         let found = align(points, self.around(map, keys, &predicted.pose), predicted)?;
-        let submap = &self.submap;
-        let Some(place) = self.place else { return Some(found) };
-        let nearest = |point: &SurfacePoint, reach: f32| {
-            let loaded = submap.nearest(point, reach);
-            let is_elsewhere = loaded.is_none() && !submap.holds(&point.position);
-            if is_elsewhere { map.nearest(place, point, reach).0 } else { loaded }
-        };
-        let found = settle(points, submap, &predicted.pose, &found, nearest).unwrap_or(found);
-        let share = self.share_of_overlay(points, &found.pose);
+        let nearest = |point: &SurfacePoint, reach: f32| self.nearest(map, point, reach).map(|(point, _)| point);
+        let found = settle(points, &self.submap, &predicted.pose, &found, nearest).unwrap_or(found);
+        let share = self.share_of_overlay(map, points, &found.pose);
         let newest = keys.newest().map_or([0.0; 2], |key| key.deviation);
         Some(ContourMatch { of_overlay: newest.map(|deviation| share * deviation), ..found })
     }
 
-    /// Learns what of a scan, whose points were seen from a pose that is known that well (m and rad), is not of the map, if it was taken far
-    /// enough from the last one.
+    /// Learns what of a scan, whose points were seen from a pose that is known that well (m and rad), is not of `map`, over which `keys`
+    /// lie, if it was taken far enough from the last one.
     pub fn learn<const KEYS: usize, const POINTS: usize>(
         &mut self,
-        keys: &mut KeyRing<KEYS, POINTS>,
+        (map, keys): (&KeptMap, &mut KeyRing<KEYS, POINTS>),
         points: &[SurfacePoint],
         (pose, deviation): (&Pose, [f32; 2]),
     ) {
@@ -91,11 +85,10 @@ impl<const ROOM: usize> Surroundings<ROOM> {
             return;
         }
         let transform = Transform::of(&self.submap.origin().between(pose));
-        let submap = &self.submap;
         let is_mapped = |point: &SurfacePoint| {
             let moved = point.moved(&transform);
             !Submap::<ROOM>::reaches(&moved.position)
-                || submap.nearest_of_either(&moved, LARGEST_REACH).is_some_and(|(_, is_over)| !is_over)
+                || self.nearest(map, &moved, LARGEST_REACH).is_some_and(|(_, is_over)| !is_over)
         };
         let unmapped = || points.iter().filter(|point| !is_mapped(point)).copied();
         if unmapped().count() < WORTH_A_KEY {
@@ -112,17 +105,25 @@ impl<const ROOM: usize> Surroundings<ROOM> {
     }
 
     /// Share of points, seen from a pose, that lie on the overlay alone.
-    fn share_of_overlay(&self, points: &[SurfacePoint], pose: &Pose) -> f32 {
+    fn share_of_overlay(&self, map: &KeptMap, points: &[SurfacePoint], pose: &Pose) -> f32 {
         if !self.submap.has_overlay() {
             return 0.0;
         }
         let transform = Transform::of(&self.submap.origin().between(pose));
-        let near =
-            points.iter().filter_map(|point| self.submap.nearest_of_either(&point.moved(&transform), LARGEST_REACH));
+        let near = points.iter().filter_map(|point| self.nearest(map, &point.moved(&transform), LARGEST_REACH));
         let (count, over) = near.fold((0_u16, 0_u16), |(count, over), (_, is_over)| {
             (count.saturating_add(1), over.saturating_add(u16::from(is_over)))
         });
         f32::from(over) / f32::from(count.max(1))
+    }
+
+    /// The nearest point of the same kind, and whether it is of the overlay: that goes behind the map, loaded or cut for want of room.
+    fn nearest(&self, map: &KeptMap, point: &SurfacePoint, reach: f32) -> Option<(SurfacePoint, bool)> {
+        let loaded = self.submap.nearest_of_either(point, reach);
+        let is_of_map = loaded.is_some_and(|(_, is_over)| !is_over);
+        let place = self.place.filter(|_| !is_of_map && !self.submap.holds(&point.position));
+        let cut = place.and_then(|place| map.nearest(place, point, reach).0);
+        cut.map(|point| (point, false)).or(loaded)
     }
 
     /// The surfaces of the map around a pose, with key scans over it.

@@ -181,9 +181,9 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
 
     #[inline(never)]
     fn learn(&mut self, pose: &Pose, deviation: (f64, f64)) {
-        if self.map.is_some() {
+        if let Some(map) = &self.map {
             let deviation = [deviation.0 as f32, deviation.1 as f32];
-            self.surroundings.learn(&mut self.keys, &self.points, (pose, deviation));
+            self.surroundings.learn((map, &mut self.keys), &self.points, (pose, deviation));
         }
     }
 
