@@ -4,12 +4,14 @@
 use std::f64::consts::{PI, TAU};
 
 use agv_core::contours::{
-    ContourMatcher, KeptMap, KeptMapError, KeptPoint, KeyRing, Prediction, SurfacePoint, Surroundings, TILE, Tile,
+    ContourMatcher, KeptMap, KeptMapError, KeptPoint, KeyRing, Prediction, SearchWindow, Submap, SurfacePoint,
+    Surroundings, TILE, Tile, search,
 };
 use agv_core::geometry::{Pose, ScanPoint, difference};
 use agv_core::measurement::{LaserId, Scan, Time};
 use agv_core::sensing::PointScan;
 
+use super::support::kept_map::kept_map;
 use super::support::walls::{Noise, Walls, corridor, range, room};
 
 /// A laser: beams, and the angle that they span, rad.
@@ -142,6 +144,27 @@ fn a_step_of_the_wheels_beyond_the_usual_search_is_found() {
             assert!(error.position().norm() < 0.05 && error.theta.abs() < 0.02, "{what}");
         }
     }
+}
+
+/// A wall fits anywhere along itself, but for noise: how far from the prediction the search goes is told by the window.
+#[test]
+fn along_a_wall_a_search_stays_as_near_to_the_prediction_as_its_window_asks() {
+    let map = kept_map(&corridor(None), &Pose::default());
+    let mean_shift = |distance: f32| {
+        let window = SearchWindow { shifts: 2, shift: 3, turns: 0, turn: 0.0, distance };
+        let shifts = (1..=20_u64).map(|seed| {
+            let (mut matcher, mut submap) = (Box::<ContourMatcher>::default(), Box::<Submap<4096>>::default());
+            let pose = Pose::new(0.37 * seed as f64, 0.2, 0.1);
+            see(&mut matcher, &corridor(None), &pose, LASERS[2], &mut Noise(seed));
+            map.load(Tile::place_of(pose.x, pose.y).unwrap(), 4096, &mut submap);
+            let inside = submap.origin().between(&pose);
+            let found = search(matcher.points(), submap.grid(), &inside, &window);
+            (found.pose.x - inside.x).abs()
+        });
+        shifts.sum::<f64>() / 20.0
+    };
+    let (near, far) = (mean_shift(1.0), mean_shift(10.0));
+    assert!(near < 0.2 && far > 1.5 * near, "{near} m, {far} m");
 }
 
 #[test]
