@@ -73,7 +73,8 @@ fn verdicts_are_those_of_weighted_means() {
                 all => long(|scan| scan.accepted as f64) / all,
             };
             let probation = 0.13 * (1.0 - telling.len().min(24) as f64 / 24.0);
-            let is_doubtful = acceptance.min(steady) < 0.75 + probation;
+            let misses = long(|scan| (scan.expected - scan.accepted) as f64);
+            let is_doubtful = misses > 1.25 && acceptance.min(steady) < 0.75 + probation;
             assert_eq!(told.is_doubtful(), is_doubtful, "{acceptance} {steady} {probation}");
             for (count, verdict) in verdicts.iter_mut().zip([
                 is_rejecting,
@@ -101,6 +102,15 @@ fn without_evidence_nothing_is_wrong() {
     let scan = |accepted: usize| Scan { expected: 4, accepted, used: 0, square_sum: 0.0 };
     let told = consistency(parameters, &[scan(4), Scan { expected: 0, ..scan(0) }, scan(1)]);
     assert_eq!((told.acceptance(), told.mean_normalised_square()), (0.25, 2.0));
+}
+
+/// The first revolution of a new pose shows six reflectors and one that is none: only more of that makes a doubt.
+#[test]
+fn one_observation_alone_that_fits_nothing_makes_no_doubt() {
+    let told = |scans: &[Scan]| consistency(InnovationMonitorParameters::default(), scans).is_doubtful();
+    let scan = |expected: usize, accepted: usize| Scan { expected, accepted, used: 0, square_sum: 0.0 };
+    assert!(!told(&[scan(7, 6)]) && !told(&[scan(3, 2)]) && !told(&[scan(7, 6), scan(6, 6)]));
+    assert!(told(&[scan(7, 5)]) && told(&[scan(7, 6), scan(7, 6)]));
 }
 
 #[test]

@@ -52,6 +52,8 @@ const STEADY: f64 = 12.0;
 const DOUBTFUL: f64 = 0.75;
 const PROBATION: f64 = 0.13;
 const PROBATION_SCANS: f64 = 24.0;
+/// One alone that fits nothing may be a false reflector, however few have been seen; so many, weighted, are more than one.
+const MORE_THAN_ONE: f64 = 1.25;
 
 impl InnovationMonitor {
     /// No evidence yet.
@@ -97,12 +99,13 @@ impl InnovationMonitor {
     }
 
     /// Whether the map may be another one that looks alike: such a map fits well now and then, so a few scans and some more
-    /// of them must both fit.
+    /// of them must both fit, but for one observation.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
         let [expected, accepted] = self.steady;
         let steady = if expected > 0.0 { accepted / expected } else { 1.0 };
-        self.acceptance().min(steady) < DOUBTFUL + PROBATION * (1.0 - self.scans / PROBATION_SCANS)
+        let least = DOUBTFUL + PROBATION * (1.0 - self.scans / PROBATION_SCANS);
+        expected - accepted > MORE_THAN_ONE && self.acceptance().min(steady) < least
     }
 
     /// Mean normalised squared innovation of what was used; two if nothing was.

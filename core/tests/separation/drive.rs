@@ -23,6 +23,9 @@ pub struct Drive {
     pub published: Pose,
     /// By which share the map is sheared.
     pub shear: f64,
+    /// How far beside the first reflector something else is seen instead, m; the first one is near then, and seen to 2 mm. None if it is
+    /// seen as the others are.
+    pub beside: Option<f64>,
 }
 
 impl Drive {
@@ -44,6 +47,7 @@ impl Drive {
             true_mount: mount,
             published: truth,
             shear: 0.0,
+            beside: None,
         };
         drive.begin();
         // It has its pose while it stands, so its clock is not in doubt.
@@ -97,11 +101,13 @@ impl Drive {
         let sensor = self.truth.compose(&self.true_mount);
         self.published = sensor.compose(&self.mount.inverse());
         let mut all = Vec::new();
-        for standing in self.reflectors.iter().take(6) {
+        for (number, standing) in self.reflectors.iter().take(6).enumerate() {
             let seen = sensor.inverse_transform(standing);
-            let mut noise = || 0.008 * self.random.normal();
-            let position = Point::new(seen.x + noise(), seen.y + noise());
-            let covariance = Matrix2::identity() * 1e-4;
+            let near = self.beside.filter(|_| number == 0);
+            let (deviation, variance) = if near.is_some() { (0.002, 4e-6) } else { (0.008, 1e-4) };
+            let mut noise = || deviation * self.random.normal();
+            let position = Point::new(seen.x + noise() + near.unwrap_or_default(), seen.y + noise());
+            let covariance = Matrix2::identity() * variance;
             let landmark = Point::new(standing.x + self.shear * standing.y, standing.y);
             all.push(Seen { position, covariance, landmark, landmark_variance: 4e-6 });
         }

@@ -78,6 +78,26 @@ fn one_event_alone_refutes_no_mounting() {
     }
 }
 
+/// Something beside the nearest reflector is taken for it in one revolution: its landmarks contradict each other, so nothing is doubted, and
+/// what was known of mounting and knocks stays. If that goes on, it is seen.
+#[test]
+fn something_else_that_is_taken_for_a_landmark_once_makes_no_doubt() {
+    for (events, is_doubted) in [(1, false), (3, true)] {
+        let mut drive = Drive::new(9);
+        for (count, step) in [(40, Pose::new(0.125, 0.0, 0.0)), (60, Pose::new(0.1, 0.002, 0.04))] {
+            (0..count).for_each(|_| drive.revolve(&step));
+        }
+        drive.reflectors[0] = drive.truth.compose(&drive.mount).transform(&Point::new(0.8, 0.8));
+        drive.beside = Some(0.0);
+        (0..8).for_each(|_| drive.revolve(&Pose::default()));
+        let before = drive.monitor.level();
+        drive.beside = Some(0.06);
+        (0..events).for_each(|_| drive.revolve(&Pose::default()));
+        let level = drive.monitor.level();
+        assert_eq!(level.position > before.position + 0.1, is_doubted, "{events}: {level:?}, {before:?} before");
+    }
+}
+
 /// What a drive of 5 m shows of a turned laser, and a turn by 90 deg of a shifted one, the level holds from then on.
 #[test]
 fn a_mounting_that_was_changed_while_the_vehicle_was_off_is_held_once_it_can_be_told() {
@@ -283,6 +303,8 @@ fn some_that_are_elsewhere_by_the_same_widen_the_bound_even_among_many() {
     // Two false reflectors among many are alike by chance now and then, not in two revolutions in a row.
     assert!(widened(12, &[pair]) < 0.01);
     assert!(widened(12, &[pair, &[], pair]) < 0.01);
+    // Others that are elsewhere make such a pair no surer.
+    assert!(widened(16, &[&[[0.3, 0.0], [0.28, 0.03], [-0.5, 0.2]]]) < 0.01);
     // As far, but elsewhere; one alone; two among more than one in ten can be.
     assert!(twice(12, &[[0.3, 0.0], [0.0, 0.3]]) < 0.01);
     assert!(twice(12, &[[0.3, 0.0]]) < 0.01);

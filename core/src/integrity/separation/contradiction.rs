@@ -13,7 +13,8 @@ const LEAST_CONTRADICTING: f64 = 2.5;
 const ALIKE_WITHIN: f64 = 0.05;
 const LEAST_ALIKE: usize = 2;
 const ALIKE: f64 = 0.1;
-/// Two false reflectors happen to be alike: so it must be so many, or more than this share of what is seen, or some in two events in a row.
+/// Two false reflectors happen to be alike: so it must be so many, or they alone more than this share of what is seen, or some in two events
+/// in a row.
 const SURELY_ALIKE: usize = 3;
 const LARGE_SHARE: f64 = 0.15;
 /// Displacements that are compared in an event.
@@ -152,8 +153,8 @@ impl Contradiction {
     /// Whether enough landmarks are elsewhere by the same.
     fn are_alike(&self) -> bool {
         let [now, last] = self.alike;
-        let is_sure = last >= LEAST_ALIKE || self.event.share() > LARGE_SHARE;
-        now >= SURELY_ALIKE || (now >= LEAST_ALIKE && is_sure)
+        let is_large = now as f64 > LARGE_SHARE * (self.event.fitting + self.event.contradicting);
+        now >= SURELY_ALIKE || (now >= LEAST_ALIKE && (is_large || last >= LEAST_ALIKE))
     }
 
     /// How many landmarks are elsewhere by the same at most.

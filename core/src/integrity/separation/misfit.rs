@@ -8,6 +8,9 @@ const EVENTS: f64 = 24.0;
 /// An excess of fewer deviations than this is chance.
 const CHANCE: f64 = 3.0;
 
+/// The misfit of one event is larger than this quantile of the normal distribution by chance once in 740 events.
+const TORN: f64 = 3.0;
+
 /// A map whose landmarks in sight are off against each other by so much may be off by so many times that as a whole: its error
 /// grows from one end of the hall to the other, and a quarter of that is seen at once.
 const WHOLE: f64 = 4.0;
@@ -24,6 +27,16 @@ pub struct Misfit {
 impl Misfit {
     /// Nothing was seen.
     pub const NONE: Self = Self { square: 0.0, freedom: 0.0, means: None };
+
+    /// Whether the landmarks of one event contradict each other by more than chance: one of them may be something else. The quantile of the
+    /// sum of squares is that of E. Wilson and M. Hilferty, "The distribution of chi-square", 1931.
+    #[must_use]
+    pub fn is_torn(told: &SensorInformation) -> bool {
+        let (square, freedom) = told.misfit();
+        let ninth = 2.0 / (9.0 * freedom.max(1.0));
+        let root = 1.0 - ninth + TORN * libm::sqrt(ninth);
+        square > freedom.max(1.0) * root * root * root
+    }
 
     /// Takes what one event tells.
     pub fn add(&mut self, told: &SensorInformation) {

@@ -104,6 +104,8 @@ pub struct SolutionSeparation {
     told: SensorInformation,
     contradiction: Contradiction,
     misfit: Misfit,
+    /// Whether the landmarks of the last event contradicted each other.
+    was_torn: bool,
     map_variances: (f64, f64),
     /// The pose that is bounded, how much larger innovations are than expected, and the bounds, all at the last step.
     pose: Pose,
@@ -171,6 +173,7 @@ impl SolutionSeparation {
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
             misfit: Misfit::NONE,
+            was_torn: false,
             map_variances: (0.0, 0.0),
             pose: Pose::default(),
             surprise: 1.0,
@@ -238,6 +241,7 @@ impl SolutionSeparation {
         self.odometry_pose = *odometry_pose;
         self.pending = Pending::NONE;
         self.misfit = Misfit::NONE;
+        self.was_torn = false;
         self.map_variances = (0.0, 0.0);
         self.contradiction = Contradiction::new();
         self.rest_on(pose, 1.0);
@@ -432,7 +436,13 @@ impl SolutionSeparation {
     pub fn end_event(&mut self, pose: &Pose, laser: &Laser, surprise: f64) {
         let is_contradicted = self.contradiction.end_event();
         self.misfit.add(&self.told);
-        if self.told.is_any() && !is_contradicted {
+        // What contradicts itself once has seen something else than landmarks; what does so twice has a wrong map.
+        let is_torn = Misfit::is_torn(&self.told);
+        let is_strange = is_torn && !self.was_torn;
+        if self.told.is_any() {
+            self.was_torn = is_torn;
+        }
+        if self.told.is_any() && !is_contradicted && !is_strange {
             self.correct(laser);
             self.map_variances = self.told.map_variances(WELL_SEEN * WELL_SEEN).unwrap_or(self.map_variances);
         }
