@@ -1,4 +1,4 @@
-//! `agv evaluate trust`: what is told is of the settings that are named beside it.
+//! `agv evaluate trust`, whose figures are of the settings that are named beside them, and `agv evaluate trial`, single runs of it.
 
 use crate::support::{Files, agv, text};
 
@@ -50,5 +50,65 @@ fn what_cannot_be_written_is_said_before_the_runs() {
         assert!(!output.status.success(), "{more:?}");
         let said = text(&output.stderr);
         assert!(said.contains("there is no folder") && said.lines().count() == 1, "{said}");
+    }
+}
+
+/// What a run of the table shows alone, it shows again; and its trace has every output, with the errors that were counted.
+#[test]
+fn a_run_of_the_table_is_made_again_alone() {
+    let files = Files::new();
+    let (rows, trace) = (files.path("rows.jsonl"), files.path("trace.csv"));
+    let path = |path: &std::path::Path| path.to_str().unwrap().to_owned();
+    let sweep =
+        ["evaluate", "trust", "--kinds", KINDS, "--only", "start turned", "--first-seed", "5", "--sweep-runs", "1"];
+    let output = agv(&[&sweep[..], &["--shard", "0/1", "-q", "--output", &path(&rows)]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let rows = std::fs::read_to_string(rows).unwrap();
+    let of_table: serde_json::Value = serde_json::from_str(rows.lines().last().unwrap()).unwrap();
+    let fault = format!("start turned={}", of_table["size"]);
+    let trial = ["evaluate", "trial", "--kinds", KINDS, "--fault", &fault, "--seed", "5", "--json", "-q"];
+    let output = agv(&[&trial[..], &["--trace", &path(&trace)]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let alone: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(alone, serde_json::json!([of_table]));
+
+    let trace = std::fs::read_to_string(trace).unwrap();
+    let columns: Vec<&str> = trace.lines().next().unwrap().split(',').collect();
+    let lines: Vec<Vec<&str>> = trace.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert!(lines.iter().all(|line| line.len() == columns.len()));
+    let outcome = &of_table["outcome"];
+    assert_eq!(lines.len() as u64, outcome["outputs"].as_u64().unwrap());
+    let column = |name: &str| columns.iter().position(|column| *column == name).unwrap();
+    let number = |line: &[&str], name: &str| line[column(name)].parse::<f64>().ok();
+    let is_claim = |line: &&Vec<&str>| {
+        number(line, "age_s").is_some_and(|age| age <= 0.1)
+            && !["not localised", "lost"].contains(&line[column("mode")])
+    };
+    let claims: Vec<_> = lines.iter().filter(is_claim).collect();
+    assert_eq!(claims.len() as u64, outcome["claims"].as_u64().unwrap());
+    let over = |line: &Vec<&str>| {
+        let share = |error: &str, level: &str| number(line, error).unwrap() / number(line, level).unwrap();
+        share("error_m", "level_m").max(share("error_rad", "level_rad"))
+    };
+    let most = claims.into_iter().map(over).fold(0.0, f64::max);
+    let counted = outcome["most_over_level"].as_f64().unwrap();
+    assert!((most - counted).abs() < 0.01 * counted + 0.01, "{most} {counted}");
+}
+
+#[test]
+fn a_trial_that_cannot_be_made_is_refused_in_one_line() {
+    for (more, said) in [
+        (&["--fault", "carried of=3"][..], "no kind of fault is called \"carried of\""),
+        (&["--fault", "carried on"], "has a size"),
+        (&["--fault", "carried on=far"], "is no number"),
+        (&["--fault", "power cut=1", "--fault", "power cut=1", "--fault", "power cut=1"], "two faults"),
+        (&["--runs", "2", "--trace", "trace.csv"], "--trace is of one run"),
+        (&["--trace", "nowhere/trace.csv"], "there is no folder"),
+        (&["--fault", "drive encoder frozen=5", "--vehicle", "increments"], "cannot have"),
+    ] {
+        let output = agv(&[&["evaluate", "trial", "--kinds", KINDS], more].concat());
+        assert!(!output.status.success(), "{more:?}");
+        let told = text(&output.stderr);
+        assert!(told.contains(said) && told.lines().count() == 1, "{more:?}: {told}");
     }
 }

@@ -14,4 +14,5 @@ pub mod row;
 pub mod sight;
 pub mod stanford;
 pub mod sweep;
+pub mod trace;
 pub mod trial;

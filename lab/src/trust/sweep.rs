@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use agv_host_sim::simulate::random::{Random, Stream};
 
+use super::judge::Moment;
 use super::kinds::Kind;
 use super::pair;
 use super::row::{Row, by_size, worst_size};
@@ -74,17 +75,26 @@ pub fn run(trials: &[Trial], shard: Shard, tested: &Tested, done: impl Fn() + Sy
     of_shard
         .into_par_iter()
         .map(|trial| {
-            let tried = catch_unwind(AssertUnwindSafe(|| trial.run(tested))).ok().transpose()?;
+            let row = row(trial, tested, |_| {})?;
             done();
-            Ok(Row {
-                kind: trial.kind.name.clone(),
-                size: trial.size,
-                with: trial.with.map(|(kind, size)| (kind.name.clone(), size)),
-                seed: trial.seed,
-                is_accepted: tried.as_ref().is_some_and(|tried| tried.is_accepted),
-                can_recover: tried.as_ref().is_some_and(|tried| tried.can_recover),
-                outcome: tried.map(|tried| tried.outcome),
-            })
+            Ok(row)
         })
         .collect()
+}
+
+/// Makes one run, and tells each moment that is judged.
+///
+/// # Errors
+/// See [`CampaignError`]. A panic is no error but a row.
+pub fn row(trial: &Trial, tested: &Tested, tell: impl FnMut(&Moment)) -> Result<Row, CampaignError> {
+    let tried = catch_unwind(AssertUnwindSafe(|| trial.run_heard(tested, tell))).ok().transpose()?;
+    Ok(Row {
+        kind: trial.kind.name.clone(),
+        size: trial.size,
+        with: trial.with.map(|(kind, size)| (kind.name.clone(), size)),
+        seed: trial.seed,
+        is_accepted: tried.as_ref().is_some_and(|tried| tried.is_accepted),
+        can_recover: tried.as_ref().is_some_and(|tried| tried.can_recover),
+        outcome: tried.map(|tried| tried.outcome),
+    })
 }

@@ -87,6 +87,14 @@ impl Trial<'_> {
     /// # Errors
     /// See [`CampaignError`].
     pub fn run(&self, tested: &Tested) -> Result<Tried, CampaignError> {
+        self.run_heard(tested, |_| {})
+    }
+
+    /// Makes the run, and tells each moment that is judged.
+    ///
+    /// # Errors
+    /// See [`CampaignError`].
+    pub fn run_heard(&self, tested: &Tested, mut tell: impl FnMut(&Moment)) -> Result<Tried, CampaignError> {
         let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
         tested.equipment.apply(&mut scenario);
         let contours = tested.contours(&scenario)?;
@@ -123,7 +131,7 @@ impl Trial<'_> {
             let before = here;
             here = (heard.truth)(heard.now).or(before);
             hidden.retain(|one| !sight.reveals(one.by, one.since, heard.time));
-            judge.hear(&Moment {
+            let moment = Moment {
                 now: heard.now,
                 heard: heard.published,
                 truth: heard.published.and_then(|(_, stated)| (heard.truth)(stated)),
@@ -133,7 +141,9 @@ impl Trial<'_> {
                 is_bare: here.is_some_and(|here| is_within(&bare, &here)),
                 has_begun: heard.time >= begins,
                 is_hidden: hidden.iter().any(|one| heard.time >= one.from),
-            });
+            };
+            judge.hear(&moment);
+            tell(&moment);
         })?;
         let ends = |fault: &&Fault| fault.until.is_some_and(|until| sight.can_recover(until));
         // Of two faults both must end.

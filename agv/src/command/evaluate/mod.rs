@@ -22,6 +22,7 @@ mod places;
 mod slam;
 mod soak;
 mod trajectory;
+mod trial;
 mod trust;
 mod warehouse;
 mod windows;
@@ -70,6 +71,7 @@ enum Experiment {
     Places(places::Places),
     Slam(slam::Slam),
     Soak(soak::Soak),
+    Trial(trial::TrialArguments),
     Trust(trust::Trust),
     Lidar3dCalibration(lidar3d_calibration::Lidar3dCalibration),
     Lidar3dPlaces(lidar3d_places::Lidar3dPlaces),
@@ -98,6 +100,7 @@ impl Evaluate {
             Experiment::Places(experiment) => experiment.run(),
             Experiment::Slam(experiment) => experiment.run(),
             Experiment::Soak(experiment) => experiment.run(),
+            Experiment::Trial(experiment) => experiment.run(),
             Experiment::Trust(experiment) => experiment.run(),
             Experiment::Lidar3dCalibration(experiment) => experiment.run(),
             Experiment::Lidar3dPlaces(experiment) => experiment.run(),
