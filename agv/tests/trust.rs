@@ -58,21 +58,20 @@ fn what_cannot_be_written_is_said_before_the_runs() {
 fn a_run_of_the_table_is_made_again_alone() {
     let files = Files::new();
     let (rows, trace) = (files.path("rows.jsonl"), files.path("trace.csv"));
-    let path = |path: &std::path::Path| path.to_str().unwrap().to_owned();
     let sweep =
         ["evaluate", "trust", "--kinds", KINDS, "--only", "start turned", "--first-seed", "5", "--sweep-runs", "1"];
-    let output = agv(&[&sweep[..], &["--shard", "0/1", "-q", "--output", &path(&rows)]].concat());
+    let output = agv(&[&sweep[..], &["--shard", "0/1", "-q", "--output", &rows]].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let rows = std::fs::read_to_string(rows).unwrap();
+    let rows = std::fs::read_to_string(&rows).unwrap();
     let of_table: serde_json::Value = serde_json::from_str(rows.lines().last().unwrap()).unwrap();
     let fault = format!("start turned={}", of_table["size"]);
     let trial = ["evaluate", "trial", "--kinds", KINDS, "--fault", &fault, "--seed", "5", "--json", "-q"];
-    let output = agv(&[&trial[..], &["--trace", &path(&trace)]].concat());
+    let output = agv(&[&trial[..], &["--trace", &trace]].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
     let alone: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(alone, serde_json::json!([of_table]));
 
-    let trace = std::fs::read_to_string(trace).unwrap();
+    let trace = std::fs::read_to_string(&trace).unwrap();
     let columns: Vec<&str> = trace.lines().next().unwrap().split(',').collect();
     let lines: Vec<Vec<&str>> = trace.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert!(lines.iter().all(|line| line.len() == columns.len()));
