@@ -264,9 +264,9 @@ fn one_landmark_that_is_seen_again_is_enough_against_a_move() {
     }
 }
 
-/// So many were seen three times, and then others elsewhere in each revolution; every beam of the scans ends at `range`, m, and there are
-/// none if that is zero. Whether a move is told.
-fn is_change_told(count: usize, range: f32) -> bool {
+/// So many were seen three times, and then others elsewhere in each revolution, but for some that stay; every beam of the scans ends at
+/// `range`, m, and there are none if that is zero. Whether a move is told.
+fn is_change_told(count: usize, staying: usize, range: f32) -> bool {
     let ranges = [range; 720];
     let scan = scan_of(&ranges);
     let mut check = SlipCheck::new();
@@ -274,7 +274,9 @@ fn is_change_told(count: usize, range: f32) -> bool {
         check.begin(time(revolution));
         let turned = if revolution < 3 { 0.0 } else { 0.3 * (revolution as f64 - 2.0) };
         let pose = Pose::new(0.0, 0.0, turned);
-        (0..count).for_each(|index| check.see(&pose.transform(&around(index, count)), 5.0));
+        let place = |index: usize| around(index, count);
+        (0..staying).for_each(|index| check.see(&place(index), 5.0));
+        (staying..count).for_each(|index| check.see(&pose.transform(&place(index)), 5.0));
         let disagrees = check.disagrees();
         let confirmed = range > 0.0 && check.misses(&scan, &Pose::default());
         disagrees || confirmed
@@ -292,6 +294,15 @@ fn few_landmarks_that_something_hides_tell_no_move() {
         (4, 0.0, true),
         (6, 3.0, true),
     ] {
-        assert_eq!(is_change_told(count, range), expected, "{count} {range}");
+        assert_eq!(is_change_told(count, 0, range), expected, "{count} {range}");
+    }
+}
+
+/// Passing the end of a rack hides many at once; one that is seen again says that the vehicle moves as it should.
+#[test]
+fn many_landmarks_that_something_hides_tell_no_move_if_one_is_seen_again() {
+    for (staying, range, expected) in [(0, 3.0, true), (1, 3.0, false), (1, 8.0, true), (1, 0.0, true), (3, 8.0, false)]
+    {
+        assert_eq!(is_change_told(8, staying, range), expected, "{staying} {range}");
     }
 }

@@ -22,7 +22,8 @@ const EXPECTED: u8 = 2;
 const LONGEST_PAUSE: f64 = 0.3;
 /// Landmarks on either side that a verdict needs.
 const LEAST: usize = 3;
-/// With fewer on either side the scan must confirm it, if there is one: half of those that are not seen again must be hidden by nothing.
+/// With fewer on either side, or if one is seen again, which speaks against it, the scan must confirm it, if there is one: half of those that
+/// are not seen again must be hidden by nothing.
 const SURE: u8 = 6;
 /// Of those that should be seen again, this share is not enough.
 const TOO_FEW: f64 = 0.2;
@@ -160,8 +161,8 @@ impl SlipCheck {
         }
     }
 
-    /// Ends the revolution. True if the laser has moved otherwise than the odometry says, which few landmarks alone do not say where there
-    /// are scans: see [`Self::misses`].
+    /// Ends the revolution. True if the laser has moved otherwise than the odometry says, which landmarks alone do not say where there are
+    /// scans if they are few, or one of them says otherwise: see [`Self::misses`].
     pub fn disagrees(&mut self) -> bool {
         let can_tell = usize::from(self.expected.min(self.seen)) >= LEAST;
         self.gone = if self.sees_none_again() { self.gone } else { 0 };
@@ -170,7 +171,8 @@ impl SlipCheck {
             && self.new > self.seen.saturating_sub(self.new);
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
         let disagrees = self.contradictions >= IN_A_ROW;
-        self.is_doubted = disagrees && self.has_scans && self.expected.min(self.seen) < SURE;
+        let is_sure = self.expected.min(self.seen) >= SURE && self.seen_again == 0;
+        self.is_doubted = disagrees && self.has_scans && !is_sure;
         disagrees && !self.is_doubted
     }
 

@@ -16,7 +16,7 @@ const ALIKE: f64 = 0.1;
 /// Two false reflectors happen to be alike: so it must be so many, or they alone more than this share of what is seen, or some in two events
 /// in a row.
 const SURELY_ALIKE: usize = 3;
-const LARGE_SHARE: f64 = 0.15;
+const LARGE_SHARE: f64 = 0.3;
 /// Displacements that are compared in an event.
 const COMPARED: usize = 8;
 /// What they count from one event to the next.
@@ -127,7 +127,7 @@ impl Contradiction {
             let before = self.found;
             let [last, _] = self.alike;
             self.alike = [self.number_alike(), last];
-            self.found = self.find();
+            self.found = if self.event.fitting > 0.0 { self.find() } else { self.found.or(&self.find()) };
             self.is_outnumbered = self.event.contradicting > self.event.fitting;
             let is_moved = self.are_alike() || self.displaced.len() as f64 >= LEAST_CONTRADICTING;
             if is_moved || before != ProtectionLevel::NONE {

@@ -8,8 +8,8 @@ const EVENTS: f64 = 24.0;
 /// An excess of fewer deviations than this is chance.
 const CHANCE: f64 = 3.0;
 
-/// The misfit of one event is larger than this quantile of the normal distribution by chance once in 740 events.
-const TORN: f64 = 3.0;
+/// The misfit of one event is larger than this quantile of the normal distribution by chance once in 160 events.
+const TORN: f64 = 2.5;
 
 /// A map whose landmarks in sight are off against each other by so much may be off by so many times that as a whole: its error
 /// grows from one end of the hall to the other, and a quarter of that is seen at once.
