@@ -99,13 +99,14 @@ impl InnovationMonitor {
     }
 
     /// Whether the map may be another one that looks alike: such a map fits well now and then, so a few scans and some more
-    /// of them must both fit, but for one observation.
+    /// of them must both fit, but for one observation. One scan alone says nothing.
     #[must_use]
     pub fn is_doubtful(&self) -> bool {
         let [expected, accepted] = self.steady;
         let steady = if expected > 0.0 { accepted / expected } else { 1.0 };
         let least = DOUBTFUL + PROBATION * (1.0 - self.scans / PROBATION_SCANS);
-        expected - accepted > MORE_THAN_ONE && self.acceptance().min(steady) < least
+        let has_more_than_one = self.scans > 1.0 && expected - accepted > MORE_THAN_ONE;
+        has_more_than_one && self.acceptance().min(steady) < least
     }
 
     /// Mean normalised squared innovation of what was used; two if nothing was.
