@@ -21,6 +21,7 @@ mod office_drive;
 mod places;
 mod slam;
 mod soak;
+mod tested_arguments;
 mod trajectory;
 mod trial;
 mod trust;

@@ -3,21 +3,18 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use agv_core::localizer::Parameters;
 use agv_host_sim::output_file;
-use agv_lab::equipment::Equipment;
 use agv_lab::trust::judge::STEP;
 use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
 use agv_lab::trust::row::Row;
 use agv_lab::trust::sweep;
 use agv_lab::trust::trace::{TRACE_HEADER, TraceLine};
 use agv_lab::trust::trial::{Tested, Trial};
-use agv_settings::Settings;
 use anyhow::{Context as _, anyhow, bail, ensure};
 
+use super::tested_arguments::TestedArguments;
 use crate::command::output::check_files;
 use crate::command::progress;
-use crate::command::setting_arguments::SettingArguments;
 
 /// Single runs of `agv evaluate trust` again: of one fault or two, each of one size, with the seeds that its table names.
 #[derive(clap::Args)]
@@ -27,20 +24,12 @@ pub struct TrialArguments {
     /// a fault.
     #[arg(long, value_name = "KIND=SIZE")]
     fault: Vec<String>,
-    /// The kinds of faults.
-    #[arg(long, default_value = "trust")]
-    kinds: PathBuf,
     /// First seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Runs, of this seed and those after it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     runs: u64,
-    #[command(flatten)]
-    equipment: Equipment,
-    /// Whether the vehicle has a map of the contours of its hall, which it has made among the reflectors on the same way before.
-    #[arg(long)]
-    contours: bool,
     /// What the bus says each 10 ms of one run, beside the truth.
     #[arg(long, value_name = "FILE.csv")]
     trace: Option<PathBuf>,
@@ -48,7 +37,7 @@ pub struct TrialArguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    settings: SettingArguments,
+    tested: TestedArguments,
 }
 
 const HELP: &str = "\
@@ -68,27 +57,24 @@ impl TrialArguments {
     pub fn run(self) -> anyhow::Result<()> {
         ensure!(self.trace.is_none() || self.runs == 1, "--trace is of one run: it takes no --runs");
         check_files(&self.trace)?;
-        let catalogue = kinds::read(&self.kinds)?;
+        let catalogue = kinds::read(&self.tested.kinds)?;
         let mut faults = self.faults(&catalogue)?.into_iter();
         let (kind, size) = faults.next().unwrap_or((nothing(&catalogue)?, 1.0));
         let with = faults.next();
         ensure!(faults.next().is_none(), "no more than two faults come together");
-        let mut parameters = Parameters { vehicle: self.equipment.believed(), ..Settings::default().parameters };
+        let parameters = self.tested.parameters()?;
         for kind in [Some(kind), with.map(|(kind, _)| kind)].into_iter().flatten() {
             ensure!(kind.is_possible(&parameters.vehicle), "the vehicle cannot have {:?}", kind.name);
         }
-        self.settings.apply(&mut parameters)?;
         let last =
             self.seed.checked_add(self.runs - 1).ok_or_else(|| anyhow!("there are no seeds after the last one"))?;
         let trials: Vec<Trial> = (self.seed..=last).map(|seed| Trial { kind, size, with, seed }).collect();
-        let rows = self.make(&trials)?;
+        let rows = self.tested.with(|tested| self.make(&trials, tested))?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&rows)?);
         } else {
             print(&rows);
-            if !self.settings.is_empty() {
-                println!("not the default settings: {}", self.settings.texts().join(" "));
-            }
+            self.tested.print_settings();
         }
         Ok(())
     }
@@ -113,18 +99,16 @@ impl TrialArguments {
         self.fault.iter().map(fault).collect()
     }
 
-    fn make(&self, trials: &[Trial]) -> anyhow::Result<Vec<Row>> {
-        let settings = |parameters: &mut Parameters| _ = self.settings.apply(parameters);
-        let tested = Tested { equipment: self.equipment, has_contours: self.contours, settings: &settings };
+    fn make(&self, trials: &[Trial], tested: &Tested) -> anyhow::Result<Vec<Row>> {
         let context = "a run cannot be made";
         let (Some(path), [trial]) = (&self.trace, trials) else {
             let bar = progress::bar("runs", trials.len() as u64);
-            let rows = sweep::run(trials, agv_lab::campaign::Shard::ALL, &tested, || bar.inc(1)).context(context)?;
+            let rows = sweep::run(trials, agv_lab::campaign::Shard::ALL, tested, || bar.inc(1)).context(context)?;
             bar.finish_and_clear();
             return Ok(rows);
         };
         let (mut text, mut moments) = (format!("{TRACE_HEADER}\n"), 0_u32);
-        let row = sweep::row(trial, &tested, |moment| {
+        let row = sweep::row(trial, tested, |moment| {
             let _ = writeln!(text, "{}", TraceLine { time: STEP * f64::from(moments), moment });
             moments += 1;
         })

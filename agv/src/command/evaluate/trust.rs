@@ -2,22 +2,19 @@
 
 use std::path::PathBuf;
 
-use agv_core::localizer::Parameters;
 use agv_host_sim::output_file;
 use agv_lab::campaign::Shard;
-use agv_lab::equipment::Equipment;
 use agv_lab::trust::figures::{Figures, figures};
 use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
 use agv_lab::trust::page::{diagrams, page};
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
-use agv_lab::trust::trial::{Tested, Trial};
-use agv_settings::Settings;
+use agv_lab::trust::trial::Trial;
 use anyhow::{Context as _, ensure};
 
+use super::tested_arguments::TestedArguments;
 use crate::command::output::{check_files, note};
 use crate::command::progress;
-use crate::command::setting_arguments::SettingArguments;
 
 /// Whether the vehicle may be trusted: kinds of faults at every size, in halls that are drawn, judged at the bus.
 ///
@@ -26,9 +23,6 @@ use crate::command::setting_arguments::SettingArguments;
 #[derive(clap::Args)]
 #[command(after_help = HELP)]
 pub struct Trust {
-    /// The kinds of faults.
-    #[arg(long, default_value = "trust")]
-    kinds: PathBuf,
     /// Only kinds with this in their names, and none beside them.
     #[arg(long)]
     only: Option<String>,
@@ -53,11 +47,6 @@ pub struct Trust {
     /// First seed of the sweep; those of the worst sizes are 50000 later, those of the pairs 75000. Seeds below 1000 are for development.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    #[command(flatten)]
-    equipment: Equipment,
-    /// Whether the vehicle has a map of the contours of its hall, which it has made among the reflectors on the same way before.
-    #[arg(long)]
-    contours: bool,
     /// Make only the runs of part I of N, counted from 0, and write their rows to --output: those of the sweep, or with --swept
     /// those of the worst sizes, without a fault and of pairs.
     #[arg(long, value_name = "I/N", requires = "output", conflicts_with = "set")]
@@ -81,7 +70,7 @@ pub struct Trust {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    settings: SettingArguments,
+    tested: TestedArguments,
 }
 
 const HELP: &str = "\
@@ -115,7 +104,7 @@ impl Trust {
     pub fn run(self) -> anyhow::Result<()> {
         let diagrams = self.diagrams.iter().flat_map(|folder| DIAGRAMS.map(|name| folder.join(name)));
         check_files(&diagrams.chain(self.report.clone()).chain(self.output.clone()).collect::<Vec<_>>())?;
-        let mut catalogue = kinds::read(&self.kinds)?;
+        let mut catalogue = kinds::read(&self.tested.kinds)?;
         self.leave_out(&mut catalogue)?;
         let all = &catalogue.kinds;
         let is_wanted = |kind: &&Kind| self.only.as_ref().is_none_or(|only| kind.name.contains(only));
@@ -125,8 +114,7 @@ impl Trust {
         if !self.merge.is_empty() {
             return self.tell(&row::read(&self.merge, all)?, &catalogue);
         }
-        let mut parameters = Parameters { vehicle: self.equipment.believed(), ..Settings::default().parameters };
-        self.settings.apply(&mut parameters)?;
+        self.tested.parameters()?;
         if let Some(runs) = self.sample {
             let rows = self.make("spot check", &sweep::sample(&faults, runs, self.seed), Shard::ALL)?;
             return self.tell(&rows, &catalogue);
@@ -154,7 +142,7 @@ impl Trust {
 
     /// Leaves out the kinds of faults that the vehicle cannot have, and names them.
     fn leave_out(&self, catalogue: &mut Catalogue) -> anyhow::Result<()> {
-        let vehicle = self.equipment.believed();
+        let vehicle = self.tested.equipment.believed();
         let mut impossible = Vec::new();
         catalogue.kinds.retain(|kind| {
             let is_possible = kind.is_possible(&vehicle);
@@ -171,10 +159,8 @@ impl Trust {
     /// Makes the runs of a part.
     fn make(&self, what: &'static str, trials: &[Trial], shard: Shard) -> anyhow::Result<Vec<Row>> {
         let bar = progress::bar(what, (0..trials.len()).filter(|run| shard.has(*run)).count() as u64);
-        // Whatever can be refused was refused before.
-        let settings = |parameters: &mut Parameters| _ = self.settings.apply(parameters);
-        let tested = Tested { equipment: self.equipment, has_contours: self.contours, settings: &settings };
-        let rows = run(trials, shard, &tested, || bar.inc(1)).context("a run cannot be made")?;
+        let rows =
+            self.tested.with(|tested| run(trials, shard, tested, || bar.inc(1))).context("a run cannot be made")?;
         bar.finish_and_clear();
         Ok(rows)
     }
@@ -193,12 +179,12 @@ impl Trust {
         }
         if self.json {
             let mut told = serde_json::to_value(&figures)?;
-            told["settings"] = self.settings.texts().into();
-            told["vehicle"] = serde_json::to_value(self.equipment.vehicle)?;
-            told["gyro"] = self.equipment.gyro.into();
-            told["contours"] = self.contours.into();
-            for (name, value) in [("slip", self.equipment.slip), ("gyro_scale_error", self.equipment.gyro_scale_error)]
-            {
+            let TestedArguments { equipment, contours, settings, .. } = &self.tested;
+            told["settings"] = settings.texts().into();
+            told["vehicle"] = serde_json::to_value(equipment.vehicle)?;
+            told["gyro"] = equipment.gyro.into();
+            told["contours"] = (*contours).into();
+            for (name, value) in [("slip", equipment.slip), ("gyro_scale_error", equipment.gyro_scale_error)] {
                 if let Some(value) = value {
                     told[name] = value.into();
                 }
@@ -206,9 +192,7 @@ impl Trust {
             println!("{}", serde_json::to_string_pretty(&told)?);
         } else {
             print(&figures);
-            if !self.settings.is_empty() {
-                println!("not the default settings: {}", self.settings.texts().join(" "));
-            }
+            self.tested.print_settings();
         }
         Ok(())
     }
