@@ -7,16 +7,15 @@ use agv_core::contours::{KeptMap, PlaceAnswer, PlaceProgress, PlaceSearch, Subma
 use agv_core::geometry::Pose;
 use agv_core::localizer::{Event, Mode, Parameters, PoseFix, StartSearch};
 use agv_core::maps::FixedMap;
-use agv_core::measurement::{LaserId, PoseIncrement, Scan, Time};
+use agv_core::measurement::{PoseIncrement, Scan, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::sensing::PointScan;
 use agv_core::sources::Places;
 use agv_core::state::Relocalization;
 
 use super::support::kept_map::kept_map;
-use super::support::walls::{Noise, Walls, corridor, range, room};
+use super::support::walls::{BEAMS, Noise, Walls, corridor, range, ranges, room, scan};
 
-const BEAMS: usize = 720;
 const LASER: Pose = Pose { x: 0.4, y: 0.05, theta: 0.2 };
 
 type Room = Submap<4096>;
@@ -31,23 +30,6 @@ struct Search {
 /// A map of walls where they are.
 fn map(walls: &Walls) -> KeptMap<'static> {
     kept_map(walls, &Pose::default())
-}
-
-fn ranges(walls: &Walls, laser: &Pose, noise: &mut Noise) -> Vec<f32> {
-    let bearing = |beam: usize| laser.theta - PI + TAU * beam as f64 / BEAMS as f64;
-    (0..BEAMS).map(|beam| range(walls, &Pose { theta: bearing(beam), ..*laser }, noise)).collect()
-}
-
-fn scan(ranges: &[f32], start: Time) -> Scan<'_> {
-    Scan {
-        laser: LaserId::FIRST,
-        start,
-        beam_interval: 0.0,
-        first_bearing: -PI,
-        bearing_step: TAU / BEAMS as f64,
-        ranges,
-        intensities: &[],
-    }
 }
 
 /// The answer to a scan of a laser in walls, and the number of slices of so much effort.

@@ -1,17 +1,13 @@
 //! What is learnt over a kept map: what it does not have, and nothing that it has where there is no room to load it.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use std::f64::consts::{PI, TAU};
-
 use agv_core::contours::{ContourMatcher, KeptMap, KeyRing, Prediction, SurfacePoint, Surroundings};
 use agv_core::geometry::Pose;
-use agv_core::measurement::{LaserId, Scan, Time};
+use agv_core::measurement::Time;
 use agv_core::sensing::PointScan;
 
 use super::support::kept_map::kept_map;
-use super::support::walls::{Noise, Walls, range, room};
-
-const BEAMS: usize = 720;
+use super::support::walls::{BEAMS, Noise, Walls, ranges, room, scan};
 
 /// The room has three times as many points.
 const ROOM: usize = 320;
@@ -29,21 +25,9 @@ fn with_crate() -> Walls {
 }
 
 fn points(walls: &Walls, laser: &Pose) -> Vec<SurfacePoint> {
-    let bearing = |beam: usize| laser.theta - PI + TAU * beam as f64 / BEAMS as f64;
-    let mut noise = Noise(7);
-    let ranges: Vec<f32> =
-        (0..BEAMS).map(|beam| range(walls, &Pose { theta: bearing(beam), ..*laser }, &mut noise)).collect();
-    let scan = Scan {
-        laser: LaserId::FIRST,
-        start: Time::default(),
-        beam_interval: 0.0,
-        first_bearing: -PI,
-        bearing_step: TAU / BEAMS as f64,
-        ranges: &ranges,
-        intensities: &[],
-    };
+    let ranges = ranges(walls, laser, &mut Noise(7));
     let (mut points, mut matcher) = (Box::<PointScan<BEAMS>>::default(), Box::<ContourMatcher>::default());
-    points.set(&scan, 0.05, 60.0);
+    points.set(&scan(&ranges, Time::default()), 0.05, 60.0);
     matcher.see(points.view());
     matcher.points().to_vec()
 }

@@ -311,6 +311,26 @@ fn some_that_are_elsewhere_by_the_same_widen_the_bound_even_among_many() {
     assert!(twice(20, &[[0.3, 0.0], [0.3, 0.0]]) < 0.01);
 }
 
+/// A revolution that shows three elsewhere, and nothing that fits, is not taken back by one in which nothing fits either.
+#[test]
+fn what_nothing_fits_does_not_end_a_contradiction() {
+    let widened = |fitting: u32| {
+        let mut drive = Drive::new(6);
+        (0..12).for_each(|_| drive.revolve(&Pose::new(0.125, 0.0, 0.0)));
+        let before = drive.monitor.level();
+        let laser = drive.monitor.laser(&drive.mount, &drive.published);
+        for (fitting, contradicting) in [(0, 3), (fitting, 1)] {
+            drive.monitor.begin_event();
+            (0..fitting).for_each(|_| drive.monitor.take(LandmarkKey::Features, SensorInformation::NONE));
+            (0..contradicting).for_each(|_| drive.monitor.contradict(0.4, 8.0));
+            drive.monitor.end_event(&drive.published, &laser, 1.0);
+        }
+        drive.monitor.level().position - before.position
+    };
+    assert!((widened(0) - 0.4).abs() < 0.01);
+    assert!(widened(5) < 0.01);
+}
+
 /// Three false reflectors among what fits are gone in the next revolution; what was moved is seen again.
 #[test]
 fn what_a_minority_contradicts_in_one_revolution_alone_is_not_believed() {

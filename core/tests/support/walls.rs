@@ -1,6 +1,9 @@
 //! Surroundings made of straight walls, and what a laser measures of them.
 
+use std::f64::consts::{PI, TAU};
+
 use agv_core::geometry::{Point, Pose};
+use agv_core::measurement::{LaserId, Scan, Time};
 
 /// Walls from one point to another, m.
 pub type Walls = Vec<[f64; 4]>;
@@ -10,6 +13,9 @@ const NOISE: f64 = 0.01;
 
 /// The reach of the laser, m.
 const REACH: f64 = 40.0;
+
+/// Beams of a laser that looks all around.
+pub const BEAMS: usize = 720;
 
 /// Numbers that look random: xorshift, J. Stat. Softw. 8 (14), 2003.
 pub struct Noise(pub u64);
@@ -40,6 +46,25 @@ pub fn range(walls: &Walls, beam: &Pose, noise: &mut Noise) -> f32 {
     });
     let nearest = hit.min_by(f64::total_cmp).filter(|range| *range < REACH);
     nearest.map_or(0.0, |range| (range + NOISE * noise.normal()) as f32)
+}
+
+/// What a laser that looks all around, and stands, measures.
+pub fn ranges(walls: &Walls, laser: &Pose, noise: &mut Noise) -> Vec<f32> {
+    let bearing = |beam: usize| laser.theta - PI + TAU * beam as f64 / BEAMS as f64;
+    (0..BEAMS).map(|beam| range(walls, &Pose { theta: bearing(beam), ..*laser }, noise)).collect()
+}
+
+/// The same as a scan.
+pub fn scan(ranges: &[f32], start: Time) -> Scan<'_> {
+    Scan {
+        laser: LaserId::FIRST,
+        start,
+        beam_interval: 0.0,
+        first_bearing: -PI,
+        bearing_step: TAU / BEAMS as f64,
+        ranges,
+        intensities: &[],
+    }
 }
 
 /// Points along the walls, with the normals of both sides.

@@ -6,8 +6,8 @@ use agv_host_sim::drive::{mode_name, reason_name};
 
 use super::judge::{Errors, Moment};
 
-/// What the columns are: time since everything was switched on; where the vehicle is; how old what the bus says is, and what it says; how
-/// wrong that is, at the time that it states; and whether no sensor of the vehicle can tell the fault yet.
+/// What the columns are: time since everything was switched on; how old what the bus says is, and what it says; where the vehicle was at the
+/// time that it states, and how wrong it is; and whether no sensor of the vehicle can tell the fault yet.
 pub const TRACE_HEADER: &str = "time_s,true_x_m,true_y_m,true_heading_rad,age_s,x_m,y_m,heading_rad,mode,reason,level_m,level_rad,error_m,error_rad,is_hidden";
 
 /// One moment.
@@ -23,7 +23,7 @@ impl fmt::Display for TraceLine<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         let Self { time, moment } = self;
         write!(formatter, "{time:.2}")?;
-        // Nothing is known before the drive of the log begins.
+        // There is none before the bus has said anything.
         match moment.truth {
             Some(truth) => write!(formatter, ",{:.4},{:.4},{:.5}", truth.x, truth.y, truth.theta)?,
             None => write!(formatter, ",,,")?,
