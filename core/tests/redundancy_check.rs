@@ -11,7 +11,9 @@ use agv_core::odometry::{
 const TICK: f64 = 1e-5;
 /// Way of the vehicle between two samples, m.
 const STEP: f64 = 0.01;
-const ERRORS: WheelErrors = WheelErrors { slip: 6e-3, lasting: 2.2e-3 };
+/// What lasts, as a share of the way.
+const LASTING: f64 = 2.2e-3;
+const ERRORS: WheelErrors = WheelErrors { slip: 6e-3, lasting: LASTING * LASTING };
 
 const DRIVEN: DrivenWheel =
     DrivenWheel { radius: 1.0, turn: AngleEncoder { scale: TICK, range: CounterRange::BITS_32 } };
@@ -103,7 +105,7 @@ fn told_of_five(share: f64) -> usize {
         let mut state = *seed;
         // And a radius that is wrong by what may last.
         let noise = |_: f64, number: usize, way: f64| {
-            let lasting = if number == 0 { ERRORS.lasting * way } else { 0.0 };
+            let lasting = if number == 0 { LASTING * way } else { 0.0 };
             lasting + share * ERRORS.slip * way.abs().sqrt() * normal(&mut state)
         };
         told(omni(), OMNI, 2000.0, noise).is_some()
@@ -144,7 +146,7 @@ fn false_alarms_in_a_hundred_kilometres() {
         for seed in 101..=150_u64 {
             let mut state = seed;
             let noise = |_: f64, number: usize, way: f64| {
-                let lasting = if number == 0 { ERRORS.lasting * way } else { 0.0 };
+                let lasting = if number == 0 { LASTING * way } else { 0.0 };
                 lasting + share * ERRORS.slip * way.abs().sqrt() * normal(&mut state)
             };
             alarms += usize::from(told(omni(), OMNI, 2000.0, noise).is_some());
@@ -201,10 +203,12 @@ fn even(check: &mut RedundancyCheck, way: f64, slip: f64, errors: &WheelErrors, 
 /// A window of 0.3 m: the sum of `n` steps has the variance of so much way, that of what lasts, and a step of a wheel.
 #[test]
 fn the_limit_is_that_of_the_stated_errors() {
-    for errors in [ERRORS, WheelErrors { slip: 0.0, lasting: 2.2e-3 }, WheelErrors { slip: 6e-3, lasting: 0.0 }] {
+    for errors in
+        [ERRORS, WheelErrors { slip: 0.0, lasting: LASTING * LASTING }, WheelErrors { slip: 6e-3, lasting: 0.0 }]
+    {
         let way: f64 = 0.15;
         // One step: what was learnt is still what is stated.
-        let limit = 5.6 * (errors.slip.powi(2) * way + (errors.lasting * way).powi(2) + 3e-4_f64.powi(2)).sqrt();
+        let limit = 5.6 * (errors.slip.powi(2) * way + errors.lasting * way * way + 3e-4_f64.powi(2)).sqrt();
         for sign in [1.0, -1.0] {
             assert!(!even(&mut RedundancyCheck::new(), way, sign * 0.99 * limit, &errors, 1), "{errors:?}");
             assert!(even(&mut RedundancyCheck::new(), way, sign * 1.01 * limit, &errors, 1), "{errors:?}");
@@ -265,7 +269,7 @@ fn what_was_seen_for_a_metre_weighs_as_much_as_what_is_stated() {
 /// The sums begin anew all along the way: what was driven long ago does not hide what slips now.
 #[test]
 fn a_long_way_behind_hides_no_slip() {
-    let errors = WheelErrors { slip: 0.0, lasting: 2.2e-3 };
+    let errors = WheelErrors { slip: 0.0, lasting: LASTING * LASTING };
     let mut check = RedundancyCheck::new();
     assert!(!even(&mut check, 0.01, 0.0, &errors, 2000));
     // 20 m: what lasts may be 44 mm; of 0.3 m it is below a millimetre.

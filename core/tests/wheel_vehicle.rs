@@ -5,7 +5,7 @@
 use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::odometry::{
     AckermannWheels, AngleEncoder, BiSteerable, CounterRange, Differential, DrivenWheel, Integration, Mecanum,
-    OdometryNoise, Omnidirectional, SteeredWheel, WheelBased, WheelMotion, WheelPath, WheelVehicle,
+    OdometryNoise, Omnidirectional, SteeredWheel, WheelBased, WheelMotion, WheelPath, WheelSet, WheelVehicle,
 };
 
 const RADIUS: f64 = 0.1;
@@ -20,11 +20,12 @@ fn assert_moves(vehicle: impl WheelBased, ways: &[f64], [x, y, theta]: [f64; 3])
     let motions: Vec<_> = ways.iter().map(|way| WheelMotion { turn: way / RADIUS, ..WheelMotion::default() }).collect();
     let noise = OdometryNoise::default();
     let wheels = vehicle.wheels();
-    let path = WheelPath::new(wheels.as_ref(), &motions, &noise, Integration::Arc).unwrap();
+    let set = WheelSet::of(wheels.as_ref());
+    let path = WheelPath::new(&set, &motions, &noise, Integration::Arc).unwrap();
     let (found, expected) = (path.displacement(), Pose::exp(&Twist { x, y, theta }));
     let off = (found.x - expected.x).hypot(found.y - expected.y);
     assert!(off < 1e-12 && difference(found.theta, expected.theta).abs() < 1e-12, "{found:?} {expected:?}");
-    assert!(path.middle().slip.abs() < 1e-12, "{vehicle:?} contradicts itself by {} m", path.middle().slip);
+    assert!(path.fit().slip.abs() < 1e-12, "{vehicle:?} contradicts itself by {} m", path.fit().slip);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use agv_core::measurement::{Time, WheelReading, WheelSample};
 use agv_core::odometry::{
     AckermannWheels, AngleEncoder, Believed, BiSteerable, Contact, Control, CounterRange, Differential, DrivenWheel,
     Integration, Kinematics, Mecanum, Odometer, OdometerParameters, OdometryError, OdometryNoise, Omnidirectional,
-    SteeredWheel, Tricycle, Wheel, WheelBased, WheelMotion, WheelParameter, WheelPath, Wheels,
+    SteeredWheel, Tricycle, Wheel, WheelBased, WheelMotion, WheelParameter, WheelPath, WheelSet, Wheels,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -97,10 +97,11 @@ proptest! {
                 .find_map(|motion| Some((motion, wheel_motions(&wheels, &motion)?)));
             let (motion, moved) = motion.unwrap();
             let noise = OdometryNoise::default();
-            let path = WheelPath::new(&wheels, &moved, &noise, Integration::Arc).unwrap();
+            let set = WheelSet::of(&wheels);
+            let path = WheelPath::new(&set, &moved, &noise, Integration::Arc).unwrap();
             let end = Pose::exp(&Twist { x: motion.x, y: motion.y, theta: motion.z });
             prop_assert!(same(&path.displacement(), &end, 1e-12), "{name}: {:?} {end:?}", path.displacement());
-            prop_assert!(path.middle().slip.abs() < 1e-12, "{name}");
+            prop_assert!(path.fit().slip.abs() < 1e-12, "{name}");
         }
     }
 
@@ -115,7 +116,8 @@ proptest! {
         for integration in INTEGRATIONS {
             let motions = [steered, WheelMotion::default()];
             let noise = OdometryNoise::default();
-            let path = WheelPath::new(&wheels, &motions, &noise, integration).unwrap();
+            let set = WheelSet::of(&wheels);
+            let path = WheelPath::new(&set, &motions, &noise, integration).unwrap();
             prop_assert!(same(&path.displacement(), &control.displacement(1.5, integration), 1e-13));
             if integration == Integration::RungeKutta2 {
                 let closed = control.jacobian(1.5);
@@ -144,10 +146,11 @@ proptest! {
             .collect();
         for integration in INTEGRATIONS {
             let end = |wheels: &[Wheel], motions: &[WheelMotion]| {
-                let end = WheelPath::new(wheels, motions, &noise, integration).unwrap().displacement();
+                let end = WheelPath::new(&WheelSet::of(wheels), motions, &noise, integration).unwrap().displacement();
                 Vector3::new(end.x, end.y, end.theta)
             };
-            let path = WheelPath::new(&wheels, &motions, &noise, integration).unwrap();
+            let set = WheelSet::of(&wheels);
+            let path = WheelPath::new(&set, &motions, &noise, integration).unwrap();
             let step = 1e-6;
             for number in 0..wheels.len() {
                 let slope = |change: &dyn Fn(f64) -> Vector3<f64>| {
@@ -172,7 +175,7 @@ proptest! {
                             let slip = |step: f64| {
                                 let mut changed = wheels.clone();
                                 changed[number] = changed[number].changed(parameter, step);
-                                WheelPath::new(&changed, &motions, &noise, integration).unwrap().slip(other)
+                                WheelPath::new(&WheelSet::of(&changed), &motions, &noise, integration).unwrap().slip(other)
                             };
                             let found = path.slip_derivative(other, number, parameter);
                             for (found, (more, less)) in found.into_iter().zip(slip(step).into_iter().zip(slip(-step))) {
@@ -266,7 +269,7 @@ fn what_redundant_wheels_say_differently_is_slip() {
 fn wheels_that_do_not_determine_the_motion_give_none() {
     let [wheel, _] = tricycle().wheels();
     let motions = [WheelMotion { turn: 1.0, ..WheelMotion::default() }];
-    assert!(WheelPath::new(&[wheel], &motions, &OdometryNoise::default(), Integration::Arc).is_none());
+    assert!(WheelPath::new(&WheelSet::of(&[wheel]), &motions, &OdometryNoise::default(), Integration::Arc).is_none());
 }
 
 /// Wheels that all roll the same way on rollers tell nothing of the way across, wherever they stand. Rounding makes the
@@ -279,7 +282,8 @@ fn parallel_wheels_that_may_move_across_do_not_determine_the_motion() {
         let wheels = [(0.31, 0.27), (-0.43, 0.19), (0.17, -0.37), (-0.29, -0.23)]
             .map(|(x, y)| DRIVEN.at(x, y, heading, Contact::Rollers(0.0)));
         let motions = [WheelMotion { turn: 1.0, ..WheelMotion::default() }; 4];
-        let path = WheelPath::new(&wheels, &motions, &noise, Integration::Arc);
+        let set = WheelSet::of(&wheels);
+        let path = WheelPath::new(&set, &motions, &noise, Integration::Arc);
         assert!(path.is_none(), "toward {degree} deg they moved by {:?}", path.unwrap().displacement());
     }
 }
@@ -294,7 +298,8 @@ fn the_derivative_of_a_flat_arc_is_that_of_its_integral() {
         let (middle, half_track) = (1.2, 0.25);
         let motions = [middle - half_track * turn, middle + half_track * turn]
             .map(|way| WheelMotion { turn: way / 0.1, ..WheelMotion::default() });
-        let path = WheelPath::new(wheels.as_ref(), &motions, &noise, Integration::Arc).unwrap();
+        let set = WheelSet::of(wheels.as_ref());
+        let path = WheelPath::new(&set, &motions, &noise, Integration::Arc).unwrap();
         let found = path.derivative(1, WheelParameter::Turn) / 0.1;
         // A way of the right wheel is half as much of the middle, and turns by its share of the track.
         let integral = |of: &dyn Fn(f64) -> f64| {

@@ -34,12 +34,12 @@ impl Window {
     const EMPTY: Self = Self { slip: 0.0, way: 0.0 };
 }
 
-/// What a vehicle in order does not exceed: standard deviations.
+/// What a vehicle in order does not exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelErrors {
-    /// Slip of a wheel, m for a square root of a metre.
+    /// Standard deviation of the slip of a wheel, m for a square root of a metre.
     pub slip: f64,
-    /// What lasts: share of the way.
+    /// Variance of what lasts: square of a share of the way.
     pub lasting: f64,
 }
 
@@ -81,8 +81,7 @@ impl RedundancyCheck {
         for window in &mut self.windows {
             window.slip += slip;
             window.way += motion.distance;
-            let lasting = errors.lasting * window.way;
-            let expected = variance * window.way + lasting * lasting + STEP * STEP;
+            let expected = (variance + errors.lasting * window.way) * window.way + STEP * STEP;
             if window.slip * window.slip > GATE * GATE * expected {
                 self.slips_until = Some(motion.end.offset(TOLD_FOR));
             }

@@ -31,7 +31,7 @@ impl<C: Capacities> Localizer<C> {
         let check = &mut self.integrity.redundancy;
         let Ok((motion, slip)) = found else { return check.clear() };
         let Parameters { assumed, odometry_noise, .. } = &self.parameters;
-        let lasting = libm::hypot(assumed.scale, assumed.steering);
+        let lasting = assumed.scale * assumed.scale + assumed.steering * assumed.steering;
         check.travel(motion, *slip, &WheelErrors { slip: odometry_noise.slip, lasting });
     }
 

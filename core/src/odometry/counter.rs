@@ -47,7 +47,15 @@ impl CounterRange {
         if values == 0 {
             return 0;
         }
-        let forward = (to as i64 - from as i64).rem_euclid(values);
+        let difference = to as i64 - from as i64;
+        // A division of 64 bits is dear on the boards, and readings within the range need none.
+        let forward = if difference >= values || difference <= -values {
+            difference.rem_euclid(values)
+        } else if difference < 0 {
+            difference + values
+        } else {
+            difference
+        };
         if forward >= values - values / 2 { forward - values } else { forward }
     }
 
@@ -65,6 +73,11 @@ impl CounterRange {
     pub const fn signed(self, reading: u32) -> i64 {
         self.step(0, reading)
     }
+}
+
+/// Ticks as a number. The boards convert 32 bits in one instruction, and 64 by a routine.
+pub(super) fn ticks_as_f64(ticks: i64) -> f64 {
+    i32::try_from(ticks).map_or_else(|_| ticks as f64, f64::from)
 }
 
 impl TryFrom<u64> for CounterRange {

@@ -25,6 +25,7 @@ mod vehicle;
 mod wheel;
 mod wheel_equations;
 mod wheel_path;
+mod wheel_set;
 mod wheel_vehicle;
 mod wheels;
 
@@ -51,6 +52,8 @@ pub use tricycle::Tricycle;
 pub use tricycle_speed::TricycleSpeed;
 pub use vehicle::Vehicle;
 pub use wheel::{AngleEncoder, Contact, Wheel, WheelMotion, WheelParameter};
+pub use wheel_equations::WheelFit;
 pub use wheel_path::WheelPath;
+pub use wheel_set::WheelSet;
 pub use wheel_vehicle::WheelVehicle;
 pub use wheels::{DrivenWheel, WheelBased, Wheels, wheel_motion_between};

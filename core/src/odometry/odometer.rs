@@ -1,7 +1,7 @@
 //! From reports to motions.
 
 use super::kinematics::Believed;
-use super::{Increments, Integration, Kinematics, Motion, OdometryNoise, Vehicle};
+use super::{Increments, Integration, Kinematics, Motion, OdometryNoise, Vehicle, WheelBased, WheelSet};
 use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, WheelSample};
 
 /// Why a report gave no motion.
@@ -99,6 +99,7 @@ impl<K: Kinematics> Odometer<K> {
 }
 
 /// The odometer of any vehicle that the parameters can describe.
+#[expect(clippy::large_enum_variant, reason = "there is no heap, and one such value in a localizer")]
 #[derive(Clone, Debug)]
 pub enum VehicleOdometer {
     /// See [`super::Tricycle`].
@@ -107,8 +108,8 @@ pub enum VehicleOdometer {
     Ackermann(Odometer<super::Ackermann>),
     /// See [`Increments`].
     Increments(Odometer<Increments>),
-    /// See [`super::WheelVehicle`].
-    Wheels(Odometer<super::WheelVehicle>),
+    /// See [`WheelSet`].
+    Wheels(Odometer<WheelSet>),
     /// See [`super::TricycleSpeed`].
     TricycleSpeed(Odometer<super::TricycleSpeed>),
 }
@@ -121,7 +122,9 @@ impl VehicleOdometer {
             Vehicle::Tricycle(tricycle) => Self::Tricycle(Odometer::new(*tricycle, parameters)),
             Vehicle::Ackermann(car) => Self::Ackermann(Odometer::new(*car, parameters)),
             Vehicle::Increments => Self::Increments(Odometer::new(Increments, parameters)),
-            Vehicle::Wheels(vehicle) => Self::Wheels(Odometer::new(*vehicle, parameters)),
+            Vehicle::Wheels(vehicle) => {
+                Self::Wheels(Odometer::new(WheelSet::of(vehicle.wheels().as_ref()), parameters))
+            }
             Vehicle::TricycleSpeed(tricycle) => Self::TricycleSpeed(Odometer::new(*tricycle, parameters)),
         }
     }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::counter::ticks_as_f64;
 use super::kinematics::{Believed, Kinematics, Step};
 use super::{AngleEncoder, Contact, Control, CounterRange, Wheel};
 use crate::measurement::{EncoderSample, Time};
@@ -42,12 +43,12 @@ impl Kinematics for Tricycle {
         // A counter that counts the wrong way has a negative scale.
         let is_backward = if ticks == 0 { believed.was_backward } else { (ticks < 0) != (self.drive_scale < 0.0) };
         let offset = if is_backward { self.steering_offset_backward } else { self.steering_offset_forward };
-        let angle = |reading: i64| self.steering_scale * reading as f64 + offset;
+        let angle = |reading: i64| self.steering_scale * ticks_as_f64(reading) + offset;
         // The wheel may pass the end of the counter's range.
         let start = self.steering_range.signed(from.steering);
         let end = start + self.steering_range.step(from.steering, to.steering);
         let control = Control {
-            distance: self.drive_scale * ticks as f64,
+            distance: self.drive_scale * ticks_as_f64(ticks),
             steering_start: angle(start),
             steering_end: angle(end),
         };

@@ -3,10 +3,13 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::counter::ticks_as_f64;
 use super::kinematics::{Believed, Kinematics, Step};
+use super::wheel_equations::WheelFit;
 use super::wheel_path::WheelPath;
-use super::{AngleEncoder, OdometryNoise, Wheel, WheelMotion, WheelParameter};
-use crate::measurement::{Time, WheelReading, WheelSample};
+use super::wheel_set::RollingWheel;
+use super::{AngleEncoder, OdometryNoise, Wheel, WheelMotion, WheelParameter, WheelSet};
+use crate::measurement::{MOST_WHEELS, Time, WheelReading, WheelSample};
 
 /// A rigid vehicle on `N` wheels, at most [`crate::measurement::MOST_WHEELS`]. Each measured wheel says how far its contact has
 /// moved along its direction, each tyre that it has not moved across; what is more than three equations is solved in least
@@ -46,32 +49,40 @@ impl DrivenWheel {
 /// What a wheel did between two readings of its counters.
 #[must_use]
 pub fn wheel_motion_between(wheel: &Wheel, from: &WheelReading, to: &WheelReading) -> WheelMotion {
-    let angle =
-        |reading: u32| wheel.steering.map_or(0.0, |encoder| encoder.scale * encoder.range.signed(reading) as f64);
+    let angle = |reading: u32| {
+        wheel.steering.map_or(0.0, |encoder| encoder.scale * ticks_as_f64(encoder.range.signed(reading)))
+    };
     WheelMotion {
-        turn: wheel.turn.map_or(0.0, |encoder| encoder.scale * encoder.range.step(from.count, to.count) as f64),
+        turn: wheel.turn.map_or(0.0, |encoder| encoder.scale * ticks_as_f64(encoder.range.step(from.count, to.count))),
         steering_start: angle(from.steering),
         steering_end: angle(to.steering),
     }
 }
 
 /// Mean distance of the measured wheels, m.
-fn mean_distance(wheels: &[Wheel], motions: &[WheelMotion]) -> f64 {
-    let measured = wheels.iter().zip(motions).filter(|(wheel, _)| wheel.turn.is_some());
-    let (sum, count) = measured
-        .fold((0.0, 0.0), |(sum, count), (wheel, motion)| (sum + libm::fabs(wheel.radius * motion.turn), count + 1.0));
+fn mean_distance(set: &WheelSet, motions: &[WheelMotion]) -> f64 {
+    let measured = set.wheels().iter().zip(motions).filter(|(rolling, _)| rolling.is_measured());
+    let (sum, count) = measured.fold((0.0, 0.0), |(sum, count), (rolling, motion)| {
+        (sum + libm::fabs(rolling.wheel.radius * motion.turn), count + 1.0)
+    });
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// Covariance of the displacement of that path: slip of every wheel, errors of its encoders, and what the model does not know.
 /// Where redundant wheels contradict each other by more than their slip, all are believed so much less.
-fn covariance(path: &WheelPath, wheels: &[Wheel], distance: f64, duration: f64, noise: &OdometryNoise) -> Matrix3<f64> {
-    let solution = path.middle();
-    let expected = solution.redundancy as f64 * distance;
-    let excess = if expected > 0.0 { libm::fmax(solution.misfit / expected, 1.0) } else { 1.0 };
-    let mut covariance = solution.spread * (distance * excess);
+fn covariance(
+    path: &WheelPath,
+    fit: &WheelFit,
+    set: &WheelSet,
+    distance: f64,
+    duration: f64,
+    noise: &OdometryNoise,
+) -> Matrix3<f64> {
+    let expected = fit.redundancy as f64 * distance;
+    let excess = if expected > 0.0 { libm::fmax(fit.misfit / expected, 1.0) } else { 1.0 };
+    let mut covariance = path.spread() * (distance * excess);
     let mut add = |by: Vector3<f64>, deviation: f64| covariance += by * by.transpose() * (deviation * deviation);
-    for (number, wheel) in wheels.iter().enumerate() {
+    for (number, RollingWheel { wheel, .. }) in set.wheels().iter().enumerate() {
         if wheel.turn.is_some() && noise.speed > 0.0 && wheel.radius != 0.0 {
             add(path.derivative(number, WheelParameter::Turn), noise.speed * duration / wheel.radius);
         }
@@ -83,23 +94,7 @@ fn covariance(path: &WheelPath, wheels: &[Wheel], distance: f64, duration: f64, 
     covariance
 }
 
-/// The step that those wheels made in `duration` seconds. Its displacement is not a number if they do not determine it.
-fn step_of(wheels: &[Wheel], motions: &[WheelMotion], duration: f64, believed: &Believed) -> Step {
-    let distance = mean_distance(wheels, motions);
-    let Some(path) = WheelPath::new(wheels, motions, &believed.noise, believed.integration) else {
-        return Step { distance: f64::NAN, ..Step::standing(believed.was_backward) };
-    };
-    let along = path.middle().motion.x;
-    Step {
-        displacement: path.displacement(),
-        covariance: covariance(&path, wheels, distance, duration, &believed.noise),
-        distance,
-        is_backward: if along == 0.0 { believed.was_backward } else { along < 0.0 },
-        slip: path.middle().slip,
-    }
-}
-
-impl<V: WheelBased> Kinematics for V {
+impl Kinematics for WheelSet {
     type Report = WheelSample;
 
     fn time(report: &WheelSample) -> Time {
@@ -110,14 +105,26 @@ impl<V: WheelBased> Kinematics for V {
         true
     }
 
+    /// Its displacement is not a number if the wheels do not determine it.
     fn step(&self, from: &WheelSample, to: &WheelSample, duration: f64, believed: &Believed) -> Step {
-        let wheels = self.wheels();
-        let mut motions = [WheelMotion::default(); crate::measurement::MOST_WHEELS];
+        let mut motions = [WheelMotion::default(); MOST_WHEELS];
         let readings = from.wheels.iter().zip(&to.wheels);
-        for ((motion, wheel), (from, to)) in motions.iter_mut().zip(wheels.as_ref()).zip(readings) {
-            *motion = wheel_motion_between(wheel, from, to);
+        for ((motion, rolling), (from, to)) in motions.iter_mut().zip(self.wheels()).zip(readings) {
+            *motion = wheel_motion_between(&rolling.wheel, from, to);
         }
-        step_of(wheels.as_ref(), &motions, duration, believed)
+        let distance = mean_distance(self, &motions);
+        let mut path = WheelPath::unsolved(self, &motions, &believed.noise, believed.integration);
+        if path.solve().is_none() {
+            return Step { distance: f64::NAN, ..Step::standing(believed.was_backward) };
+        }
+        let (along, fit) = (path.middle().x, path.fit());
+        Step {
+            displacement: path.displacement(),
+            covariance: covariance(&path, &fit, self, distance, duration, &believed.noise),
+            distance,
+            is_backward: if along == 0.0 { believed.was_backward } else { along < 0.0 },
+            slip: fit.slip,
+        }
     }
 
     fn steering_lever(&self) -> Option<f64> {
@@ -126,10 +133,35 @@ impl<V: WheelBased> Kinematics for V {
 
     /// At its fastest no wheel may go half of its counter's range; beyond, it may seem to go the other way.
     fn longest_interval(&self, fastest: f64) -> f64 {
-        let longest = |wheel: &Wheel| {
-            let encoder = wheel.turn?;
-            Some(0.5 * encoder.range.values() as f64 * libm::fabs(encoder.scale * wheel.radius) / fastest)
+        let longest = |rolling: &RollingWheel| {
+            let encoder = rolling.wheel.turn?;
+            Some(0.5 * encoder.range.values() as f64 * libm::fabs(encoder.scale * rolling.wheel.radius) / fastest)
         };
-        self.wheels().as_ref().iter().filter_map(longest).fold(f64::INFINITY, libm::fmin)
+        self.wheels().iter().filter_map(longest).fold(f64::INFINITY, libm::fmin)
+    }
+}
+
+/// As the [`WheelSet`] of its wheels, which an odometer would rather have: it is prepared once.
+impl<V: WheelBased> Kinematics for V {
+    type Report = WheelSample;
+
+    fn time(report: &WheelSample) -> Time {
+        WheelSet::time(report)
+    }
+
+    fn is_sound(&self, report: &WheelSample) -> bool {
+        WheelSet::of(self.wheels().as_ref()).is_sound(report)
+    }
+
+    fn step(&self, from: &WheelSample, to: &WheelSample, duration: f64, believed: &Believed) -> Step {
+        WheelSet::of(self.wheels().as_ref()).step(from, to, duration, believed)
+    }
+
+    fn steering_lever(&self) -> Option<f64> {
+        None
+    }
+
+    fn longest_interval(&self, fastest: f64) -> f64 {
+        WheelSet::of(self.wheels().as_ref()).longest_interval(fastest)
     }
 }

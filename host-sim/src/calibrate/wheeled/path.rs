@@ -1,6 +1,6 @@
 //! Where the wheels say that the sensor is, with derivatives by all unknowns.
 
-use agv_core::odometry::{Integration, OdometryNoise, WheelMotion, WheelParameter, WheelPath};
+use agv_core::odometry::{Integration, OdometryNoise, WheelMotion, WheelParameter, WheelPath, WheelSet};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::clock::Clock;
@@ -53,7 +53,8 @@ struct Added {
 
 /// None if the wheels do not determine the step.
 fn step(model: &WheeledModel, motions: &[WheelMotion], unknowns: &[Unknown], is_redundant: bool) -> Option<Added> {
-    let path = WheelPath::new(&model.wheels, motions, &NOISE, Integration::Arc)?;
+    let set = WheelSet::of(&model.wheels);
+    let path = WheelPath::new(&set, motions, &NOISE, Integration::Arc)?;
     let end = path.displacement();
     let slips = if is_redundant { model.wheels.len() } else { 0 };
     let mut added = Added {
@@ -89,7 +90,8 @@ pub fn is_redundant(model: &WheeledModel) -> bool {
         WheelMotion { turn: 1.0 / (number + 1) as f64, steering_start: steering, steering_end: steering }
     };
     let motions: Vec<WheelMotion> = (0..model.wheels.len()).map(motion).collect();
-    WheelPath::new(&model.wheels, &motions, &NOISE, Integration::Arc).is_some_and(|path| path.middle().slip > 1e-9)
+    let set = WheelSet::of(&model.wheels);
+    WheelPath::new(&set, &motions, &NOISE, Integration::Arc).is_some_and(|path| path.fit().slip > 1e-9)
 }
 
 /// A ratio is changed as a share of what it is now.
