@@ -11,6 +11,7 @@ use std::process::Command;
 use agv_host_sim::mapping::contour_mapper::{CELL, map_contours_at};
 use agv_host_sim::{log, replay};
 use agv_lab::evaluate::demonstration;
+use agv_settings::VehicleKind;
 use agv_tests::{emulator, image};
 
 /// The folder of the images of the emulated board. None, and a word about it, if one is missing or there is no emulator.
@@ -90,6 +91,13 @@ fn work_costs_the_instructions_that_it_did() {
         let most: u64 = row[3].parse().unwrap();
         assert!(row[1].parse::<u64>().unwrap() >= 10, "{row:?}");
         assert!(most <= budget, "{work} takes {most} instructions, {budget} are allowed");
+    }
+    let mean_of = |row: &Vec<&str>| row[2].parse::<u64>().unwrap();
+    let predictions: Vec<_> = rows.iter().filter(|row| row[0].starts_with("prediction of ")).collect();
+    let tricycle = predictions.iter().find(|row| row[0] == "prediction of tricycle").unwrap();
+    assert_eq!(predictions.len(), VehicleKind::ALL.len());
+    for row in &predictions {
+        assert!(mean_of(row) <= 2 * mean_of(tricycle), "{row:?} is dearer than two of {tricycle:?}");
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/instructions.csv");
     if std::env::var_os("AGV_ACCEPT").is_some() {

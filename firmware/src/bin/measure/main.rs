@@ -6,12 +6,13 @@
 mod contours;
 mod search;
 mod separation;
+mod vehicles;
 
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
 use agv_core::geometry::Point;
-use agv_core::localizer::{Event, Localize, Localizer, MapUse, SlamCapacities};
+use agv_core::localizer::{Event, Localize, Localizer, MapUse, Parameters, SlamCapacities};
 use agv_core::maps::{DynamicMap, FixedMap, Landmark, LandmarkKind, NearestNeighbour};
 use agv_core::measurement::{Reflectors, Scan, Time};
 use agv_core::record::Record;
@@ -54,6 +55,13 @@ impl Count {
         self.runs += 1;
         self.total += instructions;
         self.most = self.most.max(instructions);
+    }
+}
+
+impl core::fmt::Display for Count {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let mean = self.total / self.runs.max(1);
+        write!(formatter, "{},{},{},{}", self.name, self.runs, mean, self.most)
     }
 }
 
@@ -103,6 +111,7 @@ fn main() -> ! {
     let mut behind: Option<&mut Localizer> = None;
     let mut detector: Option<&mut falko::Detector<1440>> = None;
     let mut kept: Option<Contours> = None;
+    let mut believed: Option<Parameters> = None;
     let points = POINTS.take();
     let map = MAP.init_with(FixedMap::new);
     map.extend(&thousand_reflectors()).expect("a thousand reflectors fit");
@@ -115,6 +124,7 @@ fn main() -> ! {
                 // A revolution that is told reflector by reflector would be many for the solutions; they are counted apart.
                 parameters.protection = false;
                 localizer = Some(LOCALIZER.init_with(|| Localizer::new(parameters)));
+                believed = Some(parameters);
                 parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
                 slam = Some(SLAM.init_with(|| Localizer::new(parameters)));
                 behind = Some(BEHIND.init_with(|| Localizer::new(parameters)));
@@ -141,7 +151,8 @@ fn main() -> ! {
         })
         .expect("the log can be read");
     associate(&stopwatch, &mut counts, map);
-    write_table(&stopwatch, counts, kept.expect("the log has a header"), map);
+    let predictions = vehicles::count(&stopwatch, &believed.expect("the log has a header"));
+    write_table(&stopwatch, counts, kept.expect("the log has a header"), map, &predictions);
     debug::exit(debug::EXIT_SUCCESS);
     loop {
         cortex_m::asm::wfi();
@@ -149,7 +160,7 @@ fn main() -> ! {
 }
 
 /// Counts what needs no drive, and writes `instructions.csv`.
-fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut FixedMap<1000>) {
+fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut FixedMap<1000>, predictions: &[Count]) {
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
@@ -175,8 +186,10 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut 
         slice,
         whole,
     ] {
-        let mean = count.total / count.runs.max(1);
-        writeln!(text, "{},{},{},{}", count.name, count.runs, mean, count.most).expect("the table fits");
+        writeln!(text, "{count}").expect("the table fits");
+    }
+    for count in predictions {
+        writeln!(text, "prediction of {count}").expect("the table fits");
     }
     hprintln!("{}", text);
     output.write(text.as_bytes()).expect("the folder can be written");
