@@ -67,6 +67,38 @@ pub struct SearchResult {
     pub score: f32,
 }
 
+/// Where the points of a scan are in a grid.
+struct Cells {
+    /// Numbers of cells that stay in the grid however they are shifted.
+    inside: Vec<u32, POINTS>,
+    /// Columns and rows of the others.
+    others: Vec<(i32, i32), POINTS>,
+}
+
+impl Cells {
+    /// Takes points, which will be shifted by at most so many cells along each axis.
+    fn set(&mut self, points: &[ScanPoint], transform: &Transform, most: i32) {
+        self.inside.clear();
+        self.others.clear();
+        for point in points {
+            let (column, row) = LikelihoodGrid::cell(&transform.apply(point));
+            // Both have room for all.
+            let _ = match LikelihoodGrid::number_within(column, row, most) {
+                Some(number) => self.inside.push(number).is_ok(),
+                None => self.others.push((column, row)).is_ok(),
+            };
+        }
+    }
+
+    /// Sum of the values under them if they are shifted by so many cells.
+    fn sum(&self, grid: &LikelihoodGrid, (columns, rows): (i32, i32)) -> u32 {
+        let shift = LikelihoodGrid::numbers_between(columns, rows);
+        let inside = self.inside.iter().map(|number| grid.value_of(number.wrapping_add_signed(shift)));
+        let others = self.others.iter().map(|(column, row)| u32::from(grid.value(column + columns, row + rows)));
+        inside.sum::<u32>() + others.sum::<u32>()
+    }
+}
+
 /// Looks around `predicted`, a pose in the frame of the grid. Without points the prediction is the answer.
 #[must_use]
 pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, window: &SearchWindow) -> SearchResult {
@@ -77,7 +109,7 @@ pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, 
         // There is room.
         let _ = chosen.push(point.position);
     }
-    let mut cells: Vec<(i32, i32), POINTS> = Vec::new();
+    let mut cells = Cells { inside: Vec::new(), others: Vec::new() };
     let mut best = SearchResult { pose: *predicted, score: 0.0 };
     let mut best_weighted = 0.0;
     let step = i32::from(window.shift);
@@ -88,14 +120,10 @@ pub fn search(points: &[SurfacePoint], grid: &LikelihoodGrid, predicted: &Pose, 
         let by_turn = (1.0 - 0.2 * turn * turn / (HEADING * HEADING)).max(0.8);
         let turned = Pose { theta: wrap(predicted.theta + f64::from(turn)), ..*predicted };
         let transform = Transform::of(&turned);
-        cells.clear();
-        for point in &chosen {
-            let _ = cells.push(LikelihoodGrid::cell(&transform.apply(point)));
-        }
+        cells.set(&chosen, &transform, i32::from(window.shifts) * step);
         for row in shifts.clone() {
             for column in shifts.clone() {
-                let sum: u32 =
-                    cells.iter().map(|(x, y)| u32::from(grid.value(x + column * step, y + row * step))).sum();
+                let sum = cells.sum(grid, (column * step, row * step));
                 let (x, y) = ((column * step) as f32 * CELL, (row * step) as f32 * CELL);
                 let by_shift = (1.0 - 0.2 * (x * x + y * y) / (window.distance * window.distance)).max(0.5);
                 let weighted = sum as f32 * by_turn * by_shift;

@@ -68,6 +68,23 @@ impl LikelihoodGrid {
         self.cells.get(index >> 2).map_or(0, |cells| (cells >> ((index & 3) << 1)) & 3)
     }
 
+    /// The number of a cell; None if it is not in the grid, or leaves it when it is shifted by at most so many cells along each axis.
+    pub(super) fn number_within(column: i32, row: i32, most: i32) -> Option<u32> {
+        let stays = |cell: i32| cell >= most && cell < SIDE as i32 - most;
+        (stays(column) && stays(row)).then_some((row * SIDE as i32 + column) as u32)
+    }
+
+    /// By how much the number changes of a cell that is shifted by so many columns and rows.
+    pub(super) const fn numbers_between(columns: i32, rows: i32) -> i32 {
+        rows * SIDE as i32 + columns
+    }
+
+    /// See [`Self::value`], by the number of a cell.
+    pub(super) fn value_of(&self, number: u32) -> u32 {
+        let cells = self.cells.get(number as usize >> 2).copied().unwrap_or(0);
+        (u32::from(cells) >> ((number & 3) << 1)) & 3
+    }
+
     /// Adds a point, m.
     pub fn add(&mut self, point: &ScanPoint) {
         let (column, row) = Self::cell(point);
