@@ -23,7 +23,7 @@ type Room = Submap<4096>;
 /// A search and its room.
 #[derive(Default)]
 struct Search {
-    places: PlaceSearch<400, 16_384>,
+    places: PlaceSearch,
     room: Room,
 }
 
@@ -122,6 +122,43 @@ fn boxes(places: &[(f64, f64)], moved: f64) -> Walls {
         walls.extend(sides.map(|([ax, ay], [bx, by])| [*ax, *ay, *bx, *by]));
     }
     walls
+}
+
+/// A hall of 150 m by 50 m with boxes that stand irregularly.
+fn hall() -> Walls {
+    const SIZE: (f64, f64) = (150.0, 50.0);
+    let mut noise = Noise(91);
+    let mut place = || (1.0 + (SIZE.0 - 3.0) * noise.uniform(), 1.0 + (SIZE.1 - 3.0) * noise.uniform());
+    let places: Vec<_> = (0..120).map(|_| place()).collect();
+    let (x, y) = SIZE;
+    let mut walls = boxes(&places, 0.0).split_off(2);
+    walls.extend([[0.0, 0.0, x, 0.0], [x, 0.0, x, y], [x, y, 0.0, y], [0.0, y, 0.0, 0.0]]);
+    walls
+}
+
+#[test]
+fn a_laser_is_found_wherever_it_is_in_a_large_hall_and_no_look_takes_long() {
+    const SLICE: u32 = 3000;
+    let walls = hall();
+    let map = map(&walls);
+    let mut search: Box<Search> = Box::default();
+    let mut noise = Noise(17);
+    // Corners of the hall, ends of its middle, and what is between.
+    let edges = [(1.0, 0.5), (149.0, 0.5), (149.0, 49.5), (0.6, 49.0), (0.6, 25.0), (149.5, 24.0)];
+    let within = (0..14).map(|_| (150.0 * noise.uniform(), 50.0 * noise.uniform())).collect::<Vec<_>>();
+    let is_free = |(x, y): &(f64, f64)| {
+        !walls.iter().any(|[ax, ay, bx, by]| {
+            (ax.min(*bx) - 0.3..=ax.max(*bx) + 0.3).contains(x) && (ay.min(*by) - 0.3..=ay.max(*by) + 0.3).contains(y)
+        })
+    };
+    let free: Vec<_> = edges.into_iter().chain(within).filter(is_free).collect();
+    assert!(free.len() >= 15, "{free:?}");
+    for (x, y) in free {
+        let place = Pose::new(x, y, TAU * noise.uniform());
+        let (found, slices) = answer(&mut search, &walls, &map, &place, SLICE);
+        assert!(matches!(found, PlaceAnswer::Found(fix) if is_near(&fix.pose, &place)), "{place:?}: {found:?}");
+        assert!(slices < 1200, "{place:?}: {slices}");
+    }
 }
 
 /// The nearest box shows most, and all but it stand where they stood.

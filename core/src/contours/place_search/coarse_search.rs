@@ -4,13 +4,16 @@ use core::f64::consts::TAU;
 
 use heapless::Vec;
 
-use super::place_grid::{LEVELS, Offset, PlaceGrid, direction, facing};
+use super::bit_planes::{MOST_BESIDE, MOST_POINTS};
+use super::place_grid::{LEVELS, Offset, PlaceGrid, SMALLEST_CELL, direction, facing};
 use crate::contours::SurfacePoint;
 use crate::geometry::{Pose, ScanPoint, Transform, difference, wrap};
 use crate::order::insertion_sort_by;
 
 /// Points that are looked for.
 const SOUGHT: usize = 48;
+
+const _: () = assert!(SOUGHT <= MOST_POINTS, "bit planes count no more");
 
 /// Fewest that say something of a place.
 const FEWEST: usize = 12;
@@ -21,16 +24,22 @@ const SPACINGS: [f32; 4] = [0.4, 0.8, 1.6, 3.2];
 /// and no further away, m: the error of the heading moves them by less than a cell.
 const REACH: f32 = 20.0;
 
+const _: () = assert!(
+    REACH as f64 / (SMALLEST_CELL * (1 << (LEVELS - 1)) as f64) + 1.0 < MOST_BESIDE as f64,
+    "bit planes do not reach further beside the map"
+);
+
 /// Headings that are tried at the finest scale.
 const HEADINGS: u16 = 512;
 
 /// Headings at the finest scale within one at the coarsest.
 const FINE: usize = 1 << (LEVELS - 1);
 
-/// Share of the points that must be able to lie on surfaces,
-const LEAST_SHARE: f32 = 0.6;
+/// Share of the points that must be able to lie on surfaces: where there is a good place, to ask for much finds it soon. If that finds too
+/// little, all is looked at again,
+const LEAST_SHARES: [f32; 2] = [0.85, 0.6];
 
-/// and of those of the best place.
+/// and share of those of the best place.
 const AS_GOOD: f32 = 0.87;
 
 /// Places that are kept.
@@ -44,6 +53,9 @@ const STRIDE: usize = 19;
 
 /// What a heading of the coarsest scale costs, in points that are looked up: its offsets.
 const HEADING_EFFORT: i64 = 2500;
+
+/// What a point costs that is looked up for a group of cells.
+const GROUP_EFFORT: i64 = 2;
 
 /// What a cell costs beside the points that are looked up for it.
 const CELL_EFFORT: i64 = 4;
@@ -90,9 +102,13 @@ struct Sought {
 pub(super) struct CoarseSearch {
     sought: Vec<Sought, SOUGHT>,
     branch: Branch,
-    /// The heading of the coarsest scale that is looked at, and its next cell there; none before the points are turned to it.
+    /// The heading of the coarsest scale that is looked at, and its next cells there; none before the points are turned to it.
     heading: u16,
-    cell: Option<i32>,
+    group: Option<i32>,
+    /// Those of the cells before that cannot be excluded and were not looked at, a bit each.
+    open: u32,
+    /// How often all headings have been looked at.
+    pass: usize,
     /// Cells within those before that wait to be looked at.
     nodes: Vec<Node, NODES>,
     places: Vec<Place, PLACES>,
@@ -109,7 +125,9 @@ impl CoarseSearch {
             sought: Vec::new(),
             branch: Branch { headings: [const { [const { Vec::new() }; FINE] }; LEVELS] },
             heading: 0,
-            cell: None,
+            group: None,
+            open: 0,
+            pass: 0,
             nodes: Vec::new(),
             places: Vec::new(),
             left_out: 0,
@@ -122,7 +140,8 @@ impl CoarseSearch {
         self.sought.clear();
         self.places.clear();
         self.nodes.clear();
-        (self.heading, self.cell, self.left_out) = (0, None, 0);
+        (self.heading, self.group, self.left_out) = (0, None, 0);
+        (self.open, self.pass) = (0, 0);
         for spacing in SPACINGS {
             self.sought.clear();
             let is_all = points.iter().filter(|point| point.position.norm() <= REACH).all(|point| {
@@ -165,14 +184,15 @@ impl CoarseSearch {
     /// Fewest points that must be able to lie on surfaces, by the best place that was found so far.
     fn fewest(&self) -> usize {
         let best = self.places.first().map_or(0, |best| best.hits);
+        let least = LEAST_SHARES.get(self.pass).copied().unwrap_or(1.0);
         let share = |share: f32, of: usize| libm::ceilf(share * of as f32) as usize;
-        share(LEAST_SHARE, self.sought.len()).max(share(AS_GOOD, best)).max(1)
+        share(least, self.sought.len()).max(share(AS_GOOD, best)).max(1)
     }
 
     /// Looks at cells, as far as the effort goes: points that are looked up. Whether there is more to do.
     pub(super) fn advance<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, effort: &mut i64) -> bool {
-        let coarsest = grid.level(LEVELS - 1);
-        while usize::from(self.heading) * FINE < usize::from(HEADINGS) {
+        let (planes, bytes) = grid.coarsest();
+        while self.goes_on() {
             if *effort <= 0 {
                 return true;
             }
@@ -180,21 +200,27 @@ impl CoarseSearch {
                 self.look(grid, node, effort);
                 continue;
             }
-            let Some(cell) = self.cell else {
+            let Some(group) = self.group else {
                 *effort -= HEADING_EFFORT;
                 self.turn(grid.cell());
-                self.cell = Some(0);
+                self.group = Some(0);
                 continue;
             };
-            if cell < coarsest.columns() * coarsest.rows() {
-                let (column, row) = (cell.checked_rem(coarsest.columns()), cell.checked_div(coarsest.columns()));
-                if let (Some(column), Some(row)) = (column, row) {
-                    // None waits.
-                    let _ = self.nodes.push(Node { level: LEVELS - 1, branch: 0, column, row });
+            if self.open != 0 {
+                let lane = self.open.trailing_zeros() as i32;
+                self.open &= self.open - 1;
+                // It is the one before.
+                if let Some((column, row)) = planes.first_of(group - 1) {
+                    self.divide(grid, &Node { level: LEVELS - 1, branch: 0, column: column + lane, row });
                 }
-                self.cell = Some(cell + 1);
+            } else if group < planes.groups() {
+                let offsets = self.branch.headings.get(LEVELS - 1).and_then(|headings| headings.first());
+                let offsets = offsets.map_or(&[][..], |offsets| offsets);
+                let (open, looked_up) = planes.fitting(bytes, offsets, group, self.needed);
+                *effort -= GROUP_EFFORT * i64::from(looked_up) + CELL_EFFORT;
+                (self.open, self.group) = (open, Some(group + 1));
             } else {
-                (self.heading, self.cell) = (self.heading + 1, None);
+                (self.heading, self.group) = (self.heading + 1, None);
             }
         }
         let needed = self.needed;
@@ -202,7 +228,25 @@ impl CoarseSearch {
         false
     }
 
-    /// Looks at a cell. Those within it wait if it cannot be excluded: each has two headings and four cells.
+    /// Whether there are headings to look at: all of them again, if one that was not found may be good enough.
+    fn goes_on(&mut self) -> bool {
+        if usize::from(self.heading) * FINE < usize::from(HEADINGS) {
+            return true;
+        }
+        if self.pass + 1 >= LEAST_SHARES.len() {
+            return false;
+        }
+        self.pass += 1;
+        let was_needed = self.needed;
+        self.needed = self.fewest();
+        let is_again = self.needed < was_needed;
+        if is_again {
+            self.heading = 0;
+        }
+        is_again
+    }
+
+    /// Looks at a cell. Those within it wait if it cannot be excluded.
     fn look<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, node: Node, effort: &mut i64) {
         let Node { level, branch, column, row } = node;
         let Some(offsets) = self.branch.headings.get(level).and_then(|headings| headings.get(branch)) else {
@@ -213,16 +257,22 @@ impl CoarseSearch {
         if hits == 0 {
             return;
         }
-        let Some(finer) = level.checked_sub(1) else {
-            let middle = grid.middle(column, row);
-            let theta = wrap(self.heading_of(0, branch));
-            return self.keep(Place { pose: Pose { x: middle.x, y: middle.y, theta }, hits }, grid.cell());
-        };
+        if level > 0 {
+            return self.divide(grid, &node);
+        }
+        let middle = grid.middle(column, row);
+        let theta = wrap(self.heading_of(0, branch));
+        self.keep(Place { pose: Pose { x: middle.x, y: middle.y, theta }, hits }, grid.cell());
+    }
+
+    /// What is within a cell waits: it has two headings and four cells.
+    fn divide<const CELLS: usize>(&mut self, grid: &PlaceGrid<CELLS>, node: &Node) {
+        let Some(finer) = node.level.checked_sub(1) else { return };
         let within = grid.level(finer);
         for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let (column, row) = (2 * column + x, 2 * row + y);
+            let (column, row) = (2 * node.column + x, 2 * node.row + y);
             if column < within.columns() && row < within.rows() {
-                for branch in [2 * branch, 2 * branch + 1] {
+                for branch in [2 * node.branch, 2 * node.branch + 1] {
                     // There is room: one is taken before eight come.
                     let _ = self.nodes.push(Node { level: finer, branch, column, row });
                 }

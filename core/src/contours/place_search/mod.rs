@@ -5,6 +5,7 @@
 //! rather than the free space behind them. Only a clear gap to the second makes an answer.
 
 pub(super) mod best_places;
+mod bit_planes;
 mod coarse_search;
 mod place_grid;
 mod range_profile;

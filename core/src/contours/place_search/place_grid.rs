@@ -7,14 +7,16 @@
 
 use core::f32::consts::TAU;
 
+use super::bit_planes::BitPlanes;
 use crate::contours::{KeptMap, SurfacePoint, TILE};
 use crate::geometry::Point;
 
 /// Scales.
 pub(super) const LEVELS: usize = 4;
+const COARSEST: usize = LEVELS - 1;
 
 /// Smallest cell of the finest scale, m.
-const SMALLEST_CELL: f64 = 0.25;
+pub(super) const SMALLEST_CELL: f64 = 0.25;
 
 /// By how much cells grow until the map has room.
 const GROWTH: f64 = 1.05;
@@ -56,12 +58,20 @@ struct Area {
 
 impl Area {
     fn cells(&self) -> usize {
-        self.columns.max(0) as usize * self.rows.max(0) as usize
+        (self.columns.max(0) as usize).saturating_mul(self.rows.max(0) as usize)
     }
 
-    /// Bytes at a scale: the finest has a bit for each cell.
+    fn planes(&self) -> BitPlanes {
+        BitPlanes::new(self.columns, self.rows)
+    }
+
+    /// Bytes at a scale: the finest has a bit for each cell, the coarsest one for each direction.
     fn bytes(&self, level: usize) -> usize {
-        if level == 0 { self.cells().div_ceil(8) } else { self.cells() }
+        match level {
+            0 => self.cells().div_ceil(8),
+            COARSEST => self.planes().bytes(),
+            _ => self.cells(),
+        }
     }
 }
 
@@ -93,17 +103,20 @@ impl<const CELLS: usize> PlaceGrid<CELLS> {
             low = (low.0.min(row), low.1.min(column));
             high = (high.0.max(row), high.1.max(column));
         }
-        self.corner = Point::new(f64::from(low.1), f64::from(low.0)) * TILE;
+        let corner = Point::new(f64::from(low.1), f64::from(low.0)) * TILE;
         let side = |low: i16, high: i16| (f64::from(high) - f64::from(low) + 1.0) * TILE;
         let (width, height) = (side(low.1, high.1), side(low.0, high.0));
         self.cell = SMALLEST_CELL;
         for _ in 0..STEPS {
             let mut room = 0;
+            // Surfaces at the edge of the map are told by the cells beside it, too.
+            let beside = self.cell * f64::from(1 << COARSEST);
+            self.corner = corner.add_scalar(-beside);
             for (level, area) in self.areas.iter_mut().enumerate() {
                 let cell = self.cell * f64::from(1 << level);
-                let count = |length: f64| libm::ceil(length / cell) as i32;
+                let count = |length: f64| libm::ceil((length + 2.0 * beside) / cell) as i32;
                 *area = Area { columns: count(width), rows: count(height), first: room };
-                room += area.bytes(level);
+                room = room.saturating_add(area.bytes(level));
             }
             if room <= CELLS {
                 return true;
@@ -126,6 +139,11 @@ impl<const CELLS: usize> PlaceGrid<CELLS> {
                     if !(0..area.columns).contains(&x) || !(0..area.rows).contains(&y) {
                         continue;
                     }
+                    if level == COARSEST {
+                        let bytes = self.cells.get_mut(area.first..).unwrap_or_default();
+                        area.planes().mark(bytes, (x, y), mask);
+                        continue;
+                    }
                     let index = (y * area.columns + x) as usize;
                     let (index, mask) = if level == 0 { (index / 8, 1 << (index % 8)) } else { (index, mask) };
                     if let Some(cell) = self.cells.get_mut(area.first + index) {
@@ -136,11 +154,17 @@ impl<const CELLS: usize> PlaceGrid<CELLS> {
         }
     }
 
-    /// A scale, from the finest on.
+    /// A scale, from the finest to the last but the coarsest.
     pub(super) fn level(&self, level: usize) -> Level<'_> {
         let area = self.areas.get(level).copied().unwrap_or_default();
         let cells = self.cells.get(area.first..area.first + area.bytes(level)).unwrap_or_default();
         Level { area, cells, is_finest: level == 0 }
+    }
+
+    /// The coarsest scale, and its bytes.
+    pub(super) fn coarsest(&self) -> (BitPlanes, &[u8]) {
+        let area = self.areas.get(COARSEST).copied().unwrap_or_default();
+        (area.planes(), self.cells.get(area.first..).unwrap_or_default())
     }
 
     /// Whether there are surfaces within about a cell of the finest scale of a position, m.
