@@ -71,7 +71,7 @@ pub struct SearchResult {
 struct Cells {
     /// Numbers of cells that stay in the grid however they are shifted.
     inside: Vec<u32, POINTS>,
-    /// Columns and rows of the others.
+    /// Columns and rows of those that may come into it or leave it.
     others: Vec<(i32, i32), POINTS>,
 }
 
@@ -83,19 +83,19 @@ impl Cells {
         for point in points {
             let (column, row) = LikelihoodGrid::cell(&transform.apply(point));
             // Both have room for all.
-            let _ = match LikelihoodGrid::number_within(column, row, most) {
-                Some(number) => self.inside.push(number).is_ok(),
-                None => self.others.push((column, row)).is_ok(),
-            };
+            if let Some(number) = LikelihoodGrid::number_within(column, row, most) {
+                let _ = self.inside.push(number);
+            } else if LikelihoodGrid::can_enter(column, row, most) {
+                let _ = self.others.push((column, row));
+            }
         }
     }
 
     /// Sum of the values under them if they are shifted by so many cells.
     fn sum(&self, grid: &LikelihoodGrid, (columns, rows): (i32, i32)) -> u32 {
-        let shift = LikelihoodGrid::numbers_between(columns, rows);
-        let inside = self.inside.iter().map(|number| grid.value_of(number.wrapping_add_signed(shift)));
+        let inside = grid.sum_of(&self.inside, LikelihoodGrid::numbers_between(columns, rows));
         let others = self.others.iter().map(|(column, row)| u32::from(grid.value(column + columns, row + rows)));
-        inside.sum::<u32>() + others.sum::<u32>()
+        inside + others.sum::<u32>()
     }
 }
 

@@ -61,17 +61,27 @@ impl LikelihoodGrid {
     /// From 0 (nothing is near) to 3. Zero outside.
     #[must_use]
     pub fn value(&self, column: i32, row: i32) -> u8 {
-        if !(0..SIDE as i32).contains(&column) || !(0..SIDE as i32).contains(&row) {
+        if !Self::is_within(column, row, 0) {
             return 0;
         }
         let index = row as usize * SIDE + column as usize;
         self.cells.get(index >> 2).map_or(0, |cells| (cells >> ((index & 3) << 1)) & 3)
     }
 
-    /// The number of a cell; None if it is not in the grid, or leaves it when it is shifted by at most so many cells along each axis.
+    /// Whether a cell is so far within the grid, in cells, or, if that is negative, no further beside it.
+    fn is_within(column: i32, row: i32, margin: i32) -> bool {
+        let cells = margin..SIDE as i32 - margin;
+        cells.contains(&column) && cells.contains(&row)
+    }
+
+    /// Whether a cell may come into the grid when it is shifted by at most so many cells along each axis.
+    pub(super) fn can_enter(column: i32, row: i32, most: i32) -> bool {
+        Self::is_within(column, row, -most)
+    }
+
+    /// The number of a cell; None if it is not in the grid, or may leave it when it is shifted by at most so many cells along each axis.
     pub(super) fn number_within(column: i32, row: i32, most: i32) -> Option<u32> {
-        let stays = |cell: i32| cell >= most && cell < SIDE as i32 - most;
-        (stays(column) && stays(row)).then_some((row * SIDE as i32 + column) as u32)
+        Self::is_within(column, row, most).then_some((row * SIDE as i32 + column) as u32)
     }
 
     /// By how much the number changes of a cell that is shifted by so many columns and rows.
@@ -79,10 +89,15 @@ impl LikelihoodGrid {
         rows * SIDE as i32 + columns
     }
 
-    /// See [`Self::value`], by the number of a cell.
-    pub(super) fn value_of(&self, number: u32) -> u32 {
-        let cells = self.cells.get(number as usize >> 2).copied().unwrap_or(0);
-        (u32::from(cells) >> ((number & 3) << 1)) & 3
+    /// Sum of the values of cells by their numbers, each of them changed by so much.
+    pub(super) fn sum_of(&self, numbers: &[u32], shift: i32) -> u32 {
+        let cells = self.cells.as_slice();
+        numbers.iter().fold(0, |sum, number| {
+            let number = number.wrapping_add_signed(shift);
+            let values = cells.get(number as usize >> 2).map_or(0, |values| u32::from(*values));
+            // No sum of so few values is that large.
+            sum.wrapping_add((values >> ((number & 3) << 1)) & 3)
+        })
     }
 
     /// Adds a point, m.
