@@ -161,6 +161,33 @@ fn a_laser_is_found_wherever_it_is_in_a_large_hall_and_no_look_takes_long() {
     }
 }
 
+/// A corridor of 60 m that has niches at irregular distances: many places are alike, and one of them fits.
+#[test]
+fn a_laser_is_found_along_a_corridor_of_niches_and_no_look_takes_long() {
+    const LENGTH: f64 = 60.0;
+    let mut noise = Noise(23);
+    let mut walls = vec![[0.0, -1.2, 0.0, 1.2], [LENGTH, -1.2, LENGTH, 1.2]];
+    for side in [1.2, -1.2] {
+        let (mut x, deep) = (0.0, side * 1.4 / 1.2);
+        while x < LENGTH - 8.0 {
+            let begin = x + 1.0 + 5.0 * noise.uniform();
+            let end = begin + 0.8 + 0.6 * noise.uniform();
+            walls.extend([[x, side, begin, side], [begin, side, begin, deep]]);
+            walls.extend([[begin, deep, end, deep], [end, deep, end, side]]);
+            x = end;
+        }
+        walls.push([x, side, LENGTH, side]);
+    }
+    let map = map(&walls);
+    let mut search: Box<Search> = Box::default();
+    for _ in 0..10 {
+        let place = Pose::new(3.0 + 54.0 * noise.uniform(), noise.uniform() - 0.5, TAU * noise.uniform());
+        let (found, slices) = answer(&mut search, &walls, &map, &place, 3000);
+        assert!(matches!(found, PlaceAnswer::Found(fix) if is_near(&fix.pose, &place)), "{place:?}: {found:?}");
+        assert!(slices < 3900, "{place:?}: {slices}");
+    }
+}
+
 /// The nearest box shows most, and all but it stand where they stood.
 #[test]
 fn one_thing_that_was_moved_does_not_take_the_place_along() {

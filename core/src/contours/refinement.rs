@@ -1,5 +1,7 @@
 //! The pose under which the points of a scan lie on surfaces: points to lines, iterated, robustly weighted.
 
+use core::num::NonZeroUsize;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Submap, SurfacePoint};
@@ -119,6 +121,8 @@ pub(super) struct Refining {
     /// What was summed up in this iteration, of so many points.
     sums: Sums,
     points: usize,
+    /// One of so many points is taken.
+    stride: NonZeroUsize,
     outcome: Option<Refinement>,
 }
 
@@ -132,8 +136,14 @@ impl Refining {
             tolerance: TOLERANCE.0,
             sums: Sums::default(),
             points: 0,
+            stride: NonZeroUsize::MIN,
             outcome: None,
         }
+    }
+
+    /// The same by one of `stride` points each.
+    pub(super) fn by_some(start: Pose, stride: NonZeroUsize) -> Self {
+        Self { stride, ..Self::new(start) }
     }
 
     /// A scan that was laid onto some of the surfaces at `start`: the others are not far away.
@@ -170,14 +180,16 @@ impl Refining {
     ) -> bool {
         let transform = Transform::of(&self.pose);
         let reach = if self.iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
-        for point in points.iter().skip(self.points).take(count) {
+        let stride = self.stride.get();
+        let first = self.points.saturating_mul(stride);
+        for point in points.iter().skip(first).step_by(stride).take(count) {
             let moved = point.moved(&transform);
             if let Some(surface) = nearest(&moved, reach) {
                 self.sums.lay(&moved, &surface, (&transform, self.tolerance));
             }
         }
         self.points = self.points.saturating_add(count);
-        if self.points < points.len() {
+        if self.points < points.len().div_ceil(stride) {
             return true;
         }
         self.points = 0;

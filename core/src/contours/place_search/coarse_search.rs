@@ -176,6 +176,13 @@ impl CoarseSearch {
         &self.places
     }
 
+    /// One of them is known better now.
+    pub(super) fn set_pose(&mut self, place: usize, pose: Pose) {
+        if let Some(place) = self.places.get_mut(place) {
+            place.pose = pose;
+        }
+    }
+
     /// Whether a place was left out that is about as good as those that are kept.
     pub(super) fn is_crowded(&self) -> bool {
         self.left_out >= self.needed

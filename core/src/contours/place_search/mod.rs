@@ -2,7 +2,8 @@
 //!
 //! All places are looked at from coarse to fine, by what cannot be excluded. Those that remain are laid onto the surfaces, and judged from
 //! both sides: how much of the scan lies on surfaces of the map, and how many of the surfaces that should be in sight the scan shows,
-//! rather than the free space behind them. Only a clear gap to the second makes an answer.
+//! rather than the free space behind them. Where many remain, as along a corridor, that is done with some of the points first, and with
+//! all of them where that fits nearly as well as at the best. Only a clear gap to the second makes an answer.
 
 pub(super) mod best_places;
 mod bit_planes;
@@ -11,6 +12,8 @@ mod place_grid;
 mod range_profile;
 mod settling;
 mod support;
+
+use core::num::NonZeroUsize;
 
 use heapless::Vec;
 
@@ -49,6 +52,19 @@ const LEAST_SHOWN: f32 = 0.55;
 
 /// A place is looked at closely if scan and map agree there this much as well as at the best one.
 const WORTH: f32 = 0.6;
+
+/// If there are more places than these, each is glanced at by one of so many points,
+const FEW_PLACES: usize = 6;
+const GLANCE: NonZeroUsize = NonZeroUsize::MIN.saturating_add(4);
+
+/// left out if so few of them lie on surfaces,
+const LEAST_GLANCE: f32 = 0.45;
+
+/// or if there is a place where scan and map agree so much better.
+const WORTH_ALL: f32 = 0.75;
+
+/// All points are taken.
+const ALL: NonZeroUsize = NonZeroUsize::MIN;
 
 /// Turns to each side of a place that are searched, and the angle between them, rad.
 const TURNS: i32 = 3;
@@ -108,13 +124,24 @@ enum Step {
     /// Laying the scan onto the surfaces.
     Refine(usize, Refining),
     /// Looking for surfaces that should be in sight.
-    Look { fix: PlaceFix, point: usize, found: InSight },
+    Look { place: usize, fix: PlaceFix, point: usize, found: InSight },
     /// Laying the scan onto all of the map at one of the best places.
     Settle { place: usize, settling: Settling },
     /// Asking which things hold one of them along one axis, and across it.
     Ask { place: usize, is_across: bool, support: Support },
     /// Telling the answer.
     Answer,
+}
+
+/// What is known of a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Glance {
+    /// All has been looked at.
+    Done,
+    /// Nothing yet.
+    None,
+    /// How well some of the points and the map agree there, in parts of 255.
+    Overlap(u8),
 }
 
 /// Searches by `POINTS` points of a scan, with `CELLS` cells for all of the map.
@@ -128,8 +155,10 @@ pub struct PlaceSearch<const POINTS: usize = 400, const CELLS: usize = 49_152> {
     profile: RangeProfile,
     coarse: CoarseSearch,
     step: Step,
-    /// Places that have been looked at.
-    done: [bool; PLACES],
+    /// What is known of the places.
+    glances: [Glance; PLACES],
+    /// The best overlap of a glance, in parts of 255.
+    best_glance: u8,
     best: BestPlaces,
     /// The best score of a search around a place.
     score: f32,
@@ -151,7 +180,8 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
             profile: RangeProfile::new(),
             coarse: CoarseSearch::new(),
             step: Step::None,
-            done: [false; PLACES],
+            glances: [Glance::None; PLACES],
+            best_glance: 0,
             best: BestPlaces::new(),
             score: 0.0,
             shifts: 0,
@@ -171,7 +201,8 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
         self.profile.set(scan);
         self.best.clear();
         self.score = 0.0;
-        self.done = [false; PLACES];
+        self.glances = [Glance::None; PLACES];
+        self.best_glance = 0;
         self.debt = 0;
         let is_enough = self.coarse.begin(&self.points);
         self.step = match (is_enough, self.has_grid) {
@@ -204,7 +235,7 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
                 Step::Load(place, loading) => self.load(map, submap, (place, loading), &mut left),
                 Step::Turn { place, turn, best } => self.turn(submap, place, (turn, best), &mut left),
                 Step::Refine(place, refining) => self.refine(submap, place, refining, &mut left),
-                Step::Look { fix, point, found } => self.look(submap, &fix, (point, found), &mut left),
+                Step::Look { place, fix, point, found } => self.look(submap, (place, &fix), (point, found), &mut left),
                 Step::Settle { place, settling } => self.settle(map, place, settling, &mut left),
                 Step::Ask { place, is_across, support } => self.ask(map, (place, is_across), support, &mut left),
             };
@@ -243,26 +274,39 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
 
     /// The next place: one that is within what is loaded, or else the best.
     fn choose<const ROOM: usize>(&mut self, submap: &mut Submap<ROOM>) -> Step {
+        let places = self.coarse.places().iter().zip(&self.glances).enumerate();
+        let least = WORTH_ALL * f32::from(self.best_glance);
+        let is_open = |glance: Glance| match glance {
+            Glance::Done => false,
+            Glance::None => true,
+            // After the last glance.
+            Glance::Overlap(overlap) => f32::from(overlap) >= least,
+        };
+        let has_unseen = places.clone().any(|(_, (_, glance))| *glance == Glance::None);
+        let open = places.filter(|(_, (_, glance))| is_open(**glance) && (**glance == Glance::None) == has_unseen);
         let origin = *submap.origin();
         let is_loaded = |place: &Place| {
             let apart = place.pose.position() - origin.position();
             !submap.is_empty() && apart.amax() < TILE
         };
-        let mut open = self.coarse.places().iter().zip(self.done).enumerate().filter(|(_, (_, is_done))| !is_done);
-        let first = open.clone().next();
-        let loaded = open.find(|(_, (place, _))| is_loaded(place));
+        let loaded = open.clone().find(|(_, (place, _))| is_loaded(place));
+        let first = open.max_by_key(|(number, (_, glance))| (**glance, core::cmp::Reverse(*number)));
         let Some((number, (place, _))) = loaded.or(first) else { return self.first_settling(0) };
-        let place = *place;
-        if let Some(done) = self.done.get_mut(number) {
-            *done = true;
-        }
         if loaded.is_some() {
-            return self.first_turn(submap, number);
+            return self.first_look(submap, number);
         }
         match Loading::begin(place.pose.x, place.pose.y, submap) {
             Some(loading) => Step::Load(number, loading),
-            None => Step::Choose,
+            None => self.end(number),
         }
+    }
+
+    /// A place has been looked at.
+    fn end(&mut self, place: usize) -> Step {
+        if let Some(glance) = self.glances.get_mut(place) {
+            *glance = Glance::Done;
+        }
+        Step::Choose
     }
 
     fn load<const ROOM: usize>(
@@ -276,18 +320,26 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
         if loading.step(map, POINTS_A_STEP, submap) {
             Step::Load(place, loading)
         } else {
-            self.first_turn(submap, place)
+            self.first_look(submap, place)
         }
     }
 
-    fn first_turn<const ROOM: usize>(&self, submap: &Submap<ROOM>, place: usize) -> Step {
-        match self.coarse.places().get(place) {
-            Some(found) => {
-                let best = SearchResult { pose: submap.origin().between(&found.pose), score: -1.0 };
-                Step::Turn { place, turn: -TURNS, best }
-            }
-            None => Step::Choose,
+    /// Begins to look at a place: searches around it first, if that is the first time.
+    fn first_look<const ROOM: usize>(&mut self, submap: &Submap<ROOM>, place: usize) -> Step {
+        let (Some(found), Some(glance)) = (self.coarse.places().get(place), self.glances.get(place)) else {
+            return self.end(place);
+        };
+        let pose = submap.origin().between(&found.pose);
+        match glance {
+            Glance::Overlap(_) => Step::Refine(place, Refining::new(pose)),
+            Glance::None | Glance::Done => Step::Turn { place, turn: -TURNS, best: SearchResult { pose, score: -1.0 } },
         }
+    }
+
+    /// Of how many points one is taken for now: where there are many places, some are enough to leave most out.
+    fn stride(&self, place: usize) -> NonZeroUsize {
+        let is_first = self.glances.get(place) == Some(&Glance::None);
+        if is_first && self.coarse.places().len() > FEW_PLACES { GLANCE } else { ALL }
     }
 
     fn turn<const ROOM: usize>(
@@ -297,7 +349,7 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
         (turn, best): (i32, SearchResult),
         left: &mut i64,
     ) -> Step {
-        let Some(found) = self.coarse.places().get(place) else { return Step::Choose };
+        let Some(found) = self.coarse.places().get(place) else { return self.end(place) };
         *left -= TURN_EFFORT;
         let around = submap.origin().between(&found.pose);
         let around = Pose { theta: wrap(around.theta + f64::from(turn) * TURN), ..around };
@@ -307,26 +359,30 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
             return Step::Turn { place, turn: turn + 1, best };
         }
         // What is beyond the reach of the grid is not found in it.
-        let reached = self.reached::<ROOM>(&best.pose).filter(|is_reached| *is_reached).count();
+        let reached = self.reached::<ROOM>(&best.pose, ALL).filter(|is_reached| *is_reached).count();
         let score = best.score * self.points.len() as f32 / reached.max(1) as f32;
         if reached < FEWEST || score < PROMISING * self.score {
-            return Step::Choose;
+            return self.end(place);
         }
         self.score = self.score.max(score);
-        Step::Refine(place, Refining::new(best.pose))
+        Step::Refine(place, Refining::by_some(best.pose, self.stride(place)))
     }
 
-    /// Whether the points of the scan are within the reach of the submap, in whose frame it is at a pose.
-    fn reached<const ROOM: usize>(&self, pose: &Pose) -> impl Iterator<Item = bool> {
+    /// Whether points of the scan, one of so many, are within the reach of the submap, in whose frame it is at a pose.
+    fn reached<const ROOM: usize>(&self, pose: &Pose, stride: NonZeroUsize) -> impl Iterator<Item = bool> {
         let transform = Transform::of(pose);
-        self.points.iter().map(move |point| Submap::<ROOM>::reaches(&transform.apply(&point.position)))
+        self.points
+            .iter()
+            .step_by(stride.get())
+            .map(move |point| Submap::<ROOM>::reaches(&transform.apply(&point.position)))
     }
 
     /// Points further away that have surfaces near.
-    fn far_hits<const ROOM: usize>(&self, submap: &Submap<ROOM>, pose: &Pose) -> usize {
+    fn far_hits<const ROOM: usize>(&self, submap: &Submap<ROOM>, pose: &Pose, stride: NonZeroUsize) -> usize {
         let in_map = submap.origin().compose(pose);
-        let far = self.points.iter().zip(self.reached::<ROOM>(pose)).filter(|(_, is_reached)| !is_reached);
-        far.filter(|(point, _)| self.grid.is_near(&in_map.transform(&point.position.cast()))).count()
+        let is_near = |point: &SurfacePoint| self.grid.is_near(&in_map.transform(&point.position.cast()));
+        let points = self.points.iter().step_by(stride.get()).zip(self.reached::<ROOM>(pose, stride));
+        points.filter(|(point, is_reached)| !is_reached && is_near(point)).count()
     }
 
     fn refine<const ROOM: usize>(
@@ -340,21 +396,23 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
         if refining.step(&self.points, REFINED_A_STEP, |point, reach| submap.nearest(point, reach)) {
             return Step::Refine(place, refining);
         }
-        let Some(found) = refining.outcome() else { return Step::Choose };
-        let on_surfaces = found.inliers as usize + self.far_hits(submap, &found.pose);
-        let share = (on_surfaces as f32 / self.points.len().max(1) as f32).min(1.0);
-        if share < LEAST_SHARE {
-            return Step::Choose;
+        let Some(found) = refining.outcome() else { return self.end(place) };
+        let stride = self.stride(place);
+        let on_surfaces = found.inliers as usize + self.far_hits(submap, &found.pose, stride);
+        let share = (on_surfaces as f32 / self.points.len().div_ceil(stride.get()).max(1) as f32).min(1.0);
+        let least = if stride == ALL { LEAST_SHARE } else { LEAST_GLANCE };
+        if share < least {
+            return self.end(place);
         }
         let free_axis = weak_axis(found.directions);
         let fix = PlaceFix { pose: found.pose, information: found.information, share, shown: 0.0, free_axis };
-        Step::Look { fix, point: 0, found: InSight::default() }
+        Step::Look { place, fix, point: 0, found: InSight::default() }
     }
 
     fn look<const ROOM: usize>(
         &mut self,
         submap: &Submap<ROOM>,
-        fix: &PlaceFix,
+        (place, fix): (usize, &PlaceFix),
         (point, mut found): (usize, InSight),
         left: &mut i64,
     ) -> Step {
@@ -366,11 +424,21 @@ impl<const POINTS: usize, const CELLS: usize> PlaceSearch<POINTS, CELLS> {
             seen += 1;
         }
         if seen == POINTS_A_STEP {
-            return Step::Look { fix: *fix, point: point + seen, found };
+            return Step::Look { place, fix: *fix, point: point + seen, found };
         }
-        if found.share() >= LEAST_SHOWN {
-            let pose = submap.origin().compose(&fix.pose);
-            self.best.keep(PlaceFix { pose, shown: found.share(), ..*fix });
+        if found.share() < LEAST_SHOWN {
+            return self.end(place);
+        }
+        let fix = PlaceFix { pose: submap.origin().compose(&fix.pose), shown: found.share(), ..*fix };
+        if self.stride(place) == ALL {
+            self.best.keep(fix);
+            return self.end(place);
+        }
+        self.coarse.set_pose(place, fix.pose);
+        let overlap = (f32::from(u8::MAX) * fix.overlap()) as u8;
+        self.best_glance = self.best_glance.max(overlap);
+        if let Some(glance) = self.glances.get_mut(place) {
+            *glance = Glance::Overlap(overlap);
         }
         Step::Choose
     }
