@@ -21,7 +21,7 @@ use agv_host_sim::simulate::simulate;
 use agv_settings::leaf::Value;
 use agv_settings::service::authentication::{Nonce, TAG, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, Refusal, Request, Response, encode};
-use agv_tests::{emulator, image};
+use agv_tests::{emulator, image, too_busy};
 use socket2::{Domain, Socket, Type};
 
 const KEY: [u8; 32] = [0x42; 32];
@@ -416,8 +416,17 @@ fn crowd(port: u16) -> usize {
     count
 }
 
+/// Poses during attacks.
+#[derive(Default)]
+struct Poses {
+    all: usize,
+    with_reflectors: usize,
+    /// Whether the place was lost.
+    has_lost: bool,
+}
+
 /// How the poses went on during an attack.
-fn check_poses(name: &str, watch: &Watch, start: Instant) -> (usize, usize) {
+fn check_poses(name: &str, watch: &Watch, start: Instant, seen: &mut Poses) {
     let poses = watch.poses_since(start);
     let duration = start.elapsed().as_secs_f64();
     let with_reflectors = poses.iter().filter(|heard| heard.pose.mode == Mode::Reflectors).count();
@@ -431,14 +440,15 @@ fn check_poses(name: &str, watch: &Watch, start: Instant) -> (usize, usize) {
         poses.len(),
         1e3 * worst
     );
-    // Encoders that come late are the machine's affair; the place is never lost.
+    // Encoders that come late are the machine's affair; if they are so for long that the place is lost is asked at the end.
     let is_known = |mode| matches!(mode, Mode::Reflectors | Mode::WithoutOdometry | Mode::DeadReckoning);
-    assert!(poses.iter().all(|heard| is_known(heard.pose.mode)), "{name}: {others:?}");
+    seen.has_lost |= poses.iter().any(|heard| !is_known(heard.pose.mode));
     assert!(poses.len() as f64 > 25.0 * duration && worst < 0.5, "{name}: {} poses, {worst} s", poses.len());
-    (poses.len(), with_reflectors)
+    seen.all += poses.len();
+    seen.with_reflectors += with_reflectors;
 }
 
-fn attack(watch: &Watch, folder: &Path) -> (usize, usize) {
+fn attack(watch: &Watch, folder: &Path) -> Poses {
     let port = watch.ports.service;
     let start = Instant::now();
     // It has stood for longer than the second that it must before it is changed.
@@ -447,12 +457,11 @@ fn attack(watch: &Watch, folder: &Path) -> (usize, usize) {
         std::thread::sleep(Duration::from_millis(2));
     }
     let before = kept(port, folder);
-    let (mut poses, mut with_reflectors) = (0, 0);
+    let mut poses = Poses::default();
     let mut check = |name: &str, work: &dyn Fn()| {
         let start = Instant::now();
         work();
-        let (all, good) = check_poses(name, watch, start);
-        (poses, with_reflectors) = (poses + all, with_reflectors + good);
+        check_poses(name, watch, start, &mut poses);
     };
     check("replay", &|| println!("{} replayed changes", replay(port)));
     check("forgery", &|| println!("{} forged changes", forge(port)));
@@ -477,7 +486,7 @@ fn attack(watch: &Watch, folder: &Path) -> (usize, usize) {
     client.set(FASTEST, Value::Number(2.5)).unwrap();
     assert_eq!(client.get(FASTEST).unwrap().value, Value::Number(2.5));
     assert!(!watch.is_over(), "the attacks took longer than the emulation");
-    (poses, with_reflectors)
+    poses
 }
 
 #[test]
@@ -485,21 +494,30 @@ fn strangers_change_nothing_and_stop_nothing() {
     const NAME: &str = "strangers_change_nothing_and_stop_nothing";
     let Some(image) = image(NAME, "an500", "vehicle").filter(|_| emulator(NAME)) else { return };
     let recording = standing();
-    let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(&image, folder.path()) };
-    let mut seen = None;
-    let look = |watch: &Watch| {
-        // Ends the emulation even if something is found.
-        let _end = End(watch);
-        seen = Some(attack(watch, folder.path()));
-    };
-    let driven = vehicle::drive(&recording, &options, SECONDS, look).unwrap();
-    let (poses, with_reflectors) = seen.unwrap();
-    assert!(agv_tests::faults(&driven).is_empty(), "{:?}", driven.emergencies);
-    // A machine that keeps the encoders waiting adds faults of its own.
-    let least = if agv_tests::is_fair(&driven) { poses * 9 / 10 } else { poses / 2 };
-    assert!(with_reflectors >= least, "{with_reflectors} of {poses} poses with reflectors");
-    assert_eq!(driven.poses.last().unwrap().pose.mode, Mode::Reflectors);
+    // A machine that is too busy for encoders in real time is given some tries.
+    for _ in 0..3 {
+        let folder = tempfile::tempdir().unwrap();
+        let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(&image, folder.path()) };
+        let mut seen = None;
+        let look = |watch: &Watch| {
+            // Ends the emulation even if something is found.
+            let _end = End(watch);
+            seen = Some(attack(watch, folder.path()));
+        };
+        let driven = vehicle::drive(&recording, &options, SECONDS, look).unwrap();
+        let Poses { all, with_reflectors, has_lost } = seen.unwrap();
+        assert!(agv_tests::faults(&driven).is_empty(), "{:?}", driven.emergencies);
+        // A machine that keeps the encoders waiting adds faults of its own.
+        let is_fair = agv_tests::is_fair(&driven);
+        let least = if is_fair { all * 9 / 10 } else { all / 2 };
+        let last = driven.poses.last().unwrap().pose.mode;
+        let is_held = !has_lost && with_reflectors >= least && last == Mode::Reflectors;
+        if is_held {
+            return;
+        }
+        assert!(!is_fair, "{with_reflectors} of {all} poses with reflectors, lost: {has_lost}, at the end {last:?}");
+    }
+    too_busy(NAME);
 }
 
 struct End<'a>(&'a Watch<'a>);
