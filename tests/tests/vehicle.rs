@@ -189,9 +189,18 @@ fn check_stack(lines: &[String]) {
 fn a_vehicle_that_is_told_nothing_finds_itself() {
     let Some((image, _alone)) = image("a_vehicle_that_is_told_nothing_finds_itself") else { return };
     let recording = hall();
-    let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions { is_told: false, ..VehicleOptions::new(&image, folder.path()) };
-    let driven = vehicle::drive(&recording, &options, 5.0, |_| ()).unwrap();
+    // Where the machine was too busy for the encoders of a drive, and the vehicle is without them at its end, another one is tried.
+    let mut drives = (0..3).map(|_| {
+        let folder = tempfile::tempdir().unwrap();
+        let options = VehicleOptions { is_told: false, ..VehicleOptions::new(&image, folder.path()) };
+        let driven = vehicle::drive(&recording, &options, 5.0, |_| ()).unwrap();
+        Drive { driven, folder }
+    });
+    let is_without_encoders = |driven: &Driven| driven.poses.last().unwrap().pose.mode == Mode::WithoutOdometry;
+    let judged = drives.find(|drive| agv_tests::is_fair(&drive.driven) || !is_without_encoders(&drive.driven));
+    let Some(Drive { driven, folder }) = judged else {
+        return agv_tests::too_busy("a_vehicle_that_is_told_nothing_finds_itself");
+    };
     assert!(driven.poses.first().is_some_and(|heard| heard.pose.mode == Mode::NotLocalised));
     let last = driven.poses.last().unwrap().pose;
     assert_eq!((last.mode, last.health.start_search), (Mode::Reflectors, Relocalization::Idle));
