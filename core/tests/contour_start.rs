@@ -210,6 +210,35 @@ fn between_two_things_of_which_one_was_moved_no_place_is_told() {
     }
 }
 
+/// A hall of 12 m by 8 m that looks the same from the other end but for a cabinet, and boxes on its floor that no map has.
+fn cabinet_hall(boxes: usize) -> Walls {
+    let mut walls = vec![[0.0, 0.0, 12.0, 0.0], [12.0, 0.0, 12.0, 8.0], [12.0, 8.0, 0.0, 8.0], [0.0, 8.0, 0.0, 0.0]];
+    walls.extend([[0.0, 1.8, 1.0, 1.8], [1.0, 1.8, 1.0, 4.2], [1.0, 4.2, 0.0, 4.2]]);
+    for (x, y) in [(5.0, 4.6), (7.2, 2.2), (3.6, 1.4), (8.4, 4.4), (4.2, 6.4), (6.0, 0.9)].into_iter().take(boxes) {
+        let (right, top) = (x + 0.8, y + 0.8);
+        walls.extend([[x, y, right, y], [right, y, right, top], [right, top, x, top], [x, top, x, y]]);
+    }
+    walls
+}
+
+/// The more is seen that fits neither of two places, the more must tell them apart.
+#[test]
+fn a_second_place_may_be_less_good_where_much_fits_neither() {
+    let map = map(&cabinet_hall(0));
+    let truth = Pose::new(6.5, 3.8, -1.0);
+    for boxes in [0, 1, 5, 6] {
+        let (found, _) = answer(&mut Box::default(), &cabinet_hall(boxes), &map, &truth, 3000);
+        match found {
+            PlaceAnswer::Found(fix) => assert!(boxes <= 1 && is_near(&fix.pose, &truth), "{boxes}: {found:?}"),
+            PlaceAnswer::Ambiguous(one, other) => {
+                let image = Pose::new(5.5, 4.2, PI - 1.0);
+                assert!(boxes >= 5 && is_near(&one.pose, &truth) && is_near(&other.pose, &image), "{found:?}");
+            }
+            _ => panic!("{boxes}: {found:?}"),
+        }
+    }
+}
+
 /// What a controller does: events, and slices of the search in between.
 struct Switched {
     search: Box<StartSearch<Places<'static, 400, 4096>>>,
