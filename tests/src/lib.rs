@@ -40,7 +40,11 @@ const LONGEST_WAIT: f64 = 0.012;
 /// So is one that keeps the emulated board waiting for longer, which is silent meanwhile, s.
 const LONGEST_GAP: f64 = 0.04;
 
-/// Whether neither the encoders nor the board was kept waiting by the machine: the board hears encoders late otherwise, and says so.
+/// So is one that sends what the laser saw later than this, s: it is silent 75 ms after a revolution should have come.
+const LONGEST_LASER_DELAY: f64 = 0.05;
+
+/// Whether neither the encoders, nor the laser, nor the board was kept waiting by the machine: the board hears them late otherwise, and
+/// says so.
 #[must_use]
 pub fn is_fair(driven: &Driven) -> bool {
     let mut heard = driven.poses.iter().map(|pose| pose.heard).filter(|heard| *heard > driven.begin).peekable();
@@ -48,18 +52,25 @@ pub fn is_fair(driven: &Driven) -> bool {
     while let (Some(one), Some(next)) = (heard.next(), heard.peek()) {
         gap = gap.max((*next - one).as_secs_f64());
     }
-    let [stall, delay, gap] = [driven.longest_stall, driven.longest_delay, gap].map(|longest| 1e3 * longest);
-    println!("longest stall {stall:.0} ms, longest delay {delay:.0} ms, longest gap {gap:.0} ms");
-    driven.longest_stall + driven.longest_delay < LONGEST_WAIT && 1e-3 * gap < LONGEST_GAP
+    let Driven { longest_stall: stall, longest_delay: delay, longest_laser_delay: laser, .. } = *driven;
+    let [shown_stall, shown_delay, shown_gap, shown_laser] = [stall, delay, gap, laser].map(|longest| 1e3 * longest);
+    println!(
+        "longest stall {shown_stall:.0} ms, longest delay {shown_delay:.0} ms, longest gap {shown_gap:.0} ms, laser late by \
+         {shown_laser:.0} ms"
+    );
+    stall + delay < LONGEST_WAIT && gap < LONGEST_GAP && laser < LONGEST_LASER_DELAY
 }
 
-/// Emergencies that tell of a fault. Late encoders (7305h, 7306h) are none on a drive that was not fair, nor while the encoders are set up,
-/// when the drive begins.
+/// Emergencies that tell of a fault. Late encoders (7305h, 7306h) and a late laser (7300h) are none on a drive that was not fair, nor are
+/// encoders while they are set up, when the drive begins.
 #[must_use]
 pub fn faults(driven: &Driven) -> Vec<&HeardEmergency> {
     let until = driven.begin + SETTING_UP;
     let is_fair = is_fair(driven);
-    let is_machine =
-        |heard: &HeardEmergency| matches!(heard.emergency.code, 0x7305 | 0x7306) && (!is_fair || heard.heard < until);
+    let is_machine = |heard: &HeardEmergency| match heard.emergency.code {
+        0x7305 | 0x7306 => !is_fair || heard.heard < until,
+        0x7300 => !is_fair,
+        _ => false,
+    };
     driven.emergencies.iter().filter(|heard| heard.emergency.code != 0 && !is_machine(heard)).collect()
 }

@@ -343,6 +343,7 @@ impl Play<'_> {
             first: self.first,
             longest_stall: 0.0,
             longest_delay: 0.0,
+            longest_laser_delay: 0.0,
         })
     }
 }

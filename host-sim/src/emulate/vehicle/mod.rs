@@ -81,6 +81,9 @@ pub struct Driven {
     /// Longest time that this machine kept a thread of the emulator waiting for a core within a fiftieth of a second, s. Not known, and 0,
     /// where the machine does not run Linux.
     pub longest_delay: f64,
+    /// Longest time by which this machine sent what the laser saw later than it was due, s. A laser that says nothing for 200 ms is
+    /// silent.
+    pub longest_laser_delay: f64,
 }
 
 /// The settings of a vehicle that is as the recording says, in the emulator's network.
@@ -183,5 +186,6 @@ pub fn drive(
     let Heard { poses, emergencies, begin, longest_stall, longest_delay } =
         heard.into_inner().unwrap_or_else(PoisonError::into_inner);
     let begin = begin.ok_or(VehicleError::NotLocalised(poses.last().map(|heard| heard.pose.mode)))?;
-    Ok(Driven { log, stream, poses, emergencies, begin, first, longest_stall, longest_delay })
+    let longest_laser_delay = sensor.longest_delay();
+    Ok(Driven { log, stream, poses, emergencies, begin, first, longest_stall, longest_delay, longest_laser_delay })
 }

@@ -18,7 +18,7 @@ mod sensor;
 
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -55,6 +55,8 @@ pub struct Nav350 {
     speed: f64,
     started: Instant,
     sensor: Mutex<Sensor>,
+    /// Longest time by which an answer came after the end of its turn, since [`Nav350::begin`], us.
+    longest_delay: AtomicU64,
 }
 
 impl Nav350 {
@@ -64,7 +66,7 @@ impl Nav350 {
         let clock = SensorClockOptions { start: options.clock_start, ..SensorClockOptions::default() };
         let sensor = Sensor::new(drive, clock, options.dialect, options.stands).with_gap(options.gap);
         let sensor = Mutex::new(sensor);
-        Self { speed: options.speed, started: Instant::now(), sensor }
+        Self { speed: options.speed, started: Instant::now(), sensor, longest_delay: AtomicU64::new(0) }
     }
 
     /// The speed that the sensor was told last.
@@ -88,6 +90,14 @@ impl Nav350 {
     pub fn begin(&self, time: Instant) {
         let seconds = time.saturating_duration_since(self.started).as_secs_f64() * self.speed;
         self.sensor().begin(seconds);
+        self.longest_delay.store(0, Ordering::Relaxed);
+    }
+
+    /// Longest time by which this machine sent a turn later than it was due, since [`Nav350::begin`], s. Of no use for a drive that goes on,
+    /// whose turns are due when they are seen.
+    #[must_use]
+    pub fn longest_delay(&self) -> f64 {
+        1e-6 * self.longest_delay.load(Ordering::Relaxed) as f64
     }
 
     /// Serves every connection, until `is_stopped`.
@@ -131,9 +141,12 @@ impl Nav350 {
         let mut connection = Connection::default();
         let mut buffer = vec![0; 1 << 16];
         while !is_stopped.load(Ordering::Relaxed) {
+            let due = connection.due();
             let promised = connection.poll(&self.sensor(), self.now());
             if let Some(bytes) = promised {
                 stream.write_all(&bytes)?;
+                let delay = due.map_or(0.0, |due| (self.now() - due) / self.speed);
+                self.longest_delay.fetch_max((1e6 * delay) as u64, Ordering::Relaxed);
                 continue;
             }
             // What has been due for a while waits for a turn that has not ended.
