@@ -216,7 +216,8 @@ impl Refining {
         let pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
         self.pose = pose;
         self.iteration += 1;
-        if iteration >= FAR_ITERATIONS {
+        // The next one may be the last.
+        if self.iteration >= FAR_ITERATIONS {
             let distance = DEVIATION * libm::sqrtf(sums.scatter());
             self.tolerance = (TOLERATED * distance).clamp(TOLERANCE.1, TOLERANCE.0);
         }
