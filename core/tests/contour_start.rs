@@ -112,14 +112,18 @@ fn without_a_map_or_surfaces_nothing_is_found() {
     assert_eq!(answer(&mut Box::default(), &nothing, &map(&room()), &place, 3000).0, PlaceAnswer::TooFew);
 }
 
+/// The sides of a box of that size, whose lower left corner is there.
+fn sides((x, y): (f64, f64), size: f64) -> [[f64; 4]; 4] {
+    let (right, top) = (x + size, y + size);
+    [[x, y, right, y], [right, y, right, top], [right, top, x, top], [x, top, x, y]]
+}
+
 /// Two walls 16 m apart whose ends are out of sight, and boxes of 1 m between them, of which one was moved along by so much.
 fn boxes(places: &[(f64, f64)], moved: f64) -> Walls {
     let mut walls = vec![[-80.0, -8.0, 80.0, -8.0], [-80.0, 8.0, 80.0, 8.0]];
     for (number, (x, y)) in places.iter().enumerate() {
         let x = if number == 0 { x + moved } else { *x };
-        let corners = [[x, *y], [x + 1.0, *y], [x + 1.0, y + 1.0], [x, y + 1.0]];
-        let sides = corners.iter().zip(corners.iter().cycle().skip(1));
-        walls.extend(sides.map(|([ax, ay], [bx, by])| [*ax, *ay, *bx, *by]));
+        walls.extend(sides((x, *y), 1.0));
     }
     walls
 }
@@ -214,10 +218,8 @@ fn between_two_things_of_which_one_was_moved_no_place_is_told() {
 fn cabinet_hall(boxes: usize) -> Walls {
     let mut walls = vec![[0.0, 0.0, 12.0, 0.0], [12.0, 0.0, 12.0, 8.0], [12.0, 8.0, 0.0, 8.0], [0.0, 8.0, 0.0, 0.0]];
     walls.extend([[0.0, 1.8, 1.0, 1.8], [1.0, 1.8, 1.0, 4.2], [1.0, 4.2, 0.0, 4.2]]);
-    for (x, y) in [(5.0, 4.6), (7.2, 2.2), (3.6, 1.4), (8.4, 4.4), (4.2, 6.4), (6.0, 0.9)].into_iter().take(boxes) {
-        let (right, top) = (x + 0.8, y + 0.8);
-        walls.extend([[x, y, right, y], [right, y, right, top], [right, top, x, top], [x, top, x, y]]);
-    }
+    let places = [(5.0, 4.6), (7.2, 2.2), (3.6, 1.4), (8.4, 4.4), (4.2, 6.4), (6.0, 0.9)];
+    walls.extend(places.into_iter().take(boxes).flat_map(|place| sides(place, 0.8)));
     walls
 }
 

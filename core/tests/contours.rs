@@ -253,20 +253,20 @@ fn a_kept_map_gives_what_is_around_and_refuses_what_is_not_in_order() {
     assert!((TILE - 4.0).abs() < 1e-12);
 }
 
-/// A nook 3 m wide has moved. The other walls are seen to a centimetre, so what is off by more says little.
+/// The front of a cupboard on a wall has moved. The walls are seen to a centimetre, so what is off by more says little.
 #[test]
 fn what_was_moved_by_less_than_a_decimetre_takes_the_pose_along_by_millimetres() {
     let truth = Pose::new(4.0, 1.0, 0.3);
-    let nook = |by: f64| -> Walls {
+    let furnished = |by: f64| -> Walls {
         let top = -1.5 + by;
         [room(), vec![[1.0, -3.0, 1.0, top], [1.0, top, 3.5, top], [3.5, top, 3.5, -3.0]]].concat()
     };
     for by in [0.06, 0.08, 0.1] {
         for seed in 1..=8 {
             let (mut matcher, mut noise) = (ContourMatcher::default(), Noise(seed));
-            see(&mut matcher, &nook(0.0), &truth, LASERS[2], &mut noise);
+            see(&mut matcher, &furnished(0.0), &truth, LASERS[2], &mut noise);
             assert!(matcher.keep(&truth));
-            see(&mut matcher, &nook(by), &truth, LASERS[2], &mut noise);
+            see(&mut matcher, &furnished(by), &truth, LASERS[2], &mut noise);
             let found = matcher.align(&Prediction::by_odometry(&truth, &Pose::default())).unwrap().pose;
             let error = truth.between(&found);
             assert!(error.position().norm() < 0.0038, "moved by {by}, seed {seed}: {error:?}");

@@ -53,10 +53,8 @@ pub fn is_fair(driven: &Driven) -> bool {
         gap = gap.max((*next - one).as_secs_f64());
     }
     let Driven { longest_stall: stall, longest_delay: delay, longest_laser_delay: laser, .. } = *driven;
-    let [shown_stall, shown_delay, shown_gap, shown_laser] = [stall, delay, gap, laser].map(|longest| 1e3 * longest);
     println!(
-        "longest stall {shown_stall:.0} ms, longest delay {shown_delay:.0} ms, longest gap {shown_gap:.0} ms, laser late by \
-         {shown_laser:.0} ms"
+        "longest stall {stall:.3} s, longest delay {delay:.3} s, longest gap {gap:.3} s, laser late by {laser:.3} s"
     );
     stall + delay < LONGEST_WAIT && gap < LONGEST_GAP && laser < LONGEST_LASER_DELAY
 }
