@@ -22,6 +22,7 @@ mod key_scans;
 mod landmark_observation;
 mod landmark_use;
 mod landmarks;
+mod laser_odometry;
 mod localizer;
 mod mapping;
 mod misuse;

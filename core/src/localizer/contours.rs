@@ -1,14 +1,16 @@
 //! Correcting the pose by the contours of a kept map: a scan is used as a whole, at the time of its middle.
 
-use super::{Capacities, ContourSearch, Localizer};
+use super::{Capacities, ContourSearch, Event, Localizer};
 use crate::contours::KeptMapError;
 use crate::filter::{Ekf, PoseObservation};
 use crate::geometry::Pose;
 use crate::maps::{MapView, Verdict};
 use crate::measurement::{LaserId, Scan, Time};
 use crate::sources::{
-    ContourOutcome, FindContours, FindFeatures, LandmarkMaps, LaserPlace, LendContours, ScanBehind, see_contours,
+    ContourOutcome, FindContours, FindFeatures, LandmarkMaps, LaserAtStart, LaserPlace, LendContours, ScanBehind,
+    see_contours,
 };
+use crate::state::{LandmarkSource, LandmarkUse};
 
 /// While reflectors have the position as well as this, m, contours do not correct it.
 const BY_REFLECTORS: f64 = 0.02;
@@ -148,6 +150,48 @@ impl<C: Capacities> Localizer<C> {
     /// Makes the scan one of the way behind if it is time for one.
     pub(super) fn keep_contours_behind(&mut self, laser: &LaserPlace) {
         self.behind.keep(&mut self.contours, self.slam.parts().0, laser);
+    }
+
+    /// Whether surfaces are followed where no landmark is in sight: contours have nothing else to do then.
+    fn follows_surfaces(&self) -> bool {
+        let parameters = &self.parameters;
+        let is_free = !parameters.maps.slam && !self.contours.has_map();
+        is_free && C::Contours::KEYS > 0 && parameters.sources.contours && parameters.protection
+    }
+
+    /// Lets laser odometry go on by what the first laser has told, after its landmarks have corrected the pose.
+    #[inline(never)]
+    pub(super) fn follow_surfaces(&mut self, event: &Event) {
+        if event.laser() != Some(LaserId::FIRST) || !self.follows_surfaces() {
+            return;
+        }
+        let is_fixed = |seen: &&LandmarkUse| {
+            seen.verdict == Verdict::Accepted
+                && seen.landmark.is_some_and(|(source, _)| source == LandmarkSource::Fixed)
+        };
+        self.laser_odometry.use_landmarks(self.outputs.uses.iter().filter(is_fixed).count());
+        let Event::Scan(scan) = event else { return };
+        let mount = *self.parameters.lasers.first();
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none() && !self.laser_odometry.is_led())
+        else {
+            return self.laser_odometry.stop();
+        };
+        let since = timeline.motions(scan.start, timeline.now());
+        let since = since.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
+        let laser = since.inverse().compose(&mount);
+        let laser = LaserAtStart {
+            in_world: timeline.state().pose.compose(&laser),
+            by_odometry: timeline.odometry_pose().compose(&laser),
+        };
+        // Where features are looked for, its points have been taken.
+        if !(self.parameters.maps.features || self.parameters.maps.dynamic) {
+            let workspace = &mut self.workspace;
+            workspace.path.set(scan.start, &mount, timeline.relative_path(scan.start, scan.end()));
+            self.outputs.has_cut |= self.features.take(&workspace.path, &self.parameters.features, scan);
+        }
+        self.contours.see(self.features.points());
+        self.laser_odometry.follow(&mut self.contours, &laser);
+        self.outputs.has_cut |= self.contours.has_cut();
     }
 
     fn tell_contours(&mut self, time: Time, laser: LaserId, outcome: &ContourOutcome, is_used: bool) {

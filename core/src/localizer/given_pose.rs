@@ -48,6 +48,7 @@ impl<C: Capacities> Localizer<C> {
         }
         // Whoever has searched for it may have used the room of what was loaded.
         self.contours.begin_anew();
+        self.laser_odometry.stop();
         self.lost = None;
         self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
         if !is_past {

@@ -20,8 +20,8 @@ use crate::measurement::{LaserId, Reflectors, Scan, Time};
 use crate::odometry::{GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
 use crate::sensing::detect_reflectors;
 use crate::sources::{
-    AddLandmarks, Aid, AidOutcome, ContoursBehind, FindContours, FindFeatures, GyroSource, LandmarkMaps, LendLandmarks,
-    Source, Statuses, Workspace, correct_by_aid, see_reflectors,
+    AddLandmarks, Aid, AidOutcome, ContoursBehind, FindContours, FindFeatures, GyroSource, LandmarkMaps, LaserOdometry,
+    LendLandmarks, Source, Statuses, Workspace, correct_by_aid, see_reflectors,
 };
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
@@ -50,6 +50,7 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) contours: C::Contours,
     pub(super) behind: ContoursBehind,
     pub(super) contour_correction: ContourCorrection,
+    pub(super) laser_odometry: LaserOdometry,
     pub(super) workspace: Workspace,
     pub(super) outputs: Outputs,
 }
@@ -142,6 +143,7 @@ impl<C: Capacities> Localizer<C> {
             contours: C::Contours::new(),
             behind: ContoursBehind::new(),
             contour_correction: ContourCorrection::None,
+            laser_odometry: LaserOdometry::new(),
             workspace: Workspace::default(),
             outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
@@ -243,6 +245,7 @@ impl<C: Capacities> Localizer<C> {
         }
         if let Some(before) = before {
             self.check(&before, revolution_of, event);
+            self.follow_surfaces(event);
             self.separate(event.laser());
         }
         self.publish(sees);
@@ -447,7 +450,8 @@ impl<C: Capacities> Localizer<C> {
             by_features: distance.feature <= limits.dead_reckoning_from,
         };
         let outage = self.outage.map(|outage| outage.reason);
-        let motion = remark_on_motion(&self.integrity, self.gyro.is_some(), timeline.now());
+        let is_elsewhere = self.separation.contradicts_surfaces();
+        let motion = remark_on_motion(&self.integrity, self.gyro.is_some(), is_elsewhere, timeline.now());
         let (mode, reason) = supervise(self.lost, outage, motion, support, &self.integrity, timeline.now());
         self.outputs.pose = PoseOutput {
             time: timeline.now(),

@@ -36,6 +36,9 @@ impl<C: Capacities> Localizer<C> {
             }
         }
         self.tell_contours_pose(&mount, &from);
+        if laser == Some(LaserId::FIRST) {
+            self.separation.hear_laser(self.laser_odometry.pose(self.timeline.odometry_pose()));
+        }
         self.separation.doubt_laser(self.integrity.suspect() == Some(Suspect::Laser));
         let square = self.integrity.innovations.mean_normalised_square();
         self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));

@@ -13,12 +13,12 @@ pub(super) struct Support {
     pub by_features: bool,
 }
 
-/// What a gyro, if there is one, and the wheels say of each other.
-pub(super) fn remark_on_motion(integrity: &Integrity, has_gyro: bool, now: Time) -> Option<Reason> {
+/// What a gyro, if there is one, the wheels, and surfaces where they lead elsewhere say of each other.
+pub(super) fn remark_on_motion(integrity: &Integrity, has_gyro: bool, is_elsewhere: bool, now: Time) -> Option<Reason> {
     let turns = &integrity.turns;
     let fault = if has_gyro { turns.fault(now).map(|_| Reason::GyroFault) } else { None };
     let slips = integrity.redundancy.slips(now) || (has_gyro && turns.slips(now));
-    fault.or_else(|| slips.then_some(Reason::WheelsSlip))
+    fault.or_else(|| slips.then_some(Reason::WheelsSlip)).or_else(|| is_elsewhere.then_some(Reason::OdometryDisagrees))
 }
 
 /// The mode, and why it is so. `lost` and `outage` say why there is no pose, and why there is no odometry; `motion` is what gyro and

@@ -40,6 +40,14 @@ impl SolutionBound {
         self.after(&Growth::NONE)
     }
 
+    /// Whether the pose is further from the solution than its bound allows.
+    #[must_use]
+    pub fn is_exceeded(&self) -> bool {
+        [&self.position, &self.heading]
+            .into_iter()
+            .any(|bound| bound.apart > bound.factor * libm::sqrt(not_negative(bound.variance)))
+    }
+
     /// After a motion.
     #[must_use]
     pub fn after(&self, growth: &Growth) -> ProtectionLevel {

@@ -6,6 +6,7 @@
 //! left out again. So each solution costs the same however many landmarks are seen.
 
 mod assumed;
+mod by_surfaces;
 mod contradiction;
 mod creep;
 mod envelope;
@@ -15,11 +16,13 @@ mod late_clock;
 mod misfit;
 mod sensor_information;
 mod solution;
+mod unheard;
 
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, ONE_KNOCK, fault_free};
+pub use by_surfaces::BySurfaces;
 use contradiction::Contradiction;
 use creep::Creeps;
 pub use envelope::{Bound, Envelope, Growth, SolutionBound};
@@ -31,6 +34,7 @@ use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
 pub use solution::{Drift, Laser, OdometryErrors, Solution, Step};
+use unheard::Unheard;
 
 use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
@@ -99,6 +103,9 @@ pub struct SolutionSeparation {
     /// Whether the corrections say that the laser has moved.
     is_laser_doubted: bool,
     odometry: Solution,
+    /// Of laser odometry, where landmarks do not lead.
+    by_surfaces: Option<BySurfaces>,
+    unheard: Unheard,
     /// Of a vehicle with a gyro.
     gyro: Option<GyroSeparation>,
     told: SensorInformation,
@@ -125,6 +132,8 @@ struct Bounds {
     wheels: Option<SolutionBound>,
     /// By what contradicts.
     widening: ProtectionLevel,
+    /// Whether the pose is elsewhere than laser odometry can be.
+    is_elsewhere: bool,
 }
 
 impl Bounds {
@@ -136,6 +145,7 @@ impl Bounds {
             odometry_errors: odometry.odometry_errors(),
             wheels: None,
             widening: ProtectionLevel::NONE,
+            is_elsewhere: false,
         }
     }
 }
@@ -170,6 +180,8 @@ impl SolutionSeparation {
             late_clock: LateClock::new(false),
             is_laser_doubted: false,
             odometry: nowhere.clone(),
+            by_surfaces: None,
+            unheard: Unheard::new(),
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
             misfit: Misfit::NONE,
@@ -231,6 +243,8 @@ impl SolutionSeparation {
         self.creeps.begin(&self.all);
         self.late_clock = LateClock::new(self.mounting.is_none());
         self.restart_odometry();
+        self.by_surfaces = None;
+        self.unheard.begin(time);
         self.leave_outs.clear();
         if self.mounting.is_none() {
             self.mounting = Some(self.free_mounting(time));
@@ -337,6 +351,9 @@ impl SolutionSeparation {
         self.odometry_pose = *odometry_pose;
         self.pending = Pending { last: self.pending.last, ..Pending::NONE };
         self.pose = self.pose.compose(&displacement);
+        if let Some(by_surfaces) = &mut self.by_surfaces {
+            by_surfaces.pose = by_surfaces.pose.compose(&displacement);
+        }
     }
 
     /// How a displacement since the last step changes with the errors of the odometry.
@@ -429,6 +446,18 @@ impl SolutionSeparation {
         let (place, one) = self.leave_outs.iter_mut().enumerate().min_by_key(|(_, one)| one.keys.len())?;
         one.keys.push(key).ok()?;
         Some(place)
+    }
+
+    /// Takes that the first laser has told something, and where laser odometry has R now; none where landmarks lead.
+    pub fn hear_laser(&mut self, by_surfaces: Option<BySurfaces>) {
+        self.by_surfaces = by_surfaces;
+        self.unheard.hear(self.time);
+    }
+
+    /// Whether the pose is elsewhere than laser odometry can be.
+    #[must_use]
+    pub const fn contradicts_surfaces(&self) -> bool {
+        self.bounds.is_elsewhere
     }
 
     /// Ends the event: all solutions are corrected, and the protection level of `pose` is found. Innovations are `surprise` times as large
@@ -561,6 +590,8 @@ impl SolutionSeparation {
         self.late_clock.solution().into_iter().for_each(|late| envelope.add(&bound(late, &one_fault)));
         let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
+        let by_surfaces = self.by_surfaces.map(|by_surfaces| by_surfaces.bound(pose, &self.all.entries(), &one_fault));
+        by_surfaces.iter().for_each(|bound| envelope.add(bound));
         let free = found_mounting.into_iter().chain(found_yaw);
         free.for_each(|one| one.add_to(&mut envelope, pose, &one_fault, map_variances));
         let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
@@ -573,6 +604,7 @@ impl SolutionSeparation {
                 position: contradiction.position + misfit.position,
                 heading: contradiction.heading + misfit.heading,
             },
+            is_elsewhere: by_surfaces.is_some_and(|bound| bound.is_exceeded()),
         }
     }
 
@@ -580,7 +612,7 @@ impl SolutionSeparation {
     #[must_use]
     pub fn level(&self) -> ProtectionLevel {
         let Pending { covariance, distance, moved, .. } = &self.pending;
-        let Bounds { envelope, odometry, odometry_errors, wheels, widening } = &self.bounds;
+        let Bounds { envelope, odometry, odometry_errors, wheels, widening, .. } = &self.bounds;
         if *odometry == SolutionBound::UNBOUNDED {
             return ProtectionLevel::UNBOUNDED;
         }
@@ -590,8 +622,10 @@ impl SolutionSeparation {
         if let Some((wheels, gyro)) = wheels.as_ref().zip(self.gyro.as_ref()) {
             level = level.or(&wheels.after(&self.growth_by(gyro.wheels_covariance(), *distance)));
         }
-        let heading = level.heading + widening.heading;
-        ProtectionLevel { position: level.position + widening.position + heading.min(1.0) * distance, heading }
+        let unheard = self.unheard.widening(self.pending.last.map_or(self.time, |motion| motion.end));
+        let heading = level.heading + widening.heading + unheard.heading;
+        let position = level.position + widening.position + unheard.position;
+        ProtectionLevel { position: position + heading.min(1.0) * distance, heading }
     }
 
     /// What a motion of so many m, with that noise, adds to the variances of a solution.

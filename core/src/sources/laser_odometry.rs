@@ -1,0 +1,124 @@
+//! Laser odometry: where the first laser has gone since landmarks last told its pose, by the surfaces around it alone.
+//!
+//! It corrects nothing. Where no landmark is in sight, only it can contradict the odometry of the wheels: each scan is matched to those
+//! behind it, and the wheels tell no more than where to look for it.
+
+use super::FindContours;
+use super::contours::LEAST_SHARE;
+use crate::contours::Prediction;
+use crate::geometry::Pose;
+use crate::integrity::separation::BySurfaces;
+
+/// Landmarks of a fixed map that tell a pose.
+const TELLING: usize = 2;
+
+/// Where more are seen, one revolution does not lose sight of all of them but one.
+const FEW: usize = 3;
+
+/// Scans in a row that lie on no surface seen before, until those behind them are given up: what hides the surfaces passes by.
+const GIVEN_UP: u8 = 2;
+
+/// The laser when its last scan began.
+#[derive(Clone, Copy, Debug)]
+struct Reached {
+    /// By surfaces, in W as landmarks last told it.
+    by_surfaces: Pose,
+    /// In the frame of the odometry.
+    by_odometry: Pose,
+    /// How far it has gone since landmarks told its pose, m.
+    distance: f64,
+    /// Scans in a row that lay on no surface seen before.
+    missed: u8,
+    /// Whether those behind were given up since landmarks told the pose.
+    is_torn: bool,
+}
+
+/// What it has reached.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LaserOdometry {
+    /// Landmarks that were used since the last scan.
+    used: usize,
+    reached: Option<Reached>,
+}
+
+/// A laser as it is when a scan begins.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LaserAtStart {
+    /// In W.
+    pub in_world: Pose,
+    /// In the frame of the odometry.
+    pub by_odometry: Pose,
+}
+
+impl LaserOdometry {
+    pub(crate) const fn new() -> Self {
+        Self { used: 0, reached: None }
+    }
+
+    /// Nothing is known of where it was.
+    pub(crate) const fn stop(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Takes how many landmarks of a fixed map an event has used.
+    pub(crate) const fn use_landmarks(&mut self, count: usize) {
+        self.used = self.used.saturating_add(count);
+    }
+
+    /// Whether landmarks alone lead, so that no scan is needed.
+    pub(crate) const fn is_led(&self) -> bool {
+        self.used > FEW
+    }
+
+    /// Takes a scan, whose points the contours have seen.
+    pub(crate) fn follow(&mut self, contours: &mut impl FindContours, laser: &LaserAtStart) {
+        let is_told = core::mem::take(&mut self.used) >= TELLING;
+        let reached = match self.reached.filter(|_| !is_told) {
+            Some(before) => before.go_on(contours, laser),
+            None => Reached::begin(contours, laser),
+        };
+        self.reached = Some(reached);
+    }
+
+    /// Where R is now; `odometry_pose` is where it is in the frame of the odometry. None where landmarks lead.
+    pub(crate) fn pose(&self, odometry_pose: &Pose) -> Option<BySurfaces> {
+        let reached = self.reached.as_ref().filter(|_| self.used < TELLING)?;
+        Some(BySurfaces {
+            pose: reached.by_surfaces.compose(&reached.by_odometry.between(odometry_pose)),
+            distance: reached.distance,
+            is_torn: reached.is_torn || reached.missed > 0,
+        })
+    }
+}
+
+impl Reached {
+    fn begin(contours: &mut impl FindContours, laser: &LaserAtStart) -> Self {
+        contours.forget_keys();
+        contours.keep(&laser.in_world);
+        Self { by_surfaces: laser.in_world, by_odometry: laser.by_odometry, distance: 0.0, missed: 0, is_torn: false }
+    }
+
+    fn go_on(self, contours: &mut impl FindContours, laser: &LaserAtStart) -> Self {
+        let step = self.by_odometry.between(&laser.by_odometry);
+        let predicted = Prediction::by_odometry(&self.by_surfaces, &step);
+        let found = contours.locate_behind(&predicted).filter(|found| found.share >= LEAST_SHARE);
+        let by_surfaces = found.map_or(predicted.pose, |found| found.pose);
+        let missed = if found.is_some() { 0 } else { self.missed.saturating_add(1) };
+        let is_given_up = missed >= GIVEN_UP;
+        if is_given_up {
+            contours.forget_keys();
+        }
+        // What lies on no surface would lie askew among those behind it.
+        if missed == 0 || is_given_up {
+            contours.keep(&by_surfaces);
+        }
+        let gone = self.by_surfaces.between(&by_surfaces);
+        Self {
+            by_surfaces,
+            by_odometry: laser.by_odometry,
+            distance: self.distance + libm::hypot(gone.x, gone.y),
+            missed: if is_given_up { 0 } else { missed },
+            is_torn: self.is_torn || is_given_up,
+        }
+    }
+}
