@@ -7,7 +7,6 @@ use super::FindContours;
 use super::contours::LEAST_SHARE;
 use crate::contours::Prediction;
 use crate::geometry::Pose;
-use crate::integrity::separation::BySurfaces;
 
 /// Landmarks of a fixed map that tell a pose.
 const TELLING: usize = 2;
@@ -31,6 +30,17 @@ struct Reached {
     missed: u8,
     /// Whether those behind were given up since landmarks told the pose.
     is_torn: bool,
+}
+
+/// Where R is by surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BySurfaces {
+    /// In W.
+    pub pose: Pose,
+    /// How far the laser has gone since landmarks told its pose, m.
+    pub distance: f64,
+    /// Whether there was a step on which surfaces did not show how it has moved.
+    pub is_torn: bool,
 }
 
 /// What it has reached.

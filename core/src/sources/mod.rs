@@ -42,6 +42,7 @@ pub(crate) use key_scans::KeyScans;
 pub(crate) use landmark_maps::{AddLandmarks, LandmarkMaps, LendLandmarks, MapViews, Maps};
 pub use landmark_maps::{Lent, MapKeeping, Own};
 pub(crate) use landmark_slots::LandmarkSlots;
+pub use laser_odometry::BySurfaces;
 pub(crate) use laser_odometry::{LaserAtStart, LaserOdometry};
 pub(crate) use reflectors::see_reflectors;
 pub use sighting::OBSERVATIONS;

@@ -3,6 +3,7 @@
 use super::assumed::Factors;
 use super::envelope::{Bound, SolutionBound};
 use crate::geometry::{Pose, difference, larger_axis};
+use crate::sources::BySurfaces;
 
 /// Random walk of laser odometry: m and rad for a square root of a metre. In simulated aisles of racks it is 8 mm and 0.1 deg off
 /// behind 8 m, in 95 % of the scans.
@@ -12,36 +13,23 @@ const DRIFT: [f64; 2] = [0.005, 0.001];
 /// without being lost.
 const TORN: [f64; 2] = [1.5, 0.6];
 
-/// Where R is by surfaces.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BySurfaces {
-    /// In W.
-    pub pose: Pose,
-    /// How far the laser has gone since landmarks told its pose, m.
-    pub distance: f64,
-    /// Whether there was a step on which surfaces did not show how it has moved.
-    pub is_torn: bool,
-}
-
-impl BySurfaces {
-    /// The bound of a pose; landmarks had told it with that covariance, to which the odometry has added its own.
-    #[must_use]
-    pub fn bound(&self, pose: &Pose, covariance: &[f64; 6], factors: &Factors) -> SolutionBound {
-        let [xx, xy, yy, _, _, heading] = *covariance;
-        let [drift, turn] = DRIFT.map(|deviation| deviation * deviation * self.distance);
-        let [torn, torn_turn] = if self.is_torn { TORN } else { [0.0; 2] };
-        let (x, y) = (self.pose.x - pose.x, self.pose.y - pose.y);
-        SolutionBound {
-            position: Bound {
-                apart: libm::hypot(x, y) + torn,
-                variance: larger_axis(xx, xy, yy) + drift,
-                factor: factors.position,
-            },
-            heading: Bound {
-                apart: libm::fabs(difference(self.pose.theta, pose.theta)) + torn_turn,
-                variance: heading + turn,
-                factor: factors.heading,
-            },
-        }
+/// The bound of a pose by it; landmarks had told that with that covariance, to which the odometry has added its own.
+#[must_use]
+pub fn bound(by_surfaces: &BySurfaces, pose: &Pose, covariance: &[f64; 6], factors: &Factors) -> SolutionBound {
+    let [xx, xy, yy, _, _, heading] = *covariance;
+    let [drift, turn] = DRIFT.map(|deviation| deviation * deviation * by_surfaces.distance);
+    let [torn, torn_turn] = if by_surfaces.is_torn { TORN } else { [0.0; 2] };
+    let (x, y) = (by_surfaces.pose.x - pose.x, by_surfaces.pose.y - pose.y);
+    SolutionBound {
+        position: Bound {
+            apart: libm::hypot(x, y) + torn,
+            variance: larger_axis(xx, xy, yy) + drift,
+            factor: factors.position,
+        },
+        heading: Bound {
+            apart: libm::fabs(difference(by_surfaces.pose.theta, pose.theta)) + torn_turn,
+            variance: heading + turn,
+            factor: factors.heading,
+        },
     }
 }

@@ -22,7 +22,6 @@ use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, ONE_KNOCK, fault_free};
-pub use by_surfaces::BySurfaces;
 use contradiction::Contradiction;
 use creep::Creeps;
 pub use envelope::{Bound, Envelope, Growth, SolutionBound};
@@ -39,6 +38,7 @@ use unheard::Unheard;
 use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
 use crate::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion};
+use crate::sources::BySurfaces;
 use crate::state::ProtectionLevel;
 
 /// Solutions without landmarks, and with a knock in an interval.
@@ -590,7 +590,8 @@ impl SolutionSeparation {
         self.late_clock.solution().into_iter().for_each(|late| envelope.add(&bound(late, &one_fault)));
         let found_mounting = self.mounting.as_ref().filter(|free| free.counts() || self.is_laser_doubted);
         let found_yaw = self.yaw.as_ref().filter(|free| free.has_found_yaw());
-        let by_surfaces = self.by_surfaces.map(|by_surfaces| by_surfaces.bound(pose, &self.all.entries(), &one_fault));
+        let by_surfaces =
+            self.by_surfaces.map(|reached| by_surfaces::bound(&reached, pose, &self.all.entries(), &one_fault));
         by_surfaces.iter().for_each(|bound| envelope.add(bound));
         let free = found_mounting.into_iter().chain(found_yaw);
         free.for_each(|one| one.add_to(&mut envelope, pose, &one_fault, map_variances));
