@@ -72,6 +72,7 @@ struct Counts {
     scan: Count,
     slam: Count,
     behind: Count,
+    blind: Count,
     falko: Count,
     association: Count,
     map_update: Count,
@@ -85,6 +86,7 @@ impl Counts {
             scan: Count::new("scan cycle"),
             slam: Count::new("scan cycle with landmarks and key scans in the state"),
             behind: Count::new("scan cycle with contours of the way behind"),
+            blind: Count::new("scan cycle by laser odometry with all solutions"),
             falko: Count::new("falko on 1440 beams"),
             association: Count::new("association among 1000 reflectors"),
             map_update: Count::new("dynamic map update of 20 keypoints"),
@@ -96,6 +98,7 @@ static BUFFER: ConstStaticCell<LogBuffer> = ConstStaticCell::new(LogBuffer::new(
 static LOCALIZER: StaticCell<Localizer<SlamCapacities>> = StaticCell::new();
 static SLAM: StaticCell<Localizer<SlamCapacities>> = StaticCell::new();
 static BEHIND: StaticCell<Localizer> = StaticCell::new();
+static BLIND: StaticCell<Localizer> = StaticCell::new();
 static POINTS: ConstStaticCell<PointScan<1440>> = ConstStaticCell::new(PointScan::new());
 static DETECTOR: StaticCell<falko::Detector<1440>> = StaticCell::new();
 static MAP: StaticCell<FixedMap<1000>> = StaticCell::new();
@@ -109,6 +112,7 @@ fn main() -> ! {
     let mut localizer: Option<&mut Localizer<SlamCapacities>> = None;
     let mut slam: Option<&mut Localizer<SlamCapacities>> = None;
     let mut behind: Option<&mut Localizer> = None;
+    let mut blind: Option<&mut Localizer> = None;
     let mut detector: Option<&mut falko::Detector<1440>> = None;
     let mut kept: Option<Contours> = None;
     let mut believed: Option<Parameters> = None;
@@ -128,11 +132,18 @@ fn main() -> ! {
                 parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
                 slam = Some(SLAM.init_with(|| Localizer::new(parameters)));
                 behind = Some(BEHIND.init_with(|| Localizer::new(parameters)));
+                blind = Some(BLIND.init_with(|| {
+                    let maps = MapUse { reflectors: true, slam: false, ..parameters.maps };
+                    Localizer::new(Parameters { maps, protection: true, ..parameters })
+                }));
                 kept = Some(Contours::new(&parameters));
                 detector = Some(DETECTOR.init_with(|| falko::Detector::new(header.parameters.features.detector)));
             }
             (Record::Landmarks(landmarks), Some(localizer)) => {
                 localizer.add_landmarks(landmarks).expect("the map has room for the landmarks");
+                if let Some(blind) = &mut blind {
+                    blind.add_landmarks(landmarks).expect("the map has room for the landmarks");
+                }
             }
             (Record::Event(event), Some(localizer)) => {
                 if let (Event::Scan(scan), Some(detector)) = (event, &mut detector) {
@@ -142,8 +153,11 @@ fn main() -> ! {
                 if let Some(kept) = &mut kept {
                     kept.handle(&stopwatch, event);
                 }
-                if let (Some(slam), Some(behind)) = (&mut slam, &mut behind) {
+                if let (Some(slam), Some(behind), Some(blind)) = (&mut slam, &mut behind, &mut blind) {
                     count_scan(&stopwatch, &mut counts.slam, *slam, event);
+                    if !matches!(event, Event::Reflectors(_)) {
+                        count_scan(&stopwatch, &mut counts.blind, *blind, event);
+                    }
                     count_scan(&stopwatch, &mut counts.behind, *behind, event);
                 }
             }
@@ -164,7 +178,7 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut 
     let mut text: String<4096> = String::new();
     let mut output = HostFile::create(c"instructions.csv").expect("the folder can be written");
     writeln!(text, "work,runs,mean,most").expect("the table fits");
-    let Counts { prediction, reflector, scan, slam, behind, falko, association, map_update } = counts;
+    let Counts { prediction, reflector, scan, slam, behind, blind, falko, association, map_update } = counts;
     let [few, many] = search::count(stopwatch, map);
     let [in_map, slice, whole] = kept.counts();
     let [six, twenty] = separation::count(stopwatch);
@@ -177,6 +191,7 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut 
         scan,
         slam,
         behind,
+        blind,
         decode(stopwatch),
         few,
         many,
