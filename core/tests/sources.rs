@@ -177,6 +177,7 @@ fn a_match_of_contours_says_how_far_it_is_from_the_pose() {
         pose,
         information: Matrix3::identity() * 1e4,
         free_axis: None,
+        facing: 0.0,
         share,
         scatter: 1.0,
         of_overlay: [0.0; 2],

@@ -26,6 +26,8 @@ pub struct ContourMatch {
     pub information: Matrix3<f64>,
     /// The unit vector along which the surfaces do not say where the laser is, as in a corridor.
     pub free_axis: Option<ScanPoint>,
+    /// Length of the mean of the normals, weighted: 1 if all surfaces face the same way, 0 in a corridor.
+    pub facing: f32,
     /// Share of the scan's points that lie on surfaces.
     pub share: f32,
     /// Mean square of their distances from the surfaces in that which `information` takes it to be.
@@ -178,6 +180,7 @@ fn in_map<const ROOM: usize>(
         pose: map.origin().compose(&pose),
         information,
         free_axis,
+        facing: found.facing,
         share: share(points, found),
         scatter: found.scatter,
         of_overlay: [0.0; 2],

@@ -46,6 +46,8 @@ pub struct Refinement {
     pub information: Matrix3<f64>,
     /// The sum of the outer products of the normals with themselves, weighted: xx, xy, yy.
     pub directions: [f32; 3],
+    /// Length of the mean of the normals, weighted: 1 if all surfaces face the same way, 0 in a corridor.
+    pub facing: f32,
     /// Points that lie on surfaces.
     pub inliers: u32,
     /// Mean square of their distances from the surfaces, weighted, in that which `information` takes it to be.
@@ -58,6 +60,7 @@ struct Sums {
     information: [f32; 6],
     gradient: [f32; 3],
     directions: [f32; 3],
+    facing: ScanPoint,
     inliers: u32,
     weights: f32,
     squares: f32,
@@ -96,8 +99,15 @@ impl Sums {
             self.add(ScanPoint::new(0.0, 1.0), lever, error.y, weight);
         } else {
             let distance = surface.normal.dot(&error);
-            self.add(surface.normal, lever, distance, weight(distance * distance));
+            let weight = weight(distance * distance);
+            self.facing += surface.normal * weight;
+            self.add(surface.normal, lever, distance, weight);
         }
+    }
+
+    /// See [`Refinement::facing`].
+    fn facing(&self) -> f32 {
+        self.facing.norm() / self.weights.max(f32::MIN_POSITIVE)
     }
 
     /// See [`Refinement::scatter`].
@@ -225,6 +235,7 @@ impl Refining {
             pose,
             information,
             directions: sums.directions,
+            facing: sums.facing(),
             inliers: sums.inliers,
             scatter: sums.scatter(),
         });

@@ -34,6 +34,13 @@ const LEAST_HEADING: f64 = 0.9e-4;
 /// Points are not taken to be nearer their surfaces than this share of the variance that a match takes them to have.
 const LEAST_SCATTER: f64 = 0.03;
 
+/// By what the covariance of a match is multiplied besides if there is a line alone: what bends or turns it is common to its points, as where
+/// a leaning laser meets the floor.
+const LINE: f64 = 16.0;
+
+/// There is if an axis is free and the mean of the normals is longer: in a corridor they cancel out.
+const ONE_SIDED: f32 = 0.3;
+
 /// Where the submap of the way behind is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContoursBehind {
@@ -137,8 +144,10 @@ impl ContoursBehind {
     /// What a match says of the way since the pose in the slot.
     fn compare<S: Slots>(&self, filter: &Ekf<S>, laser: &LaserPlace, found: &ContourMatch) -> Option<Compared> {
         let free = Matrix3::from_diagonal_element(1.0 / (FREE * FREE));
-        let own =
-            (found.information / (INFLATION * f64::from(found.scatter).max(LEAST_SCATTER)) + free).try_inverse()?;
+        let is_line = found.free_axis.is_some() && found.facing > ONE_SIDED;
+        let inflation =
+            if is_line { LINE * INFLATION } else { INFLATION } * f64::from(found.scatter).max(LEAST_SCATTER);
+        let own = (found.information / inflation + free).try_inverse()?;
         // From the frame of the points to the laser, and from the submap to where the laser was.
         let jacobian = turn_back(self.anchor.theta) * found.pose.compose_jacobian_first(&laser.in_points);
         let least = Vector3::new(LEAST_POSITION, LEAST_POSITION, LEAST_HEADING);
