@@ -380,6 +380,12 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         })
     }
 
+    /// The displacement of R between two times, in R at `from`.
+    #[must_use]
+    pub fn displacement(&self, from: Time, to: Time) -> Pose {
+        self.motions(from, to).fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement))
+    }
+
     fn last_motion_until(&self, time: Time) -> Motion {
         let now = self.now();
         let (_, done) = self.last_motion.extrapolate(time).split(now);

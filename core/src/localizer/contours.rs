@@ -123,8 +123,7 @@ impl<C: Capacities> Localizer<C> {
     /// The motion since the scan that was compared with contours before.
     fn step_until(&self, time: Time) -> Pose {
         let from = self.outputs.sources.contours.told.unwrap_or(time);
-        let motions = self.timeline.motions(from, time);
-        motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement))
+        self.timeline.displacement(from, time)
     }
 
     /// Whether scans of the first laser are compared with the contours of the way behind: without a kept map, and with past poses in
@@ -176,8 +175,7 @@ impl<C: Capacities> Localizer<C> {
         else {
             return self.laser_odometry.stop();
         };
-        let since = timeline.motions(scan.start, timeline.now());
-        let since = since.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
+        let since = timeline.displacement(scan.start, timeline.now());
         let laser = since.inverse().compose(&mount);
         let laser = LaserAtStart {
             in_world: timeline.state().pose.compose(&laser),

@@ -337,8 +337,7 @@ impl<C: Capacities> Localizer<C> {
         let is_asked = self.lost.is_none() && self.parameters.uses_reflectors() && self.has_reflectors();
         let Some(timeline) = self.timeline.begun().filter(|_| is_asked) else { return };
         let Some(mount) = self.parameters.lasers.mount(scan.laser) else { return };
-        let since = timeline.motions(scan.start, timeline.now());
-        let since = since.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement));
+        let since = timeline.displacement(scan.start, timeline.now());
         let first = timeline.odometry_pose().compose(&since.inverse()).compose(mount);
         let path = &mut self.workspace.path;
         path.set(scan.start, mount, timeline.relative_path(scan.start, scan.end()));

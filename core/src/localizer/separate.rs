@@ -50,8 +50,7 @@ impl<C: Capacities> Localizer<C> {
         if self.lost.is_some() {
             return;
         }
-        let motions = self.timeline.motions(*time, self.timeline.now());
-        let since = motions.fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement)).compose(mount);
+        let since = self.timeline.displacement(*time, self.timeline.now()).compose(mount);
         let jacobian = seen.pose.compose_jacobian_first(&since);
         let covariance = jacobian * seen.covariance_matrix() * jacobian.transpose();
         let told = SensorInformation::of_pose(&seen.pose.compose(&since), &covariance, &seen.shared, &from.sensor);
