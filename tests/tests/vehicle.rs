@@ -5,19 +5,21 @@
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use agv_core::geometry::Pose;
 use agv_core::localizer::Event;
-use agv_core::measurement::EncoderFault;
+use agv_core::measurement::{EncoderFault, Time};
 use agv_core::state::{LaserHealth, Mode, Relocalization};
 use agv_host_sim::acceptance::{self, Verdict};
 use agv_host_sim::drive::{Figures, Track};
 use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, ServiceError};
+use agv_host_sim::live::stream::StreamSummary;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::Comparisons;
 use agv_host_sim::simulate::scenario::{MotionReport, Scenario};
@@ -25,6 +27,7 @@ use agv_host_sim::simulate::simulate;
 use agv_host_sim::{log, replay};
 use agv_settings::leaf::Value;
 use agv_settings::service::Refusal;
+use agv_tests::sound_drive;
 
 /// One emulator at a time: they work in real time.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -53,16 +56,6 @@ fn drive(image: &Path, recording: &Recording, seconds: f64, watch: impl FnOnce(&
     let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(image, folder.path()) };
     let driven = vehicle::drive(recording, &options, seconds, watch).unwrap();
     Drive { driven, folder }
-}
-
-/// A drive for which the machine had time. One that is too busy for encoders in real time is given some tries.
-fn fair_drive(test: &str, image: &Path, recording: &Recording, seconds: f64) -> Option<Drive> {
-    let mut drives = (0..5).map(|_| drive(image, recording, seconds, |_| ()));
-    let fair = drives.find(|drive| agv_tests::is_fair(&drive.driven));
-    if fair.is_none() {
-        agv_tests::too_busy(test);
-    }
-    fair
 }
 
 /// What the firmware said is what the host says, bit for bit.
@@ -99,17 +92,57 @@ fn wait_for_drive(watch: &Watch, seconds: f64) {
     });
 }
 
+/// A drive on a machine that keeps the encoders waiting for so long.
+fn waiting(longest_stall: f64) -> Driven {
+    let stream = StreamSummary::default();
+    let (poses, emergencies) = (Vec::new(), Vec::new());
+    let (begin, first) = (Instant::now(), Time::default());
+    Driven {
+        log: PathBuf::new(),
+        stream,
+        poses,
+        emergencies,
+        begin,
+        first,
+        longest_stall,
+        longest_delay: 0.0,
+        longest_laser_delay: 0.0,
+    }
+}
+
+#[test]
+fn a_wrong_drive_is_tried_again_only_where_the_machine_was_busy() {
+    // How long each drive waits, and whether it is right; how many are made, and whether one is judged to be sound.
+    let judged = |drives: &[(f64, bool)]| {
+        let made = AtomicUsize::new(0);
+        let drive = || {
+            let (wait, is_right) = drives[made.fetch_add(1, Ordering::Relaxed)];
+            (waiting(wait), is_right)
+        };
+        let sound =
+            catch_unwind(AssertUnwindSafe(|| sound_drive("", drive, |drive| &drive.0, |drive| assert!(drive.1))));
+        (made.into_inner(), sound.is_ok_and(|drive| drive.is_some()))
+    };
+    assert_eq!(judged(&[(0.1, true)]), (1, true));
+    assert_eq!(judged(&[(0.02, false), (0.0, true)]), (2, true));
+    assert_eq!(judged(&[(0.0, false), (0.0, true)]), (1, false));
+    assert_eq!(judged(&[(0.02, false); 5]), (5, false));
+}
+
 #[test]
 fn it_drives_through_the_hall() {
     let Some((image, _alone)) = image("it_drives_through_the_hall") else { return };
     let recording = hall();
     let seconds = if std::env::var_os("AGV_LONG").is_some() { f64::MAX } else { 20.0 };
-    let Some(drive) = fair_drive("it_drives_through_the_hall", &image, &recording, seconds) else { return };
-    let errors = vehicle::errors(&drive.driven, &recording).unwrap();
-    println!("{errors:?}");
-    assert!(errors.poses > 1500 && errors.localised_share > 0.9, "{errors:?}");
-    assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{errors:?}");
-    assert!(agv_tests::faults(&drive.driven).is_empty(), "{:?}", drive.driven.emergencies);
+    let judge = |drive: &Drive| {
+        let errors = vehicle::errors(&drive.driven, &recording).unwrap();
+        println!("{errors:?}");
+        assert!(errors.poses > 1500 && errors.localised_share > 0.9, "{errors:?}");
+        assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{errors:?}");
+        assert!(agv_tests::faults(&drive.driven).is_empty(), "{:?}", drive.driven.emergencies);
+    };
+    let drive = || drive(&image, &recording, seconds, |_| ());
+    let Some(drive) = sound_drive("it_drives_through_the_hall", drive, |drive| &drive.driven, judge) else { return };
     assert_replayed(&drive, 2000);
     let lines = firmware_log(&image, drive.folder.path());
     println!("{lines:#?}");
@@ -127,14 +160,17 @@ fn vehicles_of_other_kinds_drive_through_the_hall() {
         scenario.laser.scans = false;
         scenario.vehicle.reports = reports;
         let recording = simulate(&scenario).unwrap().recording;
-        let Some(drive) = fair_drive(TEST, &image, &recording, 12.0) else { return };
-        let errors = vehicle::errors(&drive.driven, &recording).unwrap();
-        println!("{reports:?} {errors:?}");
-        assert!(errors.poses > 900 && errors.localised_share > 0.9, "{reports:?} {errors:?}");
-        assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{reports:?} {errors:?}");
-        // Before, it has said that it does not know where it is, and that it has not stood for long enough to be told.
-        let mut faults = agv_tests::faults(&drive.driven).into_iter();
-        assert!(faults.all(|heard| heard.heard < drive.driven.begin), "{reports:?} {:?}", drive.driven.emergencies);
+        let judge = |drive: &Drive| {
+            let errors = vehicle::errors(&drive.driven, &recording).unwrap();
+            println!("{reports:?} {errors:?}");
+            assert!(errors.poses > 900 && errors.localised_share > 0.9, "{reports:?} {errors:?}");
+            assert!(errors.position_p95_m < 0.02 && errors.heading_p95_deg < 0.1, "{reports:?} {errors:?}");
+            // Before, it has said that it does not know where it is, and that it has not stood for long enough to be told.
+            let mut faults = agv_tests::faults(&drive.driven).into_iter();
+            assert!(faults.all(|heard| heard.heard < drive.driven.begin), "{reports:?} {:?}", drive.driven.emergencies);
+        };
+        let drive = || drive(&image, &recording, 12.0, |_| ());
+        let Some(drive) = sound_drive(TEST, drive, |drive| &drive.driven, judge) else { return };
         assert_replayed(&drive, 900);
         let given = first_given(&drive.driven).unwrap().between(&recording.truth[0].pose);
         assert!(given.x.hypot(given.y) < 0.05, "{reports:?}: it was said to be {given:?} beside its place");
@@ -189,25 +225,23 @@ fn check_stack(lines: &[String]) {
 fn a_vehicle_that_is_told_nothing_finds_itself() {
     let Some((image, _alone)) = image("a_vehicle_that_is_told_nothing_finds_itself") else { return };
     let recording = hall();
-    // Where the machine was too busy for the encoders of a drive, and the vehicle is without them at its end, another one is tried.
-    let mut drives = (0..3).map(|_| {
+    let told_nothing = || {
         let folder = tempfile::tempdir().unwrap();
         let options = VehicleOptions { is_told: false, ..VehicleOptions::new(&image, folder.path()) };
         let driven = vehicle::drive(&recording, &options, 5.0, |_| ()).unwrap();
         Drive { driven, folder }
-    });
-    let is_without_encoders = |driven: &Driven| driven.poses.last().unwrap().pose.mode == Mode::WithoutOdometry;
-    let judged = drives.find(|drive| agv_tests::is_fair(&drive.driven) || !is_without_encoders(&drive.driven));
-    let Some(Drive { driven, folder }) = judged else {
-        return agv_tests::too_busy("a_vehicle_that_is_told_nothing_finds_itself");
     };
-    assert!(driven.poses.first().is_some_and(|heard| heard.pose.mode == Mode::NotLocalised));
-    let last = driven.poses.last().unwrap().pose;
-    assert_eq!((last.mode, last.health.start_search), (Mode::Reflectors, Relocalization::Idle));
-    let errors = vehicle::errors(&driven, &recording).unwrap();
-    println!("{errors:?}");
-    // The machine may be busy: a wrong place would be metres away.
-    assert!(errors.position_p95_m < 0.1, "{errors:?}");
+    let judge = |Drive { driven, .. }: &Drive| {
+        assert!(driven.poses.first().is_some_and(|heard| heard.pose.mode == Mode::NotLocalised));
+        let last = driven.poses.last().unwrap().pose;
+        assert_eq!((last.mode, last.health.start_search), (Mode::Reflectors, Relocalization::Idle));
+        let errors = vehicle::errors(driven, &recording).unwrap();
+        println!("{errors:?}");
+        // The machine may be busy: a wrong place would be metres away.
+        assert!(errors.position_p95_m < 0.1, "{errors:?}");
+    };
+    let name = "a_vehicle_that_is_told_nothing_finds_itself";
+    let Some(Drive { driven, folder }) = sound_drive(name, told_nothing, |drive| &drive.driven, judge) else { return };
     let found = |driven: &Driven| {
         let events = log::read_contents(&driven.log, |_| ()).unwrap().recording.events;
         events.iter().filter(|event| matches!(event.view(), Event::SetPose(_))).count()
@@ -302,9 +336,7 @@ fn it_is_commissioned_over_the_service_port() {
     const TEST: &str = "it_is_commissioned_over_the_service_port";
     let (Some((image, _alone)), Some(agv)) = (image(TEST), agv_tests::agv(TEST)) else { return };
     let recording = hall();
-    let folder = tempfile::tempdir().unwrap();
-    let options = VehicleOptions { key: Some(KEY), ..VehicleOptions::new(&image, folder.path()) };
-    let driven = vehicle::drive(&recording, &options, 6.0, |watch| {
+    let watch = |watch: &Watch| {
         let host = format!("127.0.0.1:{}", watch.ports.service);
         until(60.0, "poses", || watch.pose().is_some());
         // While the vehicle stands: everything can be read, and changed by who has the key.
@@ -324,9 +356,12 @@ fn it_is_commissioned_over_the_service_port() {
         let mut stranger = Client::connect(&host, Some([1; 32])).unwrap();
         let foreign = stranger.set("limits.fastest", Value::Number(3.0));
         assert!(matches!(foreign, Err(ServiceError::Refused(Refusal::Tag))), "{foreign:?}");
-    })
-    .unwrap();
-    assert!(agv_tests::faults(&driven).is_empty(), "{:?}", driven.emergencies);
+    };
+    let judge = |drive: &Drive| {
+        assert!(agv_tests::faults(&drive.driven).is_empty(), "{:?}", drive.driven.emergencies);
+    };
+    let drive = || drive(&image, &recording, 6.0, watch);
+    let Some(Drive { folder, .. }) = sound_drive(TEST, drive, |drive| &drive.driven, judge) else { return };
 
     // A board that stands is given a map and a setting, and has them after a restart.
     let mut standing = recording.clone();
