@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
 use agv_core::geometry::{Point, Pose};
-use agv_core::integrity::{MountingCheck, SlipCheck, Suspect};
-use agv_core::measurement::Time;
+use agv_core::integrity::{InnovationMonitorParameters, Integrity, MountingCheck, SlipCheck, Suspect};
+use agv_core::maps::{LandmarkKind, Verdict};
+use agv_core::measurement::{LaserId, Scan, Time};
+use agv_core::state::LandmarkUse;
 use proptest::prelude::*;
 
 /// Reflectors of a hall, in W.
@@ -177,4 +179,56 @@ fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_fo
         }
         assert_eq!(check.suspect(), Some(Suspect::Laser), "{radius} m");
     }
+}
+
+/// Whether a move is told: so many reflectors around a laser that stands were seen three times, and then none, though nothing hides them.
+/// Every beam ends at these ranges, m, while they are seen and afterwards.
+fn is_told_gone(count: usize, ranges: [f32; 2]) -> bool {
+    let mut integrity = Integrity::new(InnovationMonitorParameters::default());
+    (0..8).any(|revolution| {
+        let time = Time::from_micros(revolution * 125_000 + 1_000_000);
+        let see = |index: usize| {
+            let angle = 0.4 + std::f64::consts::TAU * index as f64 / count as f64;
+            let located = [5.0 * angle.cos(), 5.0 * angle.sin()];
+            LandmarkUse {
+                time,
+                laser: LaserId::FIRST,
+                kind: LandmarkKind::Reflector,
+                landmark: None,
+                verdict: Verdict::Accepted,
+                position: located.map(|coordinate| coordinate as f32),
+                located,
+                residual: [0.0; 2],
+                residual_deviation: [0.0; 2],
+                test_ratio: 0.0,
+            }
+        };
+        let is_there = revolution < 3;
+        let uses: Vec<_> = (0..count).filter(|_| is_there).map(see).collect();
+        let ranges = [ranges[usize::from(!is_there)]; 720];
+        let scan = Scan {
+            laser: LaserId::FIRST,
+            start: time,
+            beam_interval: 0.0,
+            first_bearing: -std::f64::consts::PI,
+            bearing_step: std::f64::consts::TAU / 720.0,
+            ranges: &ranges,
+            intensities: &[],
+        };
+        let slips = integrity.see_reflectors(LaserId::FIRST, time, &Pose::default(), &uses);
+        let is_told = integrity.see_scan(&scan, |_| Pose::default()) || slips;
+        assert!(!(is_told && is_there));
+        is_told
+    })
+}
+
+/// At the end of an aisle a few flat reflectors turn out of sight at once.
+#[test]
+fn few_reflectors_that_are_gone_are_no_motion_where_the_surfaces_have_stayed() {
+    assert!(!is_told_gone(4, [8.0, 8.0]));
+    assert!(!is_told_gone(7, [8.0, 8.0]));
+    // Many, surfaces that have moved, and surfaces too far away to tell.
+    assert!(is_told_gone(8, [8.0, 8.0]));
+    assert!(is_told_gone(4, [8.0, 9.0]));
+    assert!(is_told_gone(4, [20.0, 20.0]));
 }

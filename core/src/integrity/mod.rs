@@ -128,8 +128,9 @@ impl Integrity {
         let laser = scan.laser.index();
         let middle = sensor(0.5 * scan.end().since(scan.start));
         let Some((slip, surfaces)) = self.slip.get_mut(laser).zip(self.surfaces.get_mut(laser)) else { return false };
-        let are_gone = slip.misses(scan, &middle);
+        let misses = slip.misses(scan, &middle);
         let are_elsewhere = surfaces.disagrees(scan, sensor);
+        let are_gone = misses && !(slip.expects_few() && surfaces.agrees());
         are_gone || are_elsewhere || (slip.is_doubted() && surfaces.is_doubtful())
     }
 

@@ -39,6 +39,9 @@ const RANGES: (f64, f64) = (1.0, 15.0);
 /// Landmarks that are gone, with none seen again, in one revolution, and in each of two in a row: a laser misses a landmark that it sees
 /// well less than once in fifty revolutions, and flat ones may turn out of its sight, two at once on both sides of an aisle.
 const GONE: [usize; 2] = [4, 3];
+/// Fewer that should be seen again may all turn out of its sight at once, as at the end of an aisle: then the surfaces of the scan must not
+/// speak against it.
+const MANY: u8 = 8;
 
 #[derive(Clone, Copy, Debug)]
 struct Remembered {
@@ -180,6 +183,12 @@ impl SlipCheck {
     #[must_use]
     pub const fn is_doubted(&self) -> bool {
         self.is_doubted
+    }
+
+    /// Whether so few landmarks should have been seen again in the revolution that all may have turned out of sight.
+    #[must_use]
+    pub const fn expects_few(&self) -> bool {
+        self.expected < MANY
     }
 
     /// Whether a scan is awaited because no landmark was seen again of those that should be.

@@ -23,7 +23,7 @@ const BESIDE: (f64, f64) = (0.1, 0.01);
 const ELSEWHERE: f64 = 0.4;
 /// Shares of the points that are elsewhere in one scan, and in each of two in a row.
 const SHARES: [f64; 2] = [0.6, 0.4];
-/// If more than this share is, it confirms what landmarks say.
+/// If more than this share is, it confirms what landmarks say; if no more is, it speaks against what few of them say.
 const DOUBTFUL: f64 = 0.2;
 /// Scans in a row that must disagree.
 const IN_A_ROW: u8 = 2;
@@ -36,27 +36,35 @@ pub struct SurfaceCheck {
     points: Vec<ScanPoint, POINTS>,
     last: Time,
     contradictions: u8,
-    is_doubtful: bool,
+    /// Whether so many points were elsewhere in the last scan that it confirms what others say of the motion. None if too few could be looked
+    /// for.
+    is_doubtful: Option<bool>,
 }
 
 impl SurfaceCheck {
     /// A check that has seen nothing.
     #[must_use]
     pub const fn new() -> Self {
-        Self { points: Vec::new(), last: Time::from_micros(0), contradictions: 0, is_doubtful: false }
+        Self { points: Vec::new(), last: Time::from_micros(0), contradictions: 0, is_doubtful: None }
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.points.clear();
         self.contradictions = 0;
-        self.is_doubtful = false;
+        self.is_doubtful = None;
     }
 
     /// Whether so many points were elsewhere in the last scan that it confirms what others say of the motion.
     #[must_use]
-    pub const fn is_doubtful(&self) -> bool {
-        self.is_doubtful
+    pub fn is_doubtful(&self) -> bool {
+        self.is_doubtful == Some(true)
+    }
+
+    /// Whether nearly all points were where they ought to be in the last scan.
+    #[must_use]
+    pub fn agrees(&self) -> bool {
+        self.is_doubtful == Some(false)
     }
 
     /// Takes a scan; `sensor` is where the laser was in the frame of the odometry so many seconds after the first beam. True if the
@@ -73,9 +81,10 @@ impl SurfaceCheck {
             asked = asked.saturating_add(1);
             elsewhere = elsewhere.saturating_add(u8::from(is_elsewhere));
         }
-        let exceeds = |share: f64| usize::from(asked) >= LEAST && f64::from(elsewhere) > share * f64::from(asked);
+        let can_tell = usize::from(asked) >= LEAST;
+        let exceeds = |share: f64| can_tell && f64::from(elsewhere) > share * f64::from(asked);
         let [at_once, in_a_row] = SHARES.map(exceeds);
-        self.is_doubtful = exceeds(DOUBTFUL);
+        self.is_doubtful = can_tell.then(|| exceeds(DOUBTFUL));
         // What contradicts is compared with the same points once more.
         if !in_a_row || self.contradictions > 0 {
             self.remember(scan, &parts);
