@@ -42,7 +42,7 @@ const OBSERVATIONS: usize = 64;
 pub(super) const REMEMBERED: f32 = 10.0;
 
 /// A found pose is not surer than this, m and rad: reflectors are passed by a moving vehicle.
-const LEAST_DEVIATION: (f64, f64) = (0.02, 0.003);
+const LEAST_DEVIATION: (f64, f64) = (0.014, 0.003);
 
 /// Finds the pose of a vehicle that does not know it.
 #[derive(Clone, Debug)]
