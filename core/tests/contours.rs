@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use agv_core::contours::{
     ContourMatcher, KeptMap, KeptMapError, KeptPoint, KeyRing, Prediction, SearchWindow, Submap, SurfacePoint,
-    Surroundings, TILE, Tile, search,
+    Surroundings, TILE, Tile, refine, search,
 };
 use agv_core::geometry::{Pose, ScanPoint, difference};
 use agv_core::measurement::{LaserId, Scan, Time};
@@ -271,5 +271,29 @@ fn what_was_moved_by_less_than_a_decimetre_takes_the_pose_along_by_millimetres()
             let error = truth.between(&found);
             assert!(error.position().norm() < 0.0038, "moved by {by}, seed {seed}: {error:?}");
         }
+    }
+}
+
+/// The two walls of a corridor stand farther apart than in the map. The points of the near one lie denser; it counts no more than the other.
+#[test]
+fn points_count_by_the_length_of_contour() {
+    let wall = |y: f32, spacing: f32, length: f32| {
+        let count = (length / spacing).round() as usize;
+        let place = move |index: usize| ScanPoint::new((index as f32 + 0.5) * spacing - 0.5 * length, y);
+        let normal = ScanPoint::new(0.0, -y.signum());
+        (0..count).map(move |index| SurfacePoint { position: place(index), normal })
+    };
+    let mut submap = Box::<Submap<4096>>::default();
+    submap.begin(&Pose::default());
+    for point in wall(1.0, 0.05, 8.0).chain(wall(-1.0, 0.05, 8.0)) {
+        submap.add_point(&point);
+    }
+    for (spacing, most) in [(0.05, 0.0005), (0.15, 0.0005), (0.1, 0.0005)] {
+        let points: Vec<_> = wall(1.01, 0.05, 6.0).chain(wall(-1.01, spacing, 6.0)).collect();
+        let found = refine(&points, &submap, &Pose::new(0.0, 0.003, 0.0)).unwrap();
+        assert!(found.pose.y.abs() < most, "{spacing}: {:?}", found.pose);
+        // Whatever they stand for, the information is that of so many points.
+        let expected = points.len() as f64 / (0.03 * 0.03);
+        assert!(found.information.m22 > 0.3 * expected && found.information.m22 <= expected, "{spacing}: {found:?}");
     }
 }

@@ -3,6 +3,7 @@
 //! A scan becomes points of surfaces ([`find_surface_points`]); those of the last key scans ([`KeyRing`]) make a map of the
 //! surroundings ([`Submap`]) in which a scan is first looked for ([`search`]) and then laid onto the surfaces ([`refine`]).
 
+mod contour_length;
 mod correlative_search;
 mod kept_map;
 mod kept_point;

@@ -4,6 +4,7 @@ use core::num::NonZeroUsize;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::contour_length::contour_length;
 use super::{Submap, SurfacePoint};
 use crate::geometry::{Pose, ScanPoint, Transform, difference, wrap};
 
@@ -42,7 +43,8 @@ const FEWEST: u32 = 10;
 pub struct Refinement {
     /// The pose in the frame of the submap.
     pub pose: Pose,
-    /// Inverse of the covariance (x, y, theta) if points err independently.
+    /// Inverse of the covariance (x, y, theta) if points err independently; each counts by the length of contour that it stands for, in their
+    /// mean as one.
     pub information: Matrix3<f64>,
     /// The sum of the outer products of the normals with themselves, weighted: xx, xy, yy.
     pub directions: [f32; 3],
@@ -62,6 +64,8 @@ struct Sums {
     directions: [f32; 3],
     facing: ScanPoint,
     inliers: u32,
+    /// Length of contour for which the inliers stand, m.
+    length: f32,
     weights: f32,
     squares: f32,
 }
@@ -88,11 +92,17 @@ impl Sums {
         self.directions[2] += weighted[1] * row[1];
     }
 
-    /// Adds what a point says that was moved by a transform to where that surface is near.
-    fn lay(&mut self, moved: &SurfacePoint, surface: &SurfacePoint, (transform, tolerance): (&Transform, f32)) {
+    /// Adds what a point says that stands for so much contour, m, and was moved by a transform to where that surface is near.
+    fn lay(
+        &mut self,
+        (moved, length): (&SurfacePoint, f32),
+        surface: &SurfacePoint,
+        (transform, tolerance): (&Transform, f32),
+    ) {
         let (lever, error) = (moved.position - transform.shift(), moved.position - surface.position);
-        let weight = |square: f32| 1.0 / ((1.0 + square / (tolerance * tolerance)) * DEVIATION * DEVIATION);
+        let weight = |square: f32| length / ((1.0 + square / (tolerance * tolerance)) * DEVIATION * DEVIATION);
         self.inliers += 1;
+        self.length += length;
         if surface.is_corner() {
             let weight = CORNER * weight(error.norm_squared());
             self.add(ScanPoint::new(1.0, 0.0), lever, error.x, weight);
@@ -115,8 +125,21 @@ impl Sums {
         self.squares / (self.weights.max(f32::MIN_POSITIVE) * DEVIATION * DEVIATION)
     }
 
+    /// What the mean inlier counts, is one.
+    fn scale(&self) -> f32 {
+        self.inliers as f32 / self.length.max(f32::MIN_POSITIVE)
+    }
+
+    fn directions(&self) -> [f32; 3] {
+        self.directions.map(|entry| entry * self.scale())
+    }
+
+    fn gradient(&self) -> Vector3<f64> {
+        Vector3::from(self.gradient.map(f64::from)) * f64::from(self.scale())
+    }
+
     fn information(&self) -> Matrix3<f64> {
-        let [xx, xy, xt, yy, yt, tt] = self.information.map(f64::from);
+        let [xx, xy, xt, yy, yt, tt] = self.information.map(|entry| f64::from(entry) * f64::from(self.scale()));
         Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt)
     }
 }
@@ -192,10 +215,11 @@ impl Refining {
         let reach = if self.iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
         let stride = self.stride.get();
         let first = self.points.saturating_mul(stride);
-        for point in points.iter().skip(first).step_by(stride).take(count) {
+        for (index, point) in points.iter().enumerate().skip(first).step_by(stride).take(count) {
             let moved = point.moved(&transform);
             if let Some(surface) = nearest(&moved, reach) {
-                self.sums.lay(&moved, &surface, (&transform, self.tolerance));
+                let length = contour_length(points, index);
+                self.sums.lay((&moved, length), &surface, (&transform, self.tolerance));
             }
         }
         self.points = self.points.saturating_add(count);
@@ -221,7 +245,7 @@ impl Refining {
         let information = sums.information();
         let prior = Vector3::new(position, position, heading);
         let moved = Vector3::new(pose.x - start.x, pose.y - start.y, difference(pose.theta, start.theta));
-        let gradient = Vector3::from(sums.gradient.map(f64::from)) + prior.component_mul(&moved);
+        let gradient = sums.gradient() + prior.component_mul(&moved);
         let step = (information + Matrix3::from_diagonal(&prior)).try_inverse()? * gradient;
         let pose = Pose { x: pose.x - step.x, y: pose.y - step.y, theta: wrap(pose.theta - step.z) };
         self.pose = pose;
@@ -234,7 +258,7 @@ impl Refining {
         self.outcome = Some(Refinement {
             pose,
             information,
-            directions: sums.directions,
+            directions: sums.directions(),
             facing: sums.facing(),
             inliers: sums.inliers,
             scatter: sums.scatter(),
