@@ -4,7 +4,7 @@ use core::num::NonZeroUsize;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::contour_length::contour_length;
+use super::contour_length::ContourLengths;
 use super::{Submap, SurfacePoint};
 use crate::geometry::{Pose, ScanPoint, Transform, difference, wrap};
 
@@ -215,11 +215,11 @@ impl Refining {
         let reach = if self.iteration < FAR_ITERATIONS { REACH.0 } else { REACH.1 };
         let stride = self.stride.get();
         let first = self.points.saturating_mul(stride);
+        let mut lengths = ContourLengths::new(points);
         for (index, point) in points.iter().enumerate().skip(first).step_by(stride).take(count) {
             let moved = point.moved(&transform);
             if let Some(surface) = nearest(&moved, reach) {
-                let length = contour_length(points, index);
-                self.sums.lay((&moved, length), &surface, (&transform, self.tolerance));
+                self.sums.lay((&moved, lengths.at(index)), &surface, (&transform, self.tolerance));
             }
         }
         self.points = self.points.saturating_add(count);
