@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 use heapless::Vec;
 
 use super::bit_planes::{MOST_BESIDE, MOST_POINTS};
-use super::place_grid::{LEVELS, Offset, PlaceGrid, SMALLEST_CELL, direction, facing};
+use super::place_grid::{COARSEST, LEVELS, Offset, PlaceGrid, SMALLEST_CELL, direction, facing};
 use crate::contours::SurfacePoint;
 use crate::geometry::{Pose, ScanPoint, Transform, difference, wrap};
 use crate::order::insertion_sort_by;
@@ -25,7 +25,7 @@ const SPACINGS: [f32; 4] = [0.4, 0.8, 1.6, 3.2];
 const REACH: f32 = 20.0;
 
 const _: () = assert!(
-    REACH as f64 / (SMALLEST_CELL * (1 << (LEVELS - 1)) as f64) + 1.0 < MOST_BESIDE as f64,
+    REACH as f64 / (SMALLEST_CELL * (1 << COARSEST) as f64) + 1.0 < MOST_BESIDE as f64,
     "bit planes do not reach further beside the map"
 );
 
@@ -33,7 +33,7 @@ const _: () = assert!(
 const HEADINGS: u16 = 512;
 
 /// Headings at the finest scale within one at the coarsest.
-const FINE: usize = 1 << (LEVELS - 1);
+const FINE: usize = 1 << COARSEST;
 
 /// Share of the points that must be able to lie on surfaces: where there is a good place, to ask for much finds it soon. If that finds too
 /// little, all is looked at again,
@@ -88,7 +88,7 @@ struct Node {
 }
 
 /// Nodes that wait: seven of each scale but the coarsest, and one more.
-const NODES: usize = 7 * (LEVELS - 1) + 1;
+const NODES: usize = 7 * COARSEST + 1;
 
 /// A point that is looked for, and the direction in which its surface faces, rad; none of a corner.
 #[derive(Clone, Copy, Debug)]
@@ -218,10 +218,10 @@ impl CoarseSearch {
                 self.open &= self.open - 1;
                 // It is the one before.
                 if let Some((column, row)) = planes.first_of(group - 1) {
-                    self.divide(grid, &Node { level: LEVELS - 1, branch: 0, column: column + lane, row });
+                    self.divide(grid, &Node { level: COARSEST, branch: 0, column: column + lane, row });
                 }
             } else if group < planes.groups() {
-                let offsets = self.branch.headings.get(LEVELS - 1).and_then(|headings| headings.first());
+                let offsets = self.branch.headings.get(COARSEST).and_then(|headings| headings.first());
                 let offsets = offsets.map_or(&[][..], |offsets| offsets);
                 let (open, looked_up) = planes.fitting(bytes, offsets, group, self.needed);
                 *effort -= GROUP_EFFORT * i64::from(looked_up) + CELL_EFFORT;

@@ -13,7 +13,7 @@ use crate::geometry::Point;
 
 /// Scales.
 pub(super) const LEVELS: usize = 4;
-const COARSEST: usize = LEVELS - 1;
+pub(super) const COARSEST: usize = LEVELS - 1;
 
 /// Smallest cell of the finest scale, m.
 pub(super) const SMALLEST_CELL: f64 = 0.25;
