@@ -41,7 +41,7 @@ const RANGES: (f64, f64) = (1.0, 15.0);
 const GONE: [usize; 2] = [4, 3];
 /// Fewer that should be seen again may all turn out of its sight at once, as at the end of an aisle: then the surfaces of the scan must not
 /// speak against it.
-const MANY: u8 = 8;
+const MANY: u8 = 7;
 
 #[derive(Clone, Copy, Debug)]
 struct Remembered {
