@@ -52,7 +52,7 @@ fn the_default_profile_is_at_least_as_repeatable_as_the_printed_one() {
         let ((usual, per_scan), (printed, _)) = (score(Parameters::default()), score(Parameters::thesis()));
         println!("{name}: {per_scan:.1} keypoints a scan, {usual:?}, as printed {printed:?}");
         assert!(usual.excluding_empty >= printed.excluding_empty && usual.counting_empty >= printed.counting_empty);
-        assert!(per_scan <= 12.0);
+        assert!((5.0..=12.0).contains(&per_scan));
     }
 }
 

@@ -15,7 +15,17 @@ const COARSE_POINTS: u16 = 2;
 const COARSE_JUMP: f32 = 0.2;
 
 /// The least standard deviation of a keypoint in every direction there, m.
-const COARSE_DEVIATION: f32 = 0.02;
+const COARSE_DEVIATION: f32 = 0.04;
+
+/// Ends of faces there: fewer returns of a face, farther apart, which must stand out further.
+fn coarse_ends(wanted: EndPointParameters) -> EndPointParameters {
+    EndPointParameters {
+        points: wanted.points.min(5),
+        spacing: wanted.spacing.max(0.12),
+        depth: wanted.depth.max(0.5),
+        ..wanted
+    }
+}
 
 /// How neighbouring candidates compete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -184,6 +194,7 @@ impl Parameters {
             points_a_side: self.points_a_side.min(COARSE_POINTS),
             jump: self.jump.map(|jump| jump.max(COARSE_JUMP)),
             gate: Some(gate),
+            end_points: self.end_points.map(coarse_ends),
             deviation_floor: self.deviation_floor.max(COARSE_DEVIATION),
             ..*self
         }
