@@ -108,11 +108,11 @@ const CANDIDATES: usize = 10;
 /// Deviation of odometry: share of the way, and of the turn, and the least (m, rad).
 const ODOMETRY: (f64, f64, f64, f64) = (0.1, 0.2, 0.05, 0.1);
 /// Points of one surface err together: the information that they give is smaller by this factor.
-const INFLATION: f64 = 20.0;
+const INFLATION: f64 = 5.0;
 /// No alignment is better than this, m and rad.
-const FLOOR: (f64, f64) = (0.01, 0.003);
+const FLOOR: (f64, f64) = (0.005, 0.003);
 /// Neighbours in space within this distance (m) and turn (rad) of each other are aligned once the graph is solved.
-const NEAR: (f64, f64) = (1.0, 0.8);
+const NEAR: (f64, f64) = (2.0, 0.8);
 /// Neighbours that are tried for each key scan.
 const NEIGHBOURS: usize = 4;
 /// Rounds of solving and taking out loops.
