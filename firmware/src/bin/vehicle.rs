@@ -6,6 +6,7 @@ use core::panic::PanicInfo;
 
 use agv_controller::{Troubles, carried_map};
 use agv_core::localizer::{self, Parameters};
+use agv_core::maps::Landmark;
 use agv_firmware::app::announced_flash::AnnouncedFlash;
 use agv_firmware::app::capacities::has_slots;
 use agv_firmware::app::exchange::RevolutionReceiver;
@@ -88,7 +89,7 @@ mod large {
 struct Shared {
     settings: &'static Settings,
     controller: &'static SharedController<Flash>,
-    landmarks: &'static [agv_core::maps::Landmark],
+    landmarks: &'static [Landmark],
     log: &'static LogQueue,
 }
 
@@ -206,12 +207,21 @@ fn failure(cause: RestartCause) -> &'static str {
     }
 }
 
+/// What is kept in flash.
+struct Kept {
+    settings: &'static Settings,
+    controller: &'static SharedController<Flash>,
+    landmarks: &'static [Landmark],
+    /// The map of contours.
+    contours: Option<&'static [u8]>,
+}
+
 #[inline(never)]
-fn start() -> Vehicle {
-    let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
-    let failure = failure(restart_cause);
-    let supervisor = Supervisor::start();
+fn read_flash(
+    flash: <Current as Board>::Flash,
+    contour_flash: Option<<Current as Board>::Flash>,
+    failure: &'static str,
+) -> Kept {
     let announced = |flash| AnnouncedFlash::new(flash, !Current::RUNS_WHILE_FLASH_WORKS);
     let map = large::MAP.init_with(KeptMap::new);
     let (flash, contour_flash) = (announced(flash), contour_flash.map(announced));
@@ -222,6 +232,16 @@ fn start() -> Vehicle {
     let landmarks = controller.landmarks;
     let contours = contour_bytes(&controller);
     let (settings, controller) = share(controller);
+    Kept { settings, controller, landmarks, contours }
+}
+
+#[inline(never)]
+fn start() -> Vehicle {
+    let core = cortex_m::Peripherals::take().expect("the program begins once");
+    let Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
+    let failure = failure(restart_cause);
+    let supervisor = Supervisor::start();
+    let Kept { settings, controller, landmarks, contours } = read_flash(flash, contour_flash, failure);
     let localizer = build_localizer(&settings.parameters);
     if localizer.lend_landmarks(landmarks).is_err() {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
