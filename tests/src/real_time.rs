@@ -4,14 +4,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
 use agv_host_sim::emulate::vehicle::{Driven, HeardEmergency};
+use agv_settings::Settings;
 
 use crate::too_busy;
 
 /// While the encoders are set up, from the beginning of the drive on.
 const SETTING_UP: Duration = Duration::from_secs(2);
-
-/// How often the controller says its pose, as it is set up by default, s.
-const POSE_PERIOD: f64 = 0.01;
 
 /// A machine that keeps encoders and board waiting for longer in all is too busy for a fair drive, s: encoders are nearly late by then.
 const LONGEST_WAIT: f64 = 0.012;
@@ -25,25 +23,24 @@ const TRIES: usize = 5;
 
 /// How long the machine kept encoders and board waiting in all, s.
 ///
-/// The board is seen to wait by the threads of its emulator, where the system counts that, and by its poses.
+/// The board is seen to wait by the threads of its emulator, where the system counts that, and by its poses, which come as often as by default.
 fn waited(driven: &Driven) -> f64 {
     let mut heard = driven.poses.iter().map(|pose| pose.heard).filter(|heard| *heard > driven.begin).peekable();
     let mut gap = 0.0_f64;
     while let (Some(one), Some(next)) = (heard.next(), heard.peek()) {
         gap = gap.max((*next - one).as_secs_f64());
     }
-    let Driven { longest_stall: stall, longest_delay: delay, longest_laser_delay: laser, .. } = *driven;
-    println!(
-        "longest stall {stall:.3} s, longest delay {delay:.3} s, longest gap {gap:.3} s, laser late by {laser:.3} s"
-    );
-    stall + delay.max(gap - POSE_PERIOD)
+    let period = 1e-3 * f64::from(Settings::default().publishing_period);
+    driven.longest_stall + driven.longest_delay.max(gap - period)
 }
 
 /// Whether neither the encoders, nor the laser, nor the board was kept waiting by the machine: the board hears them late otherwise, and
 /// says so.
 #[must_use]
 pub fn is_fair(driven: &Driven) -> bool {
-    waited(driven) < LONGEST_WAIT && driven.longest_laser_delay < LONGEST_LASER_DELAY
+    let (waited, laser) = (waited(driven), driven.longest_laser_delay);
+    println!("encoders and board waited for {waited:.3} s, the laser was late by {laser:.3} s");
+    waited < LONGEST_WAIT && laser < LONGEST_LASER_DELAY
 }
 
 /// Emergencies that tell of a fault. Late encoders (7305h, 7306h) and a late laser (7300h) are none on a drive that was not fair, nor are

@@ -125,7 +125,7 @@ impl Sums {
         self.squares / (self.weights.max(f32::MIN_POSITIVE) * DEVIATION * DEVIATION)
     }
 
-    /// What the mean inlier counts, is one.
+    /// By this factor the mean inlier counts as one.
     fn scale(&self) -> f32 {
         self.inliers as f32 / self.length.max(f32::MIN_POSITIVE)
     }

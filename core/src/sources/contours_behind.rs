@@ -38,7 +38,7 @@ const LEAST_SCATTER: f64 = 0.03;
 /// a leaning laser meets the floor.
 const LINE: f64 = 16.0;
 
-/// There is if an axis is free and the mean of the normals is longer: in a corridor they cancel out.
+/// A line is alone if an axis is free and the mean of the normals is longer than this: in a corridor they cancel out.
 const ONE_SIDED: f32 = 0.3;
 
 /// Where the submap of the way behind is.
