@@ -181,14 +181,24 @@ fn a_suspicion_of_the_laser_ends_in_a_bend_of_any_radius_in_which_it_could_be_fo
     }
 }
 
-/// Whether a move is told: so many reflectors around a laser that stands were seen three times, and then none, though nothing hides them.
+/// What is seen of reflectors that were seen three times and are gone.
+#[derive(Clone, Copy, PartialEq)]
+enum Afterwards {
+    Nothing,
+    /// As many, elsewhere.
+    Others,
+}
+
+/// Whether a move is told: so many reflectors around a laser that stands were seen three times and are gone, though nothing hides them.
 /// Every beam ends at these ranges, m, while they are seen and afterwards.
-fn is_told_gone(count: usize, ranges: [f32; 2]) -> bool {
+fn is_told_gone(count: usize, ranges: [f32; 2], afterwards: Afterwards) -> bool {
     let mut integrity = Integrity::new(InnovationMonitorParameters::default());
     (0..8).any(|revolution| {
         let time = Time::from_micros(revolution * 125_000 + 1_000_000);
+        let is_there = revolution < 3;
         let see = |index: usize| {
-            let angle = 0.4 + std::f64::consts::TAU * index as f64 / count as f64;
+            let turned = if is_there { 0.4 } else { 0.7 };
+            let angle = turned + std::f64::consts::TAU * index as f64 / count as f64;
             let located = [5.0 * angle.cos(), 5.0 * angle.sin()];
             LandmarkUse {
                 time,
@@ -203,8 +213,7 @@ fn is_told_gone(count: usize, ranges: [f32; 2]) -> bool {
                 test_ratio: 0.0,
             }
         };
-        let is_there = revolution < 3;
-        let uses: Vec<_> = (0..count).filter(|_| is_there).map(see).collect();
+        let uses: Vec<_> = (0..count).filter(|_| is_there || afterwards == Afterwards::Others).map(see).collect();
         let ranges = [ranges[usize::from(!is_there)]; 720];
         let scan = Scan {
             laser: LaserId::FIRST,
@@ -225,10 +234,21 @@ fn is_told_gone(count: usize, ranges: [f32; 2]) -> bool {
 /// At the end of an aisle a few flat reflectors turn out of sight at once.
 #[test]
 fn few_reflectors_that_are_gone_are_no_motion_where_the_surfaces_have_stayed() {
-    assert!(!is_told_gone(4, [8.0, 8.0]));
-    assert!(!is_told_gone(6, [8.0, 8.0]));
+    let is_told = |count, ranges| is_told_gone(count, ranges, Afterwards::Nothing);
+    assert!(!is_told(4, [8.0, 8.0]));
+    assert!(!is_told(6, [8.0, 8.0]));
     // Many, surfaces that have moved, and surfaces too far away to tell.
-    assert!(is_told_gone(7, [8.0, 8.0]));
-    assert!(is_told_gone(4, [8.0, 9.0]));
-    assert!(is_told_gone(4, [20.0, 20.0]));
+    assert!(is_told(7, [8.0, 8.0]));
+    assert!(is_told(4, [8.0, 9.0]));
+    assert!(is_told(4, [20.0, 20.0]));
+}
+
+/// None turns out of sight while as many come into it: in a corridor the surfaces stay though the vehicle moves otherwise.
+#[test]
+fn few_reflectors_that_are_gone_are_a_motion_where_others_are_seen() {
+    for count in [4, 5, 6, 7] {
+        assert!(is_told_gone(count, [8.0, 8.0], Afterwards::Others), "{count}");
+    }
+    // What hides them has come nearer than they are.
+    assert!(!is_told_gone(4, [3.0, 3.0], Afterwards::Others));
 }

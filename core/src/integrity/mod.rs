@@ -128,10 +128,9 @@ impl Integrity {
         let laser = scan.laser.index();
         let middle = sensor(0.5 * scan.end().since(scan.start));
         let Some((slip, surfaces)) = self.slip.get_mut(laser).zip(self.surfaces.get_mut(laser)) else { return false };
-        let misses = slip.misses(scan, &middle);
         let are_elsewhere = surfaces.disagrees(scan, sensor);
-        let are_gone = misses && !(slip.expects_few() && surfaces.agrees());
-        are_gone || are_elsewhere || (slip.is_doubted() && surfaces.is_doubtful())
+        let misses = slip.misses(scan, &middle, surfaces.agrees());
+        misses || are_elsewhere || (slip.is_doubted() && surfaces.is_doubtful())
     }
 
     /// Takes what the landmarks of a fixed map have made of the estimate, up to `now`, if there are enough of them.

@@ -39,8 +39,8 @@ const RANGES: (f64, f64) = (1.0, 15.0);
 /// Landmarks that are gone, with none seen again, in one revolution, and in each of two in a row: a laser misses a landmark that it sees
 /// well less than once in fifty revolutions, and flat ones may turn out of its sight, two at once on both sides of an aisle.
 const GONE: [usize; 2] = [4, 3];
-/// Fewer that should be seen again may all turn out of its sight at once, as at the end of an aisle: then the surfaces of the scan must not
-/// speak against it.
+/// Fewer that should be seen again may all turn out of its sight at once, as at the end of an aisle: if the surfaces of the scan have stayed,
+/// they tell no move, unless others are seen.
 const MANY: u8 = 7;
 
 #[derive(Clone, Copy, Debug)]
@@ -185,21 +185,16 @@ impl SlipCheck {
         self.is_doubted
     }
 
-    /// Whether so few landmarks should have been seen again in the revolution that all may have turned out of sight.
-    #[must_use]
-    pub const fn expects_few(&self) -> bool {
-        self.expected < MANY
-    }
-
     /// Whether a scan is awaited because no landmark was seen again of those that should be.
     fn sees_none_again(&self) -> bool {
         let [_, fewest] = GONE;
         self.awaits_scan && self.seen_again == 0 && usize::from(self.expected) >= fewest
     }
 
-    /// Takes the scan of the revolution that has ended, whose laser was at `sensor` in the frame of the odometry. True if landmarks that
-    /// should be seen again are gone, though nothing hides them, and none is there.
-    pub fn misses(&mut self, scan: &Scan, sensor: &Pose) -> bool {
+    /// Takes the scan of the revolution that has ended, whose laser was at `sensor` in the frame of the odometry, and whether its surfaces
+    /// have stayed where they were. True if landmarks that should be seen again are gone, though nothing hides them: none is there, or others
+    /// are.
+    pub fn misses(&mut self, scan: &Scan, sensor: &Pose, have_surfaces_stayed: bool) -> bool {
         let count = |nearest: f64, farthest: f64| {
             let is_gone = |one: &&Remembered| {
                 let place = sensor.inverse_transform(&one.position.cast());
@@ -214,7 +209,9 @@ impl SlipCheck {
         let is_confirmed = self.is_doubted && 2 * count(0.0, f64::INFINITY) >= unseen;
         self.awaits_scan = false;
         self.gone = if gone >= in_a_row { self.gone.saturating_add(1) } else { 0 };
-        is_confirmed || gone >= at_once || self.gone >= IN_A_ROW
+        let may_have_turned = self.expected < MANY && have_surfaces_stayed;
+        let are_gone = gone >= at_once || self.gone >= IN_A_ROW;
+        is_confirmed || (are_gone && !may_have_turned)
     }
 }
 
