@@ -41,6 +41,12 @@ struct Drive {
 impl Drive {
     /// A vehicle that has driven among reflectors for so long that it knows its odometry, and sees none any more.
     fn new(has_contours: bool) -> Self {
+        // Three rounds of a square with round corners.
+        Self::behind(12, has_contours)
+    }
+
+    /// One that has driven so many sides of a square with round corners among reflectors, and sees none any more.
+    fn behind(sides: usize, has_contours: bool) -> Self {
         let mut parameters = Parameters::new(Vehicle::Increments, LASER);
         parameters.sources.contours = has_contours;
         let mut localizer = Box::new(Small::new(parameters));
@@ -51,8 +57,7 @@ impl Drive {
         drive.report(&Pose::default());
         let fix = PoseFix { time: drive.time(), pose: truth, position_deviation: 0.01, heading_deviation: 0.002 };
         drive.localizer.handle(&Event::SetPose(fix));
-        // Three rounds of a square with round corners.
-        for _ in 0..12 {
+        for _ in 0..sides {
             (0..SIDE).for_each(|_| _ = drive.go(&AHEAD));
             (0..SIDE).for_each(|_| _ = drive.go(&BEND));
         }
@@ -146,6 +151,40 @@ fn an_odometry_in_order_has_the_level_that_it_has_without_surfaces() {
         assert!(level < without + 0.005, "{revolution}: {level} {without}");
         assert_ne!(said.reason, Reason::OdometryDisagrees, "{revolution}");
     }
+}
+
+/// Range of a beam in a corridor along the way of a vehicle in its middle, m.
+fn corridor(beam: usize, _: f64) -> f64 {
+    let bearing = beam as f64 * TAU / BEAMS as f64 - PI + LASER.theta;
+    let side = if bearing > 0.0 { 2.0 - LASER.y } else { 2.0 + LASER.y };
+    (side / bearing.sin().abs()).min(25.0)
+}
+
+/// An odometry that is hardly known may be wrong by much; surfaces show how far it leads the pose away.
+#[test]
+fn surfaces_bound_an_odometry_that_is_hardly_known() {
+    let (mut by_surfaces, mut blind) = (Drive::behind(1, true), Drive::behind(1, false));
+    let level = |drive: &mut Drive| (0..60).map(|_| drive.go(&BEND)).last().unwrap().level.position;
+    let (level, without) = (level(&mut by_surfaces), level(&mut blind));
+    assert!(level < 0.5 * without, "{level} {without}");
+    for scale in [0.85, 0.95, 1.05, 1.15] {
+        let mut drive = Drive::behind(1, true);
+        drive.scale = scale;
+        for revolution in 0..60 {
+            drive.go(&BEND);
+            let (error, level) = drive.error_over_level();
+            assert!(error < 1.0, "{scale} {revolution}: {error} of {level}");
+        }
+    }
+}
+
+/// Along a corridor only the wheels tell how far it goes.
+#[test]
+fn along_a_corridor_surfaces_bound_no_odometry() {
+    let (mut by_surfaces, mut blind) = (Drive::behind(1, true), Drive::behind(1, false));
+    let level = |drive: &mut Drive| (0..60).map(|_| drive.go_seeing(&AHEAD, corridor)).last().unwrap().level.position;
+    let (level, without) = (level(&mut by_surfaces), level(&mut blind));
+    assert!(level >= without, "{level} {without}");
 }
 
 /// Nothing of what is seen lies on a surface, though nothing is far from one.

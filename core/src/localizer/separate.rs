@@ -37,7 +37,7 @@ impl<C: Capacities> Localizer<C> {
         }
         self.tell_contours_pose(&mount, &from);
         if laser == Some(LaserId::FIRST) {
-            self.separation.hear_laser(self.laser_odometry.pose(self.timeline.odometry_pose()));
+            self.separation.hear_laser(self.laser_odometry.pose(self.timeline.odometry_pose(), &mount));
         }
         self.separation.doubt_laser(self.integrity.suspect() == Some(Suspect::Laser));
         let square = self.integrity.innovations.mean_normalised_square();

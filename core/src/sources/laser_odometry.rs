@@ -30,6 +30,8 @@ struct Reached {
     missed: u8,
     /// Whether those behind were given up since landmarks told the pose.
     is_torn: bool,
+    /// Whether surfaces left an axis free since then.
+    is_led_by_wheels: bool,
 }
 
 /// Where R is by surfaces.
@@ -41,6 +43,10 @@ pub struct BySurfaces {
     pub distance: f64,
     /// Whether there was a step on which surfaces did not show how it has moved.
     pub is_torn: bool,
+    /// Whether there was one on which they did not show it along an axis, as in a corridor: there the wheels have led.
+    pub is_led_by_wheels: bool,
+    /// The displacement of R by the wheels since its last scan began, which no surface has shown yet.
+    pub since: Pose,
 }
 
 /// What it has reached.
@@ -90,13 +96,16 @@ impl LaserOdometry {
         self.reached = Some(reached);
     }
 
-    /// Where R is now; `odometry_pose` is where it is in the frame of the odometry. None where landmarks lead.
-    pub(crate) fn pose(&self, odometry_pose: &Pose) -> Option<BySurfaces> {
+    /// Where R is now; `odometry_pose` is where it is in the frame of the odometry, and `mount` the pose of S in R. None where landmarks lead.
+    pub(crate) fn pose(&self, odometry_pose: &Pose, mount: &Pose) -> Option<BySurfaces> {
         let reached = self.reached.as_ref().filter(|_| self.used < TELLING)?;
+        let from_laser = reached.by_odometry.between(odometry_pose);
         Some(BySurfaces {
-            pose: reached.by_surfaces.compose(&reached.by_odometry.between(odometry_pose)),
+            pose: reached.by_surfaces.compose(&from_laser),
             distance: reached.distance,
             is_torn: reached.is_torn || reached.missed > 0,
+            is_led_by_wheels: reached.is_led_by_wheels,
+            since: mount.compose(&from_laser),
         })
     }
 }
@@ -105,7 +114,14 @@ impl Reached {
     fn begin(contours: &mut impl FindContours, laser: &LaserAtStart) -> Self {
         contours.forget_keys();
         contours.keep(&laser.in_world);
-        Self { by_surfaces: laser.in_world, by_odometry: laser.by_odometry, distance: 0.0, missed: 0, is_torn: false }
+        Self {
+            by_surfaces: laser.in_world,
+            by_odometry: laser.by_odometry,
+            distance: 0.0,
+            missed: 0,
+            is_torn: false,
+            is_led_by_wheels: false,
+        }
     }
 
     fn go_on(self, contours: &mut impl FindContours, laser: &LaserAtStart) -> Self {
@@ -129,6 +145,7 @@ impl Reached {
             distance: self.distance + libm::hypot(gone.x, gone.y),
             missed: if is_given_up { 0 } else { missed },
             is_torn: self.is_torn || is_given_up,
+            is_led_by_wheels: self.is_led_by_wheels || found.is_some_and(|found| found.free_axis.is_some()),
         }
     }
 }

@@ -23,4 +23,10 @@ impl ProtectionLevel {
     pub fn or(&self, other: &Self) -> Self {
         Self { position: self.position.max(other.position), heading: self.heading.max(other.heading) }
     }
+
+    /// The smaller one of each bound: where both hold, each of its components does.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        Self { position: self.position.min(other.position), heading: self.heading.min(other.heading) }
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::assumed::Factors;
 use super::envelope::{Bound, SolutionBound};
+use super::sensor_information::not_negative;
 use crate::geometry::{Pose, difference, larger_axis};
 use crate::sources::BySurfaces;
 
@@ -31,4 +32,36 @@ pub fn bound(by_surfaces: &BySurfaces, pose: &Pose, covariance: &[f64; 6], facto
             factor: factors.heading,
         },
     }
+}
+
+/// The bound of a pose by it if the odometry of the wheels is wrong, which had bounded the pose by `told` when landmarks last told it. None where
+/// the wheels have led it.
+#[must_use]
+pub fn bound_without_wheels(
+    by_surfaces: &BySurfaces,
+    pose: &Pose,
+    told: &SolutionBound,
+    factors: &Factors,
+) -> Option<SolutionBound> {
+    if by_surfaces.is_torn || by_surfaces.is_led_by_wheels {
+        return None;
+    }
+    let distance = by_surfaces.distance;
+    let [drift, turn] = DRIFT.map(|deviation| deviation * deviation * distance);
+    let SolutionBound { position, heading } = told;
+    let (x, y) = (by_surfaces.pose.x - pose.x, by_surfaces.pose.y - pose.y);
+    // What the heading was wrong by has led away over the distance since.
+    let deviation = libm::sqrt(not_negative(position.variance)) + libm::sqrt(not_negative(heading.variance)) * distance;
+    Some(SolutionBound {
+        position: Bound {
+            apart: position.apart + heading.apart * distance + libm::hypot(x, y),
+            variance: deviation * deviation + drift,
+            factor: factors.position,
+        },
+        heading: Bound {
+            apart: heading.apart + libm::fabs(difference(by_surfaces.pose.theta, pose.theta)),
+            variance: heading.variance + turn,
+            factor: factors.heading,
+        },
+    })
 }

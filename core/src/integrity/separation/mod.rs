@@ -105,6 +105,8 @@ pub struct SolutionSeparation {
     odometry: Solution,
     /// Of laser odometry, where landmarks do not lead.
     by_surfaces: Option<BySurfaces>,
+    /// What bounded the pose, if the odometry is wrong, when landmarks last told it.
+    odometry_when_told: SolutionBound,
     unheard: Unheard,
     /// Of a vehicle with a gyro.
     gyro: Option<GyroSeparation>,
@@ -128,6 +130,8 @@ struct Bounds {
     /// Of the one whose odometry is wrong, which may soon lead the pose away.
     odometry: SolutionBound,
     odometry_errors: OdometryErrors,
+    /// Of laser odometry, which holds in that case, too; none where the wheels have led it.
+    without_wheels: Option<SolutionBound>,
     /// Of the one that rests on the wheels alone; none without a gyro.
     wheels: Option<SolutionBound>,
     /// By what contradicts.
@@ -143,6 +147,7 @@ impl Bounds {
             envelope: Envelope::new(),
             odometry: SolutionBound::UNBOUNDED,
             odometry_errors: odometry.odometry_errors(),
+            without_wheels: None,
             wheels: None,
             widening: ProtectionLevel::NONE,
             is_elsewhere: false,
@@ -181,6 +186,7 @@ impl SolutionSeparation {
             is_laser_doubted: false,
             odometry: nowhere.clone(),
             by_surfaces: None,
+            odometry_when_told: SolutionBound::UNBOUNDED,
             unheard: Unheard::new(),
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
@@ -353,6 +359,7 @@ impl SolutionSeparation {
         self.pose = self.pose.compose(&displacement);
         if let Some(by_surfaces) = &mut self.by_surfaces {
             by_surfaces.pose = by_surfaces.pose.compose(&displacement);
+            by_surfaces.since = by_surfaces.since.compose(&displacement);
         }
     }
 
@@ -481,6 +488,9 @@ impl SolutionSeparation {
     fn rest_on(&mut self, pose: &Pose, surprise: f64) {
         self.pose = *pose;
         self.surprise = surprise;
+        if self.by_surfaces.is_some_and(|reached| reached.distance == 0.0) {
+            self.odometry_when_told = self.odometry.bound(pose, &ONE_FAULT.times(surprise), self.map_variances);
+        }
         self.bounds = self.bounds_of(pose, surprise);
     }
 
@@ -600,6 +610,9 @@ impl SolutionSeparation {
             envelope,
             odometry: bound(&self.odometry, &one_fault),
             odometry_errors: self.odometry.odometry_errors(),
+            without_wheels: self.by_surfaces.and_then(|reached| {
+                by_surfaces::bound_without_wheels(&reached, pose, &self.odometry_when_told, &one_fault)
+            }),
             wheels: self.gyro.as_ref().map(|gyro| bound(gyro.alone(), &one_fault)),
             widening: ProtectionLevel {
                 position: contradiction.position + misfit.position,
@@ -613,13 +626,20 @@ impl SolutionSeparation {
     #[must_use]
     pub fn level(&self) -> ProtectionLevel {
         let Pending { covariance, distance, moved, .. } = &self.pending;
-        let Bounds { envelope, odometry, odometry_errors, wheels, widening, .. } = &self.bounds;
+        let Bounds { envelope, odometry, odometry_errors, without_wheels, wheels, widening, .. } = &self.bounds;
         if *odometry == SolutionBound::UNBOUNDED {
             return ProtectionLevel::UNBOUNDED;
         }
         let noise = self.growth_by(covariance, *distance);
         let drift = odometry_errors.drift(&self.by_bias(moved), moved.theta);
-        let mut level = envelope.after(&noise).or(&odometry.after_drift(&noise, &drift));
+        let mut by_odometry = odometry.after_drift(&noise, &drift);
+        if let Some((laser, reached)) = without_wheels.as_ref().zip(self.by_surfaces.as_ref()) {
+            let Pose { x, y, theta } = reached.since;
+            let unseen = Pose { x: x + moved.x, y: y + moved.y, theta: theta + moved.theta };
+            let drift = odometry_errors.beside_another_heading().drift(&self.by_bias(&unseen), unseen.theta);
+            by_odometry = by_odometry.and(&laser.after_drift(&noise, &drift));
+        }
+        let mut level = envelope.after(&noise).or(&by_odometry);
         if let Some((wheels, gyro)) = wheels.as_ref().zip(self.gyro.as_ref()) {
             level = level.or(&wheels.after(&self.growth_by(gyro.wheels_covariance(), *distance)));
         }

@@ -67,6 +67,12 @@ pub struct OdometryErrors {
 }
 
 impl OdometryErrors {
+    /// The same beside a heading that something else has told.
+    #[must_use]
+    pub fn beside_another_heading(&self) -> Self {
+        Self { with_heading: Vector3::zeros(), ..self.clone() }
+    }
+
     /// What they do to a pose that the odometry leads on, `turned` by so many rad; `by_bias` is how that displacement in R changes with them.
     #[must_use]
     pub fn drift(&self, by_bias: &BiasJacobian, turned: f64) -> Drift {
