@@ -168,8 +168,9 @@ impl<C: Capacities> Localizer<C> {
             seen.verdict == Verdict::Accepted
                 && seen.landmark.is_some_and(|(source, _)| source == LandmarkSource::Fixed)
         };
-        self.laser_odometry.use_landmarks(self.outputs.uses.iter().filter(is_fixed).count());
-        let Event::Scan(scan) = event else { return };
+        let used = self.outputs.uses.iter().filter(is_fixed).count();
+        let Event::Scan(scan) = event else { return self.laser_odometry.use_reflectors(used) };
+        self.laser_odometry.use_features(used);
         let mount = *self.parameters.lasers.first();
         let Some(timeline) = self.timeline.begun_mut().filter(|_| self.lost.is_none() && !self.laser_odometry.is_led())
         else {

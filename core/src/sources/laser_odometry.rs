@@ -52,7 +52,7 @@ pub struct BySurfaces {
 /// What it has reached.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LaserOdometry {
-    /// Landmarks that were used since the last scan.
+    /// Landmarks that were used in the present revolution.
     used: usize,
     reached: Option<Reached>,
 }
@@ -76,8 +76,13 @@ impl LaserOdometry {
         *self = Self::new();
     }
 
-    /// Takes how many landmarks of a fixed map an event has used.
-    pub(crate) const fn use_landmarks(&mut self, count: usize) {
+    /// Takes how many landmarks of a fixed map the reflectors of a revolution have used, whether the scan of the one before has come or not.
+    pub(crate) const fn use_reflectors(&mut self, count: usize) {
+        self.used = count;
+    }
+
+    /// Takes how many landmarks of a fixed map the scan of that revolution has used.
+    pub(crate) const fn use_features(&mut self, count: usize) {
         self.used = self.used.saturating_add(count);
     }
 
