@@ -51,6 +51,7 @@ mod sources;
 mod start_confirmation;
 mod start_finder;
 mod start_search;
+mod start_watch;
 mod state_slots;
 mod support;
 mod surface_check;

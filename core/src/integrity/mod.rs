@@ -92,12 +92,7 @@ impl Integrity {
             self.mounting.suspect_laser();
         }
         self.innovations = InnovationMonitor::new(parameters);
-        for slip in &mut self.slip {
-            slip.clear();
-        }
-        for surfaces in &mut self.surfaces {
-            surfaces.clear();
-        }
+        self.forget_motion();
         self.mounting.restart();
         self.jumps.forget();
         self.traction.clear();
@@ -112,14 +107,32 @@ impl Integrity {
     /// Takes the reflectors of a revolution of a laser that ended at `now`, be it none; `to_odometry` is the pose of W in the frame of the
     /// odometry. True if the laser has moved otherwise than the odometry says.
     pub fn see_reflectors(&mut self, laser: LaserId, now: Time, to_odometry: &Pose, uses: &[LandmarkUse]) -> bool {
+        let reflectors = uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector);
+        let places = reflectors.map(|seen| {
+            let [x, y] = seen.position.map(f64::from);
+            (to_odometry.transform(&Point::from(seen.located)), libm::hypot(x, y))
+        });
+        self.see_places(laser, now, places)
+    }
+
+    /// The same of reflectors that were located already: each in the frame of the odometry, m, and how far from the laser, m.
+    pub fn see_places(&mut self, laser: LaserId, now: Time, places: impl Iterator<Item = (Point, f64)>) -> bool {
         let Some(slip) = self.slip.get_mut(laser.index()) else { return false };
         slip.begin(now);
-        for seen in uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector) {
-            let [x, y] = seen.position.map(f64::from);
-            let place = to_odometry.transform(&Point::from(seen.located));
-            slip.see(&place, libm::hypot(x, y));
+        for (place, range) in places {
+            slip.see(&place, range);
         }
         slip.disagrees()
+    }
+
+    /// Nobody knows how the vehicle has moved: what is seen is not compared with what was seen before.
+    pub fn forget_motion(&mut self) {
+        for slip in &mut self.slip {
+            slip.clear();
+        }
+        for surfaces in &mut self.surfaces {
+            surfaces.clear();
+        }
     }
 
     /// Takes a scan of a laser whose reflectors of that revolution were taken just before; `sensor` is where the laser was so many seconds

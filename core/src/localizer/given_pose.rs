@@ -35,10 +35,12 @@ impl<C: Capacities> Localizer<C> {
             self.separation.step(self.timeline.now(), self.timeline.odometry_pose());
         }
         self.timeline.begin(fix.time, state);
+        let was_contradicted = self.start_watch.end();
         if self.parameters.protection {
             let (now, state) = (self.timeline.now(), self.timeline.state());
             self.separation.begin(now, &state.pose, &state.covariance_entries(), self.timeline.odometry_pose());
-            if matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge)) {
+            let is_rejected = matches!(self.lost, Some(Reason::LandmarksRejected | Reason::InnovationsTooLarge));
+            if was_contradicted || is_rejected {
                 self.separation.doubt_mounting();
             }
         }

@@ -5,6 +5,7 @@ use heapless::Vec;
 use super::contours::ContourCorrection;
 use super::evidence::DistanceSince;
 use super::slam::Slam;
+use super::start_watch::StartWatch;
 use super::supervisor::{Support, remark_on_motion, supervise};
 use super::travel::Outage;
 use super::{
@@ -38,6 +39,8 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) timeline: Timeline<PAST>,
     pub(super) slam: Slam<C::Slots>,
     pub(super) integrity: Integrity,
+    /// Before the first pose.
+    pub(super) start_watch: StartWatch,
     pub(super) separation: SolutionSeparation,
     /// Of a vehicle with a gyro.
     pub(super) gyro: Option<GyroSource>,
@@ -133,6 +136,7 @@ impl<C: Capacities> Localizer<C> {
             timeline: Timeline::new(parameters.limits.longest_extrapolation),
             slam: Slam::new(),
             integrity: Integrity::new(parameters.consistency),
+            start_watch: StartWatch::new(&parameters),
             separation: Self::separation(&parameters),
             gyro: parameters.uses_gyro().then(|| GyroSource::new(&parameters.gyro)),
             lost: None,
@@ -207,6 +211,9 @@ impl<C: Capacities> Localizer<C> {
     /// further behind is silent.
     pub fn handle(&mut self, event: &Event) -> &Outputs {
         self.begin_event();
+        if self.timeline.begun().is_none() {
+            self.watch_start(event);
+        }
         if let Some((from, until)) = event.seen().filter(|(_, until)| *until > self.timeline.now()) {
             self.bridge(from, until);
         }
@@ -287,6 +294,11 @@ impl<C: Capacities> Localizer<C> {
         self.separate(None);
         self.publish(true);
         outcome
+    }
+
+    #[inline(never)]
+    fn watch_start(&mut self, event: &Event) {
+        self.start_watch.take(event, &self.parameters, &mut self.integrity);
     }
 
     fn begin_event(&mut self) {

@@ -23,6 +23,7 @@ mod start_confirmation;
 mod start_finder;
 mod start_odometry;
 mod start_search;
+mod start_watch;
 mod supervisor;
 mod travel;
 

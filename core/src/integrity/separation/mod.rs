@@ -267,8 +267,9 @@ impl SolutionSeparation {
         self.rest_on(pose, 1.0);
     }
 
-    /// The map has contradicted the pose before [`Self::begin`], and nobody knows why: mounting or clock of the laser may be others
-    /// since then, so they are free again, and that counts at once, until a turn has shown them.
+    /// The map has contradicted the pose before [`Self::begin`], or the laser has moved otherwise than the vehicle before there was one, and
+    /// nobody knows why: mounting or clock of the laser may be others since then, so they are free again, and that counts at once, until a
+    /// turn has shown them.
     pub fn doubt_mounting(&mut self) {
         self.mounting = Some(FreeSince { is_needed: true, ..self.free_mounting(self.time) });
         self.next_mounting = None;
