@@ -45,7 +45,7 @@ fn hall() -> Recording {
 
 fn controller(criterion: &mut Criterion) {
     let recording = hall();
-    let options = RigOptions { seconds: f64::from(SECONDS), seed: 1, is_told: true, contours: None };
+    let options = RigOptions::told(f64::from(SECONDS), 1, None);
     let tape = Tape::record(&recording, &options).expect("the controller drives");
     let mode = tape.play(&recording).expect("the map fits").output().map(|output| output.mode);
     let rig = best(|| drop(Tape::record(&recording, &options)));

@@ -11,7 +11,7 @@ const HALL: &str = include_str!("../../host-sim/scenarios/warehouse_hall.toml");
 #[test]
 fn a_tape_leads_another_controller_to_the_same_pose() {
     let recording = simulate(&Scenario::parse(HALL).unwrap()).unwrap().recording;
-    let options = RigOptions { seconds: 10.0, seed: 1, is_told: true, contours: None };
+    let options = RigOptions::told(10.0, 1, None);
     let mut last = None;
     drive(&recording, &[], &options, |heard| last = heard.output.copied()).unwrap();
     let output = Tape::record(&recording, &options).unwrap().play(&recording).unwrap().output();

@@ -19,7 +19,7 @@ fn drive(reports: MotionReport, has_gyro: bool, seed: u64) {
     let length = truth.last().unwrap().time.since(truth.first().unwrap().time);
     let (mut compared, mut worst, mut beyond) = (0, (0.0_f64, 0.0_f64), 0);
     let mut remarks = Vec::new();
-    let options = RigOptions { seconds: length, seed, is_told: true, contours: None };
+    let options = RigOptions::told(length, seed, None);
     rig::drive(&simulation.recording, &[], &options, |heard| {
         let Some(output) = heard.output.filter(|_| heard.time > 2.0) else { return };
         let Some(truth) = (heard.truth)(output.time) else { return };

@@ -217,7 +217,7 @@ impl Campaign {
             fault.mislead(&mut recording, &mut random);
         }
         let mut judge = Judge::new(self.limits, window(&faults).0);
-        let options = RigOptions { seconds: self.seconds, seed: run.seed, is_told: true, contours: None };
+        let options = RigOptions::told(self.seconds, run.seed, None);
         rig::drive(&recording, &faults, &options, |heard| {
             // The vehicle is told where it is when it drives off.
             if heard.time >= 0.0 {

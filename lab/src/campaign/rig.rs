@@ -35,8 +35,8 @@ pub enum RigError {
     Map(MapError),
 }
 
-/// When the vehicle drives off, s after everything was switched on.
-const BEGIN: f64 = 5.0;
+/// How long a vehicle stands that is told where it starts, s.
+const STANDS: f64 = 5.0;
 /// Step of the simulated time, us: what the firmware's bus task sleeps at most.
 const STEP: u64 = 1_000;
 /// Steps between two poses that are judged.
@@ -54,10 +54,20 @@ pub struct RigOptions<'a> {
     pub seconds: f64,
     /// Seed of the faults of the lines.
     pub seed: u64,
-    /// Whether the controller is told where it starts.
-    pub is_told: bool,
+    /// How long everything has been switched on when the recording begins, s. Meanwhile the laser tells its first revolution again and again.
+    pub stands: f64,
+    /// When the controller is told where it starts, s after the recording begins; never if absent.
+    pub told: Option<f64>,
     /// Its map of contours, if it has one.
     pub contours: Option<KeptMap<'a>>,
+}
+
+impl<'a> RigOptions<'a> {
+    /// A vehicle that has stood for 5 s, and is told where it starts when the recording begins.
+    #[must_use]
+    pub const fn told(seconds: f64, seed: u64, contours: Option<KeptMap<'a>>) -> Self {
+        Self { seconds, seed, stands: STANDS, told: Some(0.0), contours }
+    }
 }
 
 /// What is heard a hundred times a second, from when everything was switched on.
@@ -65,7 +75,7 @@ pub struct RigOptions<'a> {
 pub struct Heard<'a> {
     /// Now.
     pub now: Time,
-    /// How long the vehicle has driven, s; negative while it stands before.
+    /// Time of the recording, s; negative before it begins.
     pub time: f64,
     /// What the controller would publish.
     pub output: Option<&'a PoseOutput>,
@@ -140,7 +150,7 @@ pub fn drive_listening(
     hear: impl FnMut(&Heard),
     listen: impl FnMut(Time, Given),
 ) -> Result<(), RigError> {
-    drive_rig(Rig::new(recording, options.contours, faults, options.seed)?, options, hear, listen)
+    drive_rig(Rig::new(recording, faults, options)?, options, hear, listen)
 }
 
 fn drive_rig(
@@ -150,13 +160,18 @@ fn drive_rig(
     mut listen: impl FnMut(Time, Given),
 ) -> Result<(), RigError> {
     let recording = rig.recording;
-    let begin = Time::from_seconds(BEGIN);
-    let steps = ((BEGIN + options.seconds) * 1e6) as u64 / STEP;
+    // Everything is switched on for one step at least.
+    let begin = Time::from_seconds(options.stands).max(Time::from_micros(STEP));
+    let told = options.told.map(|told| begin.offset(told));
+    let steps = ((options.stands + options.seconds) * 1e6) as u64 / STEP;
     for step in 1..=steps {
         let now = Time::from_micros(step * STEP);
         let time = now.since(begin);
         if now == begin {
-            rig.begin(now, options.is_told, &mut listen);
+            rig.begin(now);
+        }
+        if Some(now) == told {
+            rig.tell_start(now, &mut listen);
         }
         rig.switch(now, time)?;
         rig.control(now, time, &mut listen);
@@ -172,12 +187,8 @@ fn drive_rig(
 }
 
 impl<'a> Rig<'a> {
-    fn new(
-        recording: &'a Recording,
-        contours: Option<KeptMap<'a>>,
-        faults: &'a [&'a Fault],
-        seed: u64,
-    ) -> Result<Self, RigError> {
+    fn new(recording: &'a Recording, faults: &'a [&'a Fault], options: &RigOptions<'a>) -> Result<Self, RigError> {
+        let RigOptions { seed, stands, contours, .. } = *options;
         let settings = Settings::of(recording.parameters);
         let nodes = EncoderNodes::of(&settings);
         let motion = EmulatedMotion::new(recording, &nodes)?.standing();
@@ -190,7 +201,7 @@ impl<'a> Rig<'a> {
             controller: None,
             gyro: EmulatedGyro::of(recording, &settings.gyro_frame),
             motion,
-            sensor: Sensor::new(drive, clock(faults), None, true),
+            sensor: Sensor::new(drive, clock(faults, stands), None, true),
             connection: None,
             from_laser: Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams)),
             to_laser: Line::new(LASER_LATENCY, Random::new(seed, Stream::Telegrams)),
@@ -211,15 +222,19 @@ impl<'a> Rig<'a> {
         Ok(())
     }
 
-    /// Lets the vehicle drive off.
-    fn begin(&mut self, now: Time, is_told: bool, listen: &mut impl FnMut(Time, Given)) {
+    /// Lets the recording begin.
+    fn begin(&mut self, now: Time) {
         self.motion.begin(now);
         if let Some(gyro) = &mut self.gyro {
             gyro.begin(now);
         }
         self.sensor.begin(now.since(Time::default()));
-        if let (true, Some(controller), Some(RecordedEvent::SetPose(fix))) =
-            (is_told, &mut self.controller, self.recording.events.first())
+    }
+
+    /// Tells the controller where the recording says that it starts.
+    fn tell_start(&mut self, now: Time, listen: &mut impl FnMut(Time, Given)) {
+        if let (Some(controller), Some(RecordedEvent::SetPose(fix))) =
+            (&mut self.controller, self.recording.events.first())
         {
             let mut fix = *fix;
             fix.time = now;
@@ -349,14 +364,14 @@ fn stated(pose: &PublishedPose, now: Time) -> Time {
     Time::from_micros(1000 * milliseconds.saturating_add_signed(-i64::from(age)))
 }
 
-/// What the laser's clock shows.
-fn clock(faults: &[&Fault]) -> SensorClockOptions {
+/// What the laser's clock shows, so many seconds before the recording begins.
+fn clock(faults: &[&Fault], stands: f64) -> SensorClockOptions {
     let mut clock = SensorClockOptions { start: 1_000_000, ..SensorClockOptions::default() };
     for fault in faults {
         match fault.what {
-            FaultKind::LaserClockJumps { milliseconds } => clock.jumps.push((BEGIN + fault.from, milliseconds)),
+            FaultKind::LaserClockJumps { milliseconds } => clock.jumps.push((stands + fault.from, milliseconds)),
             FaultKind::LaserClockDrifts { share } => clock.drift = share,
-            FaultKind::LaserClockWraps => clock.start = (CLOCK_RANGE - (BEGIN + fault.from) * 1e3) as u32,
+            FaultKind::LaserClockWraps => clock.start = (CLOCK_RANGE - (stands + fault.from) * 1e3) as u32,
             _ => {}
         }
     }

@@ -59,7 +59,7 @@ pub fn soak(scenario: &Scenario, hours: u64, mut done: impl FnMut()) -> Result<V
     let limits = AlertLimits::default();
     let mut all = Vec::new();
     let (mut judge, mut errors, mut begun) = (Judge::new(limits, 0.0), Vec::new(), Instant::now());
-    let options = RigOptions { seconds, seed: scenario.seed, is_told: true, contours: None };
+    let options = RigOptions::told(seconds, scenario.seed, None);
     rig::drive(&recording, &[&wrap], &options, |&Heard { now, time, output, truth, .. }| {
         // The vehicle is told where it is when it drives off.
         if time < 0.0 {

@@ -313,7 +313,7 @@ fn run(site: Site, sensor: SensorKind, seconds: Option<f64>, seed: u64) -> Resul
     let fix = PoseFix { time: START, pose, position_deviation: FIRST.0, heading_deviation: FIRST.1 };
     recording.events.insert(0, RecordedEvent::SetPose(fix));
     let length = drive.truth.last().map_or(0.0, |last| last.time.since(START));
-    let options = RigOptions { seconds: length, seed, is_told: true, contours: Some(contours.view()) };
+    let options = RigOptions::told(length, seed, Some(contours.view()));
     rig::drive(&recording, &[], &options, |heard| {
         if heard.time < SETTLED {
             return;

@@ -414,7 +414,7 @@ fn blind_drive(kind: Kind, seed: u64) -> Result<Drive, GyroError> {
     let (blind, end) = times(&scenario, kind.before);
     let simulation = simulate(&scenario)?;
     let silence = silence_from(blind);
-    let options = RigOptions { seconds: end, seed, is_told: true, contours: None };
+    let options = RigOptions::told(end, seed, None);
     let (mut at_start, mut way_driven, mut last): (Option<f64>, f64, Option<Pose>) = (None, 0.0, None);
     let mut drive = Drive { lost: f64::INFINITY, is_beyond: false, is_alarmed: false };
     rig::drive(&simulation.recording, &[&silence], &options, |heard| {
@@ -441,7 +441,7 @@ fn sound_drive(vehicle: VehicleKind, has_gyro: bool, seed: u64) -> Result<(f64, 
     let scenario = scenario(kind, seed);
     let (_, end) = times(&scenario, Before::Drives);
     let simulation = simulate(&scenario)?;
-    let options = RigOptions { seconds: end, seed, is_told: true, contours: None };
+    let options = RigOptions::told(end, seed, None);
     let (mut way, mut last) = (0.0, None::<Pose>);
     let (mut alarms, mut last_alarm) = (0, f64::NEG_INFINITY);
     rig::drive(&simulation.recording, &[], &options, |heard| {
@@ -473,7 +473,7 @@ fn slipping_drive(
     let simulation = simulate(&scenario)?;
     let silence = silence_from(BEFORE + lead + 1.0);
     let faults = if shown_by == ShownBy::Reflectors { &[][..] } else { &[&silence] };
-    let options = RigOptions { seconds: end.min(from + 3.0), seed, is_told: true, contours: None };
+    let options = RigOptions::told(end.min(from + 3.0), seed, None);
     let (mut begun, mut told, mut is_beyond) = (None::<Pose>, None, false);
     let (mut driven, mut last) = (0.0, None::<Pose>);
     rig::drive(&simulation.recording, faults, &options, |heard| {

@@ -33,6 +33,8 @@ pub struct Hall {
 pub const LONGEST_BLIND: f64 = 3.0;
 /// Reflectors farther away than this do not count for the commissioning check, m.
 pub const CHECKED_RANGE: f64 = 25.0;
+/// How long the vehicle stands, switched on, before anything may happen, s; it drives off a second later.
+pub const STANDS: f64 = 5.0;
 
 /// From the middle of the middle aisle to the first reflector, m; one on a rack is seen from 2 m before it.
 const HALF_BARE: f64 = 6.8;
@@ -107,7 +109,13 @@ pub fn draw(seed: u64) -> Hall {
         seed,
         world: WorldOptions::Shapes(shapes),
         path,
-        drive: DriveOptions { speed, stop_between_legs: 3.0, end_standstill: 6.0, ..DriveOptions::default() },
+        drive: DriveOptions {
+            speed,
+            start_standstill: STANDS + 1.0,
+            stop_between_legs: 3.0,
+            end_standstill: 6.0,
+            ..DriveOptions::default()
+        },
         reflectors: ReflectorOptions { missing_share: 0.1, ..ReflectorOptions::default() },
         ..Scenario::default()
     };

@@ -9,6 +9,7 @@ use agv_host_sim::simulate::standard;
 use serde::{Deserialize, Serialize};
 
 use super::blinding::Blinding;
+use super::hall::STANDS;
 use crate::campaign::fault::{Fault, FaultKind};
 
 /// Why kinds of faults cannot be read.
@@ -44,7 +45,7 @@ pub enum KindsError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Begin {
-    /// At any time of the drive.
+    /// At any time of the drive, once the vehicle has stood.
     #[default]
     AnyTime,
     /// It is there from the beginning.
@@ -225,7 +226,7 @@ impl Kind {
         if self.sizes.is_empty() { &[1.0] } else { &self.sizes }
     }
 
-    /// The fault of that size, beginning `from` s after the vehicle drives off.
+    /// The fault of that size, beginning at `from`, s.
     ///
     /// # Errors
     /// What is wrong with the kind.
@@ -269,13 +270,12 @@ impl Kind {
         !matches!(fault, Some(Drawn::Fault(fault)) if !fault.what.is_possible(vehicle))
     }
 
-    /// When the fault of a run begins, s after the vehicle drives off, in a drive of that many seconds in which the vehicle
-    /// stands at those times, and drives on later.
+    /// When the fault of a run begins, s, in a drive of that many seconds in which the vehicle stands at those times, and drives on later.
     pub fn draw_begin(&self, seconds: f64, standing: &[f64], random: &mut Random) -> f64 {
         let drawn = random.uniform();
         match self.begins {
             Begin::Before => 0.0,
-            Begin::AnyTime => drawn * seconds,
+            Begin::AnyTime => STANDS + drawn * (seconds - STANDS),
             Begin::Standing => standing.get((drawn * standing.len() as f64) as usize).copied().unwrap_or(0.0),
         }
     }

@@ -9,7 +9,7 @@ use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, Shapes, WorldOptions};
 use agv_host_sim::simulate::{START, simulate};
 
-use super::hall::{Hall, draw};
+use super::hall::{Hall, STANDS, draw};
 use super::judge::{Judge, Moment};
 use super::kinds::{Drawn, Hidden, Kind};
 use super::outcome::Outcome;
@@ -126,7 +126,8 @@ impl Trial<'_> {
             of_drawn.filter_map(|((kind, _), (from, drawn))| kind.hidden(*from, drawn)).collect();
         let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
         let contours = contours.as_ref().map(ContourMap::view);
-        let options = RigOptions { seconds, seed: self.seed, is_told, contours };
+        let told = is_told.then_some(STANDS);
+        let options = RigOptions { seconds, seed: self.seed, stands: 0.0, told, contours };
         rig::drive(&recording, &faults, &options, |heard| {
             let before = here;
             here = (heard.truth)(heard.now).or(before);
