@@ -26,6 +26,11 @@ pub struct Drive {
     /// How far beside the first reflector something else is seen instead, m; the first one is near then, and seen to 2 mm. None if it is
     /// seen as the others are.
     pub beside: Option<f64>,
+    /// Reports of the odometry in a revolution.
+    pub samples: usize,
+    /// Deviation of what each but the last of them rounds the way to, m, and what the last one has.
+    pub rounding: f64,
+    rounded: f64,
 }
 
 impl Drive {
@@ -48,6 +53,9 @@ impl Drive {
             published: truth,
             shear: 0.0,
             beside: None,
+            samples: 1,
+            rounding: 0.0,
+            rounded: 0.0,
         };
         drive.begin();
         // It has its pose while it stands, so its clock is not in doubt.
@@ -90,10 +98,25 @@ impl Drive {
             covariance: Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-8, 4e-8)),
             distance: told.x.abs(),
         };
-        self.time = end;
         self.truth = self.truth.compose(step);
-        self.odometry = self.odometry.compose(&told);
-        self.monitor.travel(&motion, &self.odometry);
+        let samples = self.samples;
+        for sample in 1..=samples {
+            let is_last = sample == samples;
+            let rounded = if is_last { 0.0 } else { self.rounding * self.random.normal() };
+            let share = 1.0 / samples as f64;
+            let displacement = Pose::new(share * told.x + rounded - self.rounded, share * told.y, share * told.theta);
+            self.rounded = rounded;
+            self.odometry = self.odometry.compose(&displacement);
+            let part = Motion {
+                start: self.time,
+                end: if is_last { end } else { self.time.offset(share * 0.125) },
+                displacement,
+                covariance: motion.covariance * share,
+                distance: share * motion.distance,
+            };
+            self.time = part.end;
+            self.monitor.travel(&part, &self.odometry);
+        }
         self.monitor.step(end, &self.odometry);
     }
 

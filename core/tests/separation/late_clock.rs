@@ -89,3 +89,23 @@ fn a_laser_that_is_late_of_a_vehicle_that_finds_itself_while_it_moves_is_held() 
         }
     }
 }
+
+/// At constant speed nothing shows the clock; that of single samples is not constant.
+#[test]
+fn what_the_wheels_round_shows_no_clock() {
+    for seed in 1..6 {
+        for late in [0.05, 0.125, 0.2] {
+            let mut drive = Drive::new(seed);
+            (drive.samples, drive.rounding) = (12, 4e-4);
+            let mount = drive.mount;
+            drive.published = drive.truth.compose(&Pose::new(-late * 0.4, 0.0, 0.0));
+            drive.begin();
+            let faster = (1..=10).map(|part| 0.05 + 0.01 * f64::from(part));
+            for along in faster.chain([0.15; 160]) {
+                drive.true_mount = before(late, along, 0.0).compose(&mount);
+                drive.revolve(&Pose::new(along, 0.0, 0.0));
+                drive.assert_held(format_args!("{seed}: {late} s"));
+            }
+        }
+    }
+}

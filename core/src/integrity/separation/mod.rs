@@ -13,6 +13,7 @@ mod envelope;
 mod gyro;
 mod hypothesis;
 mod late_clock;
+mod mean_velocity;
 mod misfit;
 mod sensor_information;
 mod solution;
@@ -29,6 +30,7 @@ use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
 use late_clock::LateClock;
+use mean_velocity::MeanVelocity;
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
@@ -90,6 +92,7 @@ pub struct SolutionSeparation {
     time: Time,
     odometry_pose: Pose,
     pending: Pending,
+    velocity: MeanVelocity,
     /// Distance and turn since landmarks were last seen, m and rad.
     unseen: (f64, f64),
     all: Solution,
@@ -174,6 +177,7 @@ impl SolutionSeparation {
             time: Time::default(),
             odometry_pose: Pose::default(),
             pending: Pending::NONE,
+            velocity: MeanVelocity::NONE,
             unseen: (0.0, 0.0),
             all: nowhere.clone(),
             leave_outs: Vec::new(),
@@ -319,6 +323,7 @@ impl SolutionSeparation {
         let moved = &self.pending.moved;
         self.pending.moved = Pose { x: moved.x + x, y: moved.y + y, theta: moved.theta + theta };
         self.pending.last = Some(*motion);
+        self.velocity.add(motion);
         if self.pending.distance > LONGEST_STEP {
             self.step(motion.end, odometry_pose);
             let pose = self.pose;
@@ -387,13 +392,10 @@ impl SolutionSeparation {
     /// The laser, of which what follows is told, if it is at `mount` in R and R at `pose`.
     #[must_use]
     pub fn laser(&self, mount: &Pose, pose: &Pose) -> Laser {
-        let (speed_x, speed_y, turn) = self.pending.last.map_or((0.0, 0.0, 0.0), |motion| {
-            let duration = motion.end.since(motion.start).max(1e-3);
-            let Pose { x, y, theta } = motion.displacement;
-            (x / duration, y / duration, theta / duration)
-        });
+        let velocity = self.velocity.velocity();
+        let turn = velocity.z;
         let (sine, cosine) = libm::sincos(pose.theta);
-        let (x, y) = (speed_x - turn * mount.y, speed_y + turn * mount.x);
+        let (x, y) = (velocity.x - turn * mount.y, velocity.y + turn * mount.x);
         Laser {
             mount: *mount,
             sensor: pose.compose(mount),
