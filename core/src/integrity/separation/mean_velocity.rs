@@ -1,4 +1,4 @@
-//! How fast the vehicle goes, in the mean of a tenth of a second or two.
+//! How fast the vehicle goes, in the mean of about a tenth of a second.
 //!
 //! The velocity of one sample has its noise. A solution whose clock is free would take that for changes of speed which show no error of the clock,
 //! and so learn at constant speed that there is none.
@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use crate::odometry::{Coasting, Motion};
 
-/// Each of the two parts lasts at least so long, s.
+/// A part that lasts so long, s, is whole; one that lasts half as long tells enough alone: what is older tells of another speed.
 const SPAN: f64 = Coasting::SPAN;
 
 /// The displacements of so much time, added in R.
@@ -45,6 +45,10 @@ impl MeanVelocity {
     /// In R: m/s, m/s and rad/s.
     #[must_use]
     pub fn velocity(&self) -> Vector3<f64> {
-        (self.older.moved + self.newer.moved) / (self.older.seconds + self.newer.seconds).max(1e-3)
+        let Part { moved, seconds } = self.newer;
+        if seconds >= 0.5 * SPAN {
+            return moved / seconds;
+        }
+        (self.older.moved + moved) / (self.older.seconds + seconds).max(1e-3)
     }
 }
