@@ -28,6 +28,7 @@ mod mapping;
 mod misuse;
 mod modes;
 mod motion;
+mod motion_doubt;
 mod mounting_check;
 mod moving_laser;
 mod odometry;

@@ -229,7 +229,7 @@ fn told_gone(count: usize, range: f32, has_scan: impl Fn(usize) -> bool) -> Opti
             check.see(&around(index, count), 5.0);
         }
         assert!(!check.disagrees());
-        let misses = has_scan(revolution) && check.misses(&scan, &Pose::default(), false);
+        let misses = has_scan(revolution) && check.misses(&scan, &Pose::default(), false, false);
         assert!(!(misses && revolution < 3));
         misses.then(|| revolution - 3)
     })
@@ -260,7 +260,7 @@ fn one_landmark_that_is_seen_again_is_enough_against_a_move() {
     for revolution in 0..8 {
         check.begin(time(revolution));
         (0..6).filter(|index| revolution < 3 || *index == 0).for_each(|index| check.see(&around(index, 6), 5.0));
-        assert!(!check.misses(&scan, &Pose::default(), false), "{revolution}");
+        assert!(!check.misses(&scan, &Pose::default(), false, false), "{revolution}");
     }
 }
 
@@ -278,7 +278,7 @@ fn is_change_told(count: usize, staying: usize, range: f32) -> bool {
         (0..staying).for_each(|index| check.see(&place(index), 5.0));
         (staying..count).for_each(|index| check.see(&pose.transform(&place(index)), 5.0));
         let disagrees = check.disagrees();
-        let confirmed = range > 0.0 && check.misses(&scan, &Pose::default(), false);
+        let confirmed = range > 0.0 && check.misses(&scan, &Pose::default(), false, false);
         disagrees || confirmed
     })
 }

@@ -6,6 +6,7 @@
 //! | [`InnovationMonitor`] | how many observations fit, and how well | a wrong pose, or a map that looks alike |
 //! | [`SlipCheck`] | where landmarks are in the frame of the odometry | a vehicle that slides or is carried |
 //! | [`SurfaceCheck`] | where surfaces are in the frame of the odometry | a vehicle that is carried where no landmark is |
+//! | [`MotionDoubt`] | what a revolution has lost sight of, and what it sees instead | a vehicle that may have been carried |
 //! | [`JumpCheck`] | the pose before and after a correction | a laser that was knocked |
 //! | [`RedundancyCheck`] | what redundant wheels say differently | a wheel that slips |
 //! | [`TractionCheck`] | the estimate before and after each correction | a wheel that slips |
@@ -17,6 +18,7 @@
 mod alert_limits;
 mod innovation_monitor;
 mod jump_check;
+mod motion_doubt;
 mod mounting_check;
 mod redundancy_check;
 pub mod separation;
@@ -28,6 +30,7 @@ mod turn_check;
 pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
 pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
 pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
+pub use motion_doubt::MotionDoubt;
 pub use mounting_check::{MountingCheck, Suspect};
 pub use redundancy_check::{RedundancyCheck, WheelErrors};
 pub use slip_check::SlipCheck;
@@ -49,6 +52,7 @@ pub struct Integrity {
     /// One for each laser: they see the same landmarks at other times.
     slip: [SlipCheck; LASERS],
     surfaces: [SurfaceCheck; LASERS],
+    doubts: [MotionDoubt; LASERS],
     jumps: JumpCheck,
     mounting: MountingCheck,
     /// Of a vehicle with a gyro.
@@ -78,6 +82,7 @@ impl Integrity {
             innovations: InnovationMonitor::new(parameters),
             slip: [const { SlipCheck::new() }; LASERS],
             surfaces: [const { SurfaceCheck::new() }; LASERS],
+            doubts: [MotionDoubt::default(); LASERS],
             jumps: JumpCheck::new(),
             mounting: MountingCheck::new(),
             turns: TurnCheck::new(),
@@ -125,6 +130,20 @@ impl Integrity {
         slip.disagrees()
     }
 
+    /// Takes what the map of landmarks says of a revolution of a laser that was taken just before.
+    pub fn compare_with_map(&mut self, laser: LaserId, uses: &[LandmarkUse]) {
+        let Some((slip, doubt)) = self.slip.get(laser.index()).zip(self.doubts.get_mut(laser.index())) else { return };
+        let reflectors = uses.iter().filter(|seen| seen.kind == LandmarkKind::Reflector);
+        let fitting = reflectors.clone().filter(|seen| seen.verdict == Verdict::Accepted).count();
+        doubt.take_landmarks(slip.has_lost_sight(), reflectors.count(), fitting);
+    }
+
+    /// Whether it is doubtful that a laser has moved as the odometry says.
+    #[must_use]
+    pub fn is_motion_doubtful(&self) -> bool {
+        self.doubts.iter().any(MotionDoubt::is_raised)
+    }
+
     /// Nobody knows how the vehicle has moved: what is seen is not compared with what was seen before.
     pub fn forget_motion(&mut self) {
         for slip in &mut self.slip {
@@ -133,6 +152,7 @@ impl Integrity {
         for surfaces in &mut self.surfaces {
             surfaces.clear();
         }
+        self.doubts = [MotionDoubt::default(); LASERS];
     }
 
     /// Takes a scan of a laser whose reflectors of that revolution were taken just before; `sensor` is where the laser was so many seconds
@@ -141,8 +161,10 @@ impl Integrity {
         let laser = scan.laser.index();
         let middle = sensor(0.5 * scan.end().since(scan.start));
         let Some((slip, surfaces)) = self.slip.get_mut(laser).zip(self.surfaces.get_mut(laser)) else { return false };
+        let Some(doubt) = self.doubts.get_mut(laser) else { return false };
         let are_elsewhere = surfaces.disagrees(scan, sensor);
-        let misses = slip.misses(scan, &middle, surfaces.agrees());
+        doubt.take_surfaces(surfaces.agrees());
+        let misses = slip.misses(scan, &middle, surfaces.agrees(), doubt.do_all_fit());
         misses || are_elsewhere || (slip.is_doubted() && surfaces.is_doubtful())
     }
 

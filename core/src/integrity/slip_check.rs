@@ -40,8 +40,10 @@ const RANGES: (f64, f64) = (1.0, 15.0);
 /// well less than once in fifty revolutions, and flat ones may turn out of its sight, two at once on both sides of an aisle.
 const GONE: [usize; 2] = [4, 3];
 /// Fewer that should be seen again may all turn out of its sight at once, as at the end of an aisle: if the surfaces of the scan have stayed,
-/// they tell no move, unless others are seen.
+/// they tell no move, unless others are seen. Nor do more, if the map has all that are seen instead.
 const MANY: u8 = 7;
+/// Fewer of which none is seen again are nothing unusual.
+const SEVERAL: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]
 struct Remembered {
@@ -169,9 +171,7 @@ impl SlipCheck {
     pub fn disagrees(&mut self) -> bool {
         let can_tell = usize::from(self.expected.min(self.seen)) >= LEAST;
         self.gone = if self.sees_none_again() { self.gone } else { 0 };
-        let is_contradicted = can_tell
-            && f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
-            && self.new > self.seen.saturating_sub(self.new);
+        let is_contradicted = can_tell && self.sees_too_few_again() && self.new > self.seen.saturating_sub(self.new);
         self.contradictions = if is_contradicted { self.contradictions.saturating_add(1) } else { 0 };
         let disagrees = self.contradictions >= IN_A_ROW;
         let is_sure = self.expected.min(self.seen) >= SURE && self.seen_again == 0;
@@ -185,16 +185,26 @@ impl SlipCheck {
         self.is_doubted
     }
 
+    fn sees_too_few_again(&self) -> bool {
+        f64::from(self.seen_again) < TOO_FEW * f64::from(self.expected)
+    }
+
+    /// Whether hardly any landmark is seen again in the revolution of several that should be.
+    #[must_use]
+    pub fn has_lost_sight(&self) -> bool {
+        self.expected >= SEVERAL && self.sees_too_few_again()
+    }
+
     /// Whether a scan is awaited because no landmark was seen again of those that should be.
     fn sees_none_again(&self) -> bool {
         let [_, fewest] = GONE;
         self.awaits_scan && self.seen_again == 0 && usize::from(self.expected) >= fewest
     }
 
-    /// Takes the scan of the revolution that has ended, whose laser was at `sensor` in the frame of the odometry, and whether its surfaces
-    /// have stayed where they were. True if landmarks that should be seen again are gone, though nothing hides them: none is there, or others
-    /// are.
-    pub fn misses(&mut self, scan: &Scan, sensor: &Pose, have_surfaces_stayed: bool) -> bool {
+    /// Takes the scan of the revolution that has ended, whose laser was at `sensor` in the frame of the odometry, whether its surfaces
+    /// have stayed where they were, and whether the map has all that the revolution has seen. True if landmarks that should be seen again are
+    /// gone, though nothing hides them: none is there, or others are.
+    pub fn misses(&mut self, scan: &Scan, sensor: &Pose, have_surfaces_stayed: bool, do_all_fit: bool) -> bool {
         let count = |nearest: f64, farthest: f64| {
             let is_gone = |one: &&Remembered| {
                 let place = sensor.inverse_transform(&one.position.cast());
@@ -209,7 +219,7 @@ impl SlipCheck {
         let is_confirmed = self.is_doubted && 2 * count(0.0, f64::INFINITY) >= unseen;
         self.awaits_scan = false;
         self.gone = if gone >= in_a_row { self.gone.saturating_add(1) } else { 0 };
-        let may_have_turned = self.expected < MANY && have_surfaces_stayed;
+        let may_have_turned = (self.expected < MANY || do_all_fit) && have_surfaces_stayed;
         let are_gone = gone >= at_once || self.gone >= IN_A_ROW;
         is_confirmed || (are_gone && !may_have_turned)
     }

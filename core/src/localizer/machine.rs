@@ -327,6 +327,10 @@ impl<C: Capacities> Localizer<C> {
         if let Some(laser) = revolution_of {
             let to_odometry = before.odometry_pose.compose(&before.pose.inverse());
             let slips = self.integrity.see_reflectors(laser, self.timeline.now(), &to_odometry, uses);
+            // What SLAM has not seen before is in no map.
+            if self.has_reflectors() && !self.parameters.maps.slam {
+                self.integrity.compare_with_map(laser, uses);
+            }
             if slips && self.lost.is_none() {
                 self.lost = Some(Reason::MotionDisagrees);
             }

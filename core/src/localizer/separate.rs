@@ -39,6 +39,7 @@ impl<C: Capacities> Localizer<C> {
         if laser == Some(LaserId::FIRST) {
             self.separation.hear_laser(self.laser_odometry.pose(self.timeline.odometry_pose(), &mount));
         }
+        self.separation.doubt_motion(self.integrity.is_motion_doubtful());
         self.separation.doubt_laser(self.integrity.suspect() == Some(Suspect::Laser));
         let square = self.integrity.innovations.mean_normalised_square();
         self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));

@@ -10,8 +10,9 @@ use crate::sources::BySurfaces;
 /// behind 8 m, in 95 % of the scans.
 const DRIFT: [f64; 2] = [0.005, 0.001];
 
-/// Where surfaces did not show how the laser has moved, it is taken to be off by so much at the most, m and rad: more than any alert limit.
-const TORN: [f64; 2] = [1.5, 0.6];
+/// Where surfaces did not show how the laser has moved, or landmarks say that it may have moved otherwise, it is taken to be off by so much at
+/// the most, m and rad: more than any alert limit.
+pub const TORN: [f64; 2] = [1.5, 0.6];
 
 /// The bound of a pose by it; landmarks had told that with that covariance, to which the odometry has added its own.
 #[must_use]

@@ -111,6 +111,8 @@ pub struct SolutionSeparation {
     /// What bounded the pose, if the odometry is wrong, when landmarks last told it.
     odometry_when_told: SolutionBound,
     unheard: Unheard,
+    /// Whether it is doubtful that the laser has moved as the odometry says.
+    is_motion_doubtful: bool,
     /// Of a vehicle with a gyro.
     gyro: Option<GyroSeparation>,
     told: SensorInformation,
@@ -192,6 +194,7 @@ impl SolutionSeparation {
             by_surfaces: None,
             odometry_when_told: SolutionBound::UNBOUNDED,
             unheard: Unheard::new(),
+            is_motion_doubtful: false,
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
             misfit: Misfit::NONE,
@@ -255,6 +258,7 @@ impl SolutionSeparation {
         self.restart_odometry();
         self.by_surfaces = None;
         self.unheard.begin(time);
+        self.is_motion_doubtful = false;
         self.leave_outs.clear();
         if self.mounting.is_none() {
             self.mounting = Some(self.free_mounting(time));
@@ -284,6 +288,11 @@ impl SolutionSeparation {
     /// Whether the corrections say that the laser has moved: as long as they do, the solutions count in which it has.
     pub fn doubt_laser(&mut self, is_doubted: bool) {
         self.is_laser_doubted = is_doubted;
+    }
+
+    /// Whether it is doubtful that the laser has moved as the odometry says: as long as it is, the vehicle may be elsewhere.
+    pub fn doubt_motion(&mut self, is_doubtful: bool) {
+        self.is_motion_doubtful = is_doubtful;
     }
 
     /// What was wrong before may have been learnt as something else; so nothing is kept but about where the vehicle is.
@@ -609,6 +618,7 @@ impl SolutionSeparation {
         let free = found_mounting.into_iter().chain(found_yaw);
         free.for_each(|one| one.add_to(&mut envelope, pose, &one_fault, map_variances));
         let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
+        let [carried, turned] = if self.is_motion_doubtful { by_surfaces::TORN } else { [0.0; 2] };
         Bounds {
             envelope,
             odometry: bound(&self.odometry, &one_fault),
@@ -618,8 +628,8 @@ impl SolutionSeparation {
             }),
             wheels: self.gyro.as_ref().map(|gyro| bound(gyro.alone(), &one_fault)),
             widening: ProtectionLevel {
-                position: contradiction.position + misfit.position,
-                heading: contradiction.heading + misfit.heading,
+                position: contradiction.position + misfit.position + carried,
+                heading: contradiction.heading + misfit.heading + turned,
             },
             is_elsewhere: by_surfaces.is_some_and(|bound| bound.is_exceeded()),
         }
