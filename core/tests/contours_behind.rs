@@ -5,11 +5,12 @@ use std::f64::consts::{PI, TAU};
 
 use agv_core::geometry::{Pose, Twist, difference};
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, PoseOutput, SlamSlots};
-use agv_core::measurement::{LaserId, PoseIncrement, Scan, Time};
+use agv_core::measurement::{PoseIncrement, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::sources::Contours;
 use nalgebra::{Matrix3, Vector3};
 
+use super::support::standing_scan;
 use super::support::walls::{Noise, Walls, corridor, range, room};
 
 const BEAMS: usize = 360;
@@ -67,15 +68,7 @@ impl Drive {
         let at = self.truth.compose(&LASER);
         let of = |beam: usize| Pose { theta: at.theta + beam as f64 * TAU / BEAMS as f64 - PI, ..at };
         let ranges: Vec<f32> = (0..BEAMS).map(|beam| range(&self.walls, &of(beam), &mut self.noise)).collect();
-        self.localizer.handle(&Event::Scan(Scan {
-            laser: LaserId::FIRST,
-            start: self.time(),
-            beam_interval: 0.0,
-            first_bearing: -PI,
-            bearing_step: TAU / BEAMS as f64,
-            ranges: &ranges,
-            intensities: &[],
-        }));
+        self.localizer.handle(&Event::Scan(standing_scan::scan(self.time(), &ranges)));
     }
 
     /// Goes on for a step; what is reported has the noise that the vehicle believes, and is longer by a share.

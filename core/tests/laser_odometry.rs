@@ -6,12 +6,12 @@ use std::f64::consts::{PI, TAU};
 use agv_core::geometry::{Pose, Twist};
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, PoseFix, PoseOutput, Reason, SlamSlots};
 use agv_core::maps::Landmark;
-use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Time};
 use agv_core::odometry::Vehicle;
 use agv_core::sources::Contours;
 
-use super::support::hall::cast;
 use super::support::stage::reflectors;
+use super::support::standing_scan;
 
 const BEAMS: usize = 720;
 type Small = Localizer<CapacitiesOf<BEAMS, 64, 16, 4, SlamSlots, Contours<'static, 400, 4096, 20>>>;
@@ -91,20 +91,8 @@ impl Drive {
 
     /// The scan of a revolution that takes no time; `change` is done to each range.
     fn see_surfaces(&mut self, change: impl Fn(usize, f64) -> f64) -> PoseOutput {
-        let (sensor, time) = (self.truth.compose(&LASER), self.time());
-        let step = TAU / BEAMS as f64;
-        let ranges: Vec<f32> =
-            (0..BEAMS).map(|beam| change(beam, cast(&sensor, beam as f64 * step - PI)) as f32).collect();
-        let scan = Scan {
-            laser: LaserId::FIRST,
-            start: time,
-            beam_interval: 0.0,
-            first_bearing: -PI,
-            bearing_step: step,
-            ranges: &ranges,
-            intensities: &[],
-        };
-        self.localizer.handle(&Event::Scan(scan)).pose
+        let ranges = standing_scan::ranges(&self.truth.compose(&LASER), BEAMS, change);
+        self.localizer.handle(&Event::Scan(standing_scan::scan(self.time(), &ranges))).pose
     }
 
     /// A motion that nothing is seen behind.

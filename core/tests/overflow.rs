@@ -3,7 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::support::hall::{cast, corners};
+use crate::support::hall::corners;
+use crate::support::standing_scan;
 use agv_core::geometry::Pose;
 use agv_core::localizer::{CapacitiesOf, Event, Localizer, OBSERVATIONS, Parameters, PoseFix};
 use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
@@ -85,18 +86,8 @@ fn of_too_many_bright_spots_those_of_all_directions_are_kept() {
 #[test]
 fn of_too_many_features_the_best_known_are_kept() {
     const BEAMS: usize = 1440;
-    let bearing_step = TAU / BEAMS as f64;
-    let place = Pose::new(0.4, 0.3, 0.2);
-    let ranges: Vec<f32> = (0..BEAMS).map(|beam| cast(&place, beam as f64 * bearing_step - PI) as f32).collect();
-    let scan = Scan {
-        laser: LaserId::FIRST,
-        start: Time::default(),
-        beam_interval: 0.0,
-        first_bearing: -PI,
-        bearing_step,
-        ranges: &ranges,
-        intensities: &[],
-    };
+    let ranges = standing_scan::ranges(&Pose::new(0.4, 0.3, 0.2), BEAMS, |_, range| range);
+    let scan = standing_scan::scan(Time::default(), &ranges);
     let mut points = Box::new(PointScan::<BEAMS>::new());
     points.set(&scan, 0.1, 50.0);
     let mut detector = Box::new(Detector::<BEAMS>::new(Falko::mended()));

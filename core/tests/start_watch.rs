@@ -1,15 +1,13 @@
 //! A laser that is knocked while the vehicle does not know where it is: the truth is kept apart.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use std::f64::consts::{PI, TAU};
-
 use agv_core::geometry::{Pose, Twist};
 use agv_core::localizer::{Event, Mode, PoseFix, PoseOutput};
 use agv_core::maps::Landmark;
-use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflectors, Scan, Time};
+use agv_core::measurement::{PoseIncrement, ReflectorObservation, Reflectors, Time};
 
-use super::support::hall::cast;
 use super::support::stage::{LASER, Small, parameters, reflectors};
+use super::support::standing_scan;
 
 const BEAMS: usize = 720;
 
@@ -69,18 +67,8 @@ impl Start {
         if self.tells == Tells::Reflectors {
             return self.localizer.outputs().pose;
         }
-        let step = TAU / BEAMS as f64;
-        let ranges: Vec<f32> = (0..BEAMS).map(|beam| cast(&sensor, beam as f64 * step - PI) as f32).collect();
-        let scan = Scan {
-            laser: LaserId::FIRST,
-            start: time,
-            beam_interval: 0.0,
-            first_bearing: -PI,
-            bearing_step: step,
-            ranges: &ranges,
-            intensities: &[],
-        };
-        self.localizer.handle(&Event::Scan(scan)).pose
+        let ranges = standing_scan::ranges(&sensor, BEAMS, |_, range| range);
+        self.localizer.handle(&Event::Scan(standing_scan::scan(time, &ranges))).pose
     }
 
     /// Gives the pose that a search among the reflectors finds: where the vehicle would be if the laser were where it is believed.

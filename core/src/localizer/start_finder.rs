@@ -8,7 +8,7 @@ use heapless::Vec;
 use super::start_confirmation::{Belief, Look, StartConfirmation, StartRule};
 use super::start_odometry::{Moved, Sight, StartOdometry};
 use super::{Event, Parameters, PoseFix};
-use crate::geometry::{Point, Pose};
+use crate::geometry::Pose;
 use crate::measurement::{LaserId, ReflectorObservation, Scan};
 use crate::relocalization::{
     IndexedReflectors, ReflectorAnswer, ReflectorFix, ReflectorNoise, ReflectorRelocalizer, ReflectorSnapshot,
@@ -187,12 +187,8 @@ impl<const SEEN: usize> StartFinder<SEEN> {
             return;
         };
         for observation in observations.iter().filter(|observation| observation.time >= known_from) {
-            let range = f64::from(observation.range);
-            let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
-            let in_robot = mount.transform(&Point::new(range * cosine, range * sine));
-            // The vehicle goes on, or has come here, as it has moved of late.
-            let position = self.odometry.recent().pose_at(observation.time).transform(&in_robot);
-            self.snapshot.see(&position, range, &noise);
+            let position = self.odometry.place(observation, mount);
+            self.snapshot.see(&position, f64::from(observation.range), &noise);
         }
     }
 

@@ -1,8 +1,8 @@
 //! How a vehicle has moved that does not know where it is: what it has seen is carried along, as long as the odometry may be believed.
 
 use super::{Event, Parameters};
-use crate::geometry::Pose;
-use crate::measurement::Time;
+use crate::geometry::{Point, Pose};
+use crate::measurement::{ReflectorObservation, Time};
 use crate::odometry::{Motion, OdometryError, RecentMotion, VehicleOdometer};
 
 /// Silence after which the odometry says nothing of the present, s.
@@ -70,6 +70,14 @@ impl StartOdometry {
     /// What was seen earlier is not placed; none if nothing is.
     pub(super) fn known_from(&self) -> Option<Time> {
         self.known_from
+    }
+
+    /// Where a reflector is in R as the vehicle is now, by how it has moved of late, or goes on: it was seen by a laser at `mount` in R.
+    pub(super) fn place(&self, seen: &ReflectorObservation, mount: &Pose) -> Point {
+        let range = f64::from(seen.range);
+        let (sine, cosine) = libm::sincos(f64::from(seen.bearing));
+        let in_robot = mount.transform(&Point::new(range * cosine, range * sine));
+        self.recent.pose_at(seen.time).transform(&in_robot)
     }
 
     /// Takes an event.

@@ -5,7 +5,7 @@
 
 use super::start_odometry::{Moved, Sight, StartOdometry};
 use super::{Event, Parameters};
-use crate::geometry::{Point, Pose};
+use crate::geometry::Pose;
 use crate::integrity::Integrity;
 use crate::measurement::{Reflectors, Scan};
 
@@ -48,14 +48,11 @@ impl StartWatch {
             Sight::Anew => integrity.forget_motion(),
             Sight::Useless => return false,
         }
-        let (recent, pose) = (self.odometry.recent(), self.odometry.pose());
+        let odometry = &self.odometry;
         let places = seen.observations.iter().map(|observation| {
-            let range = f64::from(observation.range);
-            let (sine, cosine) = libm::sincos(f64::from(observation.bearing));
-            let in_robot = mount.transform(&Point::new(range * cosine, range * sine));
-            (pose.transform(&recent.pose_at(observation.time).transform(&in_robot)), range)
+            (odometry.pose().transform(&odometry.place(observation, mount)), f64::from(observation.range))
         });
-        integrity.see_places(seen.laser, recent.end(), places)
+        integrity.see_places(seen.laser, odometry.recent().end(), places)
     }
 
     fn see_scan(&self, scan: &Scan, parameters: &Parameters, integrity: &mut Integrity) -> bool {

@@ -4,5 +4,6 @@ pub mod hall;
 pub mod kept_map;
 pub mod reference_drive;
 pub mod stage;
+pub mod standing_scan;
 pub mod view;
 pub mod walls;

@@ -10,6 +10,7 @@ use agv_core::measurement::{LaserId, PoseIncrement, ReflectorObservation, Reflec
 use agv_core::odometry::Vehicle;
 
 use super::hall::{cast, corners};
+use super::standing_scan;
 
 pub const BEAMS: usize = 1440;
 const KEYS: usize = 2;
@@ -225,19 +226,8 @@ impl Stage {
 
     /// The same, with something done to each beam's range.
     pub fn scan_as(&mut self, change: impl Fn(usize, f32) -> f32) -> PoseOutput {
-        let step = TAU / BEAMS as f64;
-        let sensor = self.sensor();
-        let range = |beam: usize| cast(&sensor, beam as f64 * step - PI) as f32;
-        let ranges: Vec<f32> = (0..BEAMS).map(|beam| change(beam, range(beam))).collect();
-        let scan = Scan {
-            laser: LaserId::FIRST,
-            start: self.time(),
-            beam_interval: 0.0,
-            first_bearing: -PI,
-            bearing_step: step,
-            ranges: &ranges,
-            intensities: &[],
-        };
-        self.localizer.handle(&Event::Scan(scan)).pose
+        let change = |beam: usize, range: f64| f64::from(change(beam, range as f32));
+        let ranges = standing_scan::ranges(&self.sensor(), BEAMS, change);
+        self.localizer.handle(&Event::Scan(standing_scan::scan(self.time(), &ranges))).pose
     }
 }
