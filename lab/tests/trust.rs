@@ -328,6 +328,25 @@ fn what_nobody_can_tell_yet_counts_apart() {
     assert_eq!((outcome(false), outcome(true)), ((2, 0, 100), (0, 100, 100)));
 }
 
+/// Where no size misleads, the largest share of error over protection level is often that without the fault.
+#[test]
+fn the_worst_size_of_a_fault_is_one_at_which_it_is_there() {
+    let row = |size: f64, most_over_level: f64, misleading: u64| Row {
+        kind: "telegrams dropped".to_owned(),
+        size,
+        with: None,
+        seed: 1,
+        is_accepted: true,
+        can_recover: false,
+        outcome: Some(Outcome { most_over_level, misleading, ..Outcome::default() }),
+    };
+    let worst = |rows: &[Row]| row::worst_size(&row::by_size(rows, "telegrams dropped"));
+    assert_eq!(worst(&[row(0.0, 0.4, 0), row(0.1, 0.2, 0), row(0.2, 0.3, 0), row(0.5, 0.1, 0)]), Some(0.2));
+    assert_eq!(worst(&[row(0.0, 0.4, 0), row(0.1, 1.2, 3), row(0.2, 1.1, 4)]), Some(0.2));
+    assert_eq!(worst(&[row(0.0, 0.4, 0)]), Some(0.0));
+    assert_eq!(worst(&[]), None);
+}
+
 #[test]
 fn rows_of_parts_are_those_of_the_whole() {
     let kinds = kinds::read(&scenarios("trust.toml")).unwrap().kinds;

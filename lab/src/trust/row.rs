@@ -185,11 +185,11 @@ pub fn by_size<'a>(rows: impl IntoIterator<Item = &'a Row>, kind: &str) -> Vec<O
 }
 
 /// The size of a kind at which its runs are worst: most failures, then hazards, then misleading outputs,
-/// then the largest share of error over protection level; the smallest such.
+/// then the largest share of error over protection level; the smallest such. Of size nought a fault is none, and is not asked if others are.
 #[must_use]
 pub fn worst_size(sizes: &[OfSize]) -> Option<f64> {
     let mut worst: Option<&OfSize> = None;
-    for of in sizes {
+    for of in sizes.iter().filter(|of| of.size != 0.0 || sizes.len() == 1) {
         if worst.is_none_or(|worst| of.badness() > worst.badness()) {
             worst = Some(of);
         }
