@@ -53,6 +53,30 @@ fn what_cannot_be_written_is_said_before_the_runs() {
     }
 }
 
+/// Rows of a sweep beside those of the worst sizes tell what every size has shown.
+#[test]
+fn every_size_is_told_where_the_sweep_is_known() {
+    let files = Files::new();
+    let (rows, page, report) = (files.path("rows.jsonl"), files.path("threats.md"), files.path("report.html"));
+    let kind = ["evaluate", "trust", "--kinds", KINDS, "--only", "start turned", "-q"];
+    let sweep = ["--first-seed", "5", "--sweep-runs", "1", "--shard", "0/1", "--output", &rows];
+    let output = agv(&[&kind[..], &sweep].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let merge = ["--merge", &rows, "--swept", &rows, "--threats", &page, "--report", &report, "--json"];
+    let output = agv(&[&kind[..], &merge].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let of = &told["per_fault"][0];
+    let sizes = of["sizes"].as_array().unwrap();
+    assert!(sizes.len() >= 9 && sizes.iter().any(|size| size["size"] == of["worst_size"]), "{of}");
+    let page = std::fs::read_to_string(page).unwrap();
+    assert_eq!(page.matches("| start turned |").count(), 2, "{page}");
+    let last = sizes.last().unwrap()["size"].to_string();
+    let curve = page.lines().last().unwrap();
+    assert!(curve.contains(&format!(" {}: ", last.trim_end_matches(".0"))), "{curve}");
+    assert_eq!(std::fs::read_to_string(report).unwrap().matches("<td>start turned").count(), 1 + sizes.len());
+}
+
 /// What a run of the table shows alone, it shows again; and its trace has every output, with the errors that were counted.
 #[test]
 fn a_run_of_the_table_is_made_again_alone() {

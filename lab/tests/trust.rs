@@ -9,6 +9,7 @@ use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_lab::campaign::Shard;
 use agv_lab::evaluate::levels;
+use agv_lab::trust::exact_bound;
 use agv_lab::trust::figures::figures;
 use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
@@ -215,7 +216,7 @@ fn pairs_count_in_the_totals_but_where_one_hides_the_other() {
         row("laser silent", 5.0, Some(("laser turned", 1.0)), 2),
         row("laser silent", 5.0, None, 0),
     ];
-    let found = figures(&rows, &catalogue);
+    let found = figures(&rows, &[], &catalogue);
     assert_eq!((found.runs, found.integrity_failures), (2, 2));
     assert_eq!((found.pairs.runs, found.pairs.failures, found.pairs_apart.failures), (1, 1, 1));
     assert_eq!(found.pairs_apart.failed[0].hidden_by.as_deref(), Some("laser"));
@@ -260,7 +261,7 @@ fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
     let counts: Vec<usize> = (1..=20).map(|seed| hall::draw(seed).scenario.build_world().reflectors.len()).collect();
     assert!(counts.iter().min() < counts.iter().max(), "{counts:?}");
     let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, &Tested::default(), || ()).unwrap();
-    let found = figures(&rows, &kinds::read(&scenarios("trust.toml")).unwrap());
+    let found = figures(&rows, &[], &kinds::read(&scenarios("trust.toml")).unwrap());
     assert_eq!((found.runs, found.panics, found.seeds), (2, 0, [1, 2]));
     assert!(found.first_claim_s[1] < 30.0 && found.nominal_mi == 0 && found.nominal_hmi == 0, "{found:?}");
     // The same run is the same row.
@@ -449,4 +450,67 @@ fn the_levels_of_the_car_park_hold() {
         assert!(row.mi_share == 0.0 && row.hazardous == 0, "{}: {}", row.mode, row.mi_share);
         assert_eq!(row.stanford.cells.iter().map(|(_, _, count)| count).sum::<u64>(), row.claims as u64);
     }
+}
+
+/// Against the quantiles of the beta and the chi-squared distribution (scipy.stats).
+#[test]
+fn bounds_of_what_was_counted_are_exact() {
+    let shares = [
+        (0, 300, 0.009_936_081_944_457_708),
+        (1, 300, 0.015_714_554_891_583_95),
+        (30, 300, 0.133_188_494_246_291_84),
+        (3, 25_800, 0.000_300_501_637_494_608_43),
+        (7, 7, 1.0),
+    ];
+    for (failures, runs, bound) in shares {
+        let found = exact_bound::of_share(failures, runs).unwrap();
+        assert!((found / bound - 1.0).abs() < 1e-9, "{failures} of {runs}: {found}");
+    }
+    assert_eq!(exact_bound::of_share(0, 0), None);
+    for (count, bound) in [(0, 2.995_732_273_553_99), (1, 4.743_864_518_390_577), (20, 29.062_018_840_434_014)] {
+        let found = exact_bound::of_count(count);
+        assert!((found / bound - 1.0).abs() < 1e-9, "{count}: {found}");
+    }
+}
+
+#[test]
+fn the_worst_values_say_whose_they_are() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let row = |kind: &str, seed, is_accepted, outcome: Outcome| Row {
+        kind: kind.to_owned(),
+        size: 5.0,
+        with: None,
+        seed,
+        is_accepted,
+        can_recover: false,
+        outcome: Some(Outcome { outputs: 1000, judged: 900, claims: 900, driven_um: 50_000_000_000, ..outcome }),
+    };
+    let sound = |available, level, first_claim| Outcome {
+        available,
+        nominal_mm: [(20, 500), (level, 1)].into(),
+        first_claim,
+        ..Outcome::default()
+    };
+    let rows = [
+        row(NOTHING, 1, true, Outcome { losses: 1, ..sound(890, 41, Some(100)) }),
+        row(NOTHING, 2, true, sound(900, 48, Some(110))),
+        // Availability and levels are asked for in halls that commissioning accepts.
+        row(NOTHING, 3, false, sound(5, 300, None)),
+        row("laser silent", 4, true, Outcome { worst_hazard_s: 0.2, hazards: 1, ..Outcome::default() }),
+    ];
+    let swept = [row("laser silent", 7, true, Outcome { most_over_level: 0.5, ..Outcome::default() })];
+    let found = figures(&rows, &swept, &catalogue);
+    let worst = |of: Option<agv_lab::trust::worst::Worst>| of.map(|worst| (worst.value, worst.seed));
+    assert_eq!(worst(found.worst.availability_travel), Some((890.0 / 900.0, 1)));
+    assert_eq!(worst(found.worst.availability_docking), None);
+    assert_eq!(worst(found.worst.losses), Some((1.0, 1)));
+    assert_eq!(worst(found.worst.pl_nominal_mm), Some((48.0, 2)));
+    assert_eq!(worst(found.worst.first_claim_s), Some((10.0, 3)));
+    assert_eq!(worst(found.worst.hmi_s), Some((0.2, 4)));
+    // One loss in the 100 km of two drives, and no failure of one run.
+    let bounds = &found.bounds;
+    assert!((bounds.losses_per_100km.unwrap() - 4.743_864_518).abs() < 1e-6, "{bounds:?}");
+    assert!((bounds.failures_of_singles.unwrap() - 0.95).abs() < 1e-9, "{bounds:?}");
+    let sizes = &found.per_fault[0].sizes;
+    assert_eq!((sizes.len(), sizes[0].size, sizes[0].error_over_pl_max), (1, 5.0, Some(0.5)));
 }

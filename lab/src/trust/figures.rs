@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::exact_bound;
 use super::kinds::{Catalogue, NOTHING};
 use super::of_kind::{Class, OfKind, per_fault};
 use super::of_pairs::{OfPairs, pairs};
 use super::outcome::Outcome;
 use super::row::{OfSize, Row};
 use super::stanford::Stanford;
+use super::worst::{WorstValues, seconds_to_first_claim, worst_values};
 use agv_host_sim::accuracy::Spread;
 
 /// The figures of a campaign; shares of nothing are none.
@@ -61,6 +63,10 @@ pub struct Figures {
     pub error_over_pl_max: f64,
     /// Time to the first claim without faults: 95 % mark and worst, s.
     pub first_claim_s: [f64; 2],
+    /// The worst values, and whose they are.
+    pub worst: WorstValues,
+    /// What may be true, though it was not seen.
+    pub bounds: Bounds,
     /// First and last seed.
     pub seeds: [u64; 2],
     /// Kinds of class C.
@@ -77,9 +83,24 @@ pub struct Figures {
     pub stanford_faults: Stanford,
 }
 
-/// The figures of these rows.
+/// Exact 95 % bounds, from above; of nothing there are none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Bounds {
+    /// Of the share of runs with one fault that fail.
+    pub failures_of_singles: Option<f64>,
+    /// Of the share of runs without faults with a misleading output.
+    pub nominal_mi: Option<f64>,
+    /// Of the share of runs without faults with a hazardous output.
+    pub nominal_hmi: Option<f64>,
+    /// Of the losses of availability for 100 km.
+    pub losses_per_100km: Option<f64>,
+    /// Of the false alarms for 100 km.
+    pub false_alarms_per_100km: Option<f64>,
+}
+
+/// The figures of these rows, and of those of the sweep by which the worst sizes were found, if they are known.
 #[must_use]
-pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
+pub fn figures(every_row: &[Row], swept: &[Row], catalogue: &Catalogue) -> Figures {
     let hidden = |row: &Row| {
         let (kind, size) = row.with.as_ref()?;
         catalogue.hidden_by((&row.kind, row.size), (kind, *size)).map(str::to_owned)
@@ -96,7 +117,12 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
     let recovering = OfSize { size: 0.0, rows: rows.iter().copied().filter(|row| row.can_recover).collect() };
     let first_claims = first_claims(&sound);
     let seeds = rows.iter().map(|row| row.seed);
-    let of_kinds = per_fault(&rows, catalogue);
+    let of_kinds = per_fault(&rows, swept, catalogue);
+    let per_100km = |count: f64| (km > 0.0).then(|| count / km * 100.0);
+    let losses = accepted.sum(|outcome| u64::from(outcome.losses));
+    let false_alarms = false_alarms(&accepted);
+    let singles = OfSize { size: 0.0, rows: faulty.iter().copied().filter(|row| row.with.is_none()).collect() };
+    let sound_runs = sound.rows.len() as u64;
     Figures {
         runs: rows.len(),
         panics: rows.iter().filter(|row| row.outcome.is_none()).count(),
@@ -119,14 +145,22 @@ pub fn figures(every_row: &[Row], catalogue: &Catalogue) -> Figures {
             accepted.sum(|outcome| outcome.within_docking),
             accepted.sum(|outcome| outcome.judged),
         ),
-        continuity_per_100km: (km > 0.0).then(|| accepted.sum(|outcome| u64::from(outcome.losses)) as f64 / km * 100.0),
-        false_alarms: false_alarms(&accepted),
+        continuity_per_100km: per_100km(losses as f64),
         recovered_share: share(recovering.count(|outcome| outcome.ends_right), recovering.rows.len() as u64),
         recovered_share_of_all: all.count(|outcome| outcome.ends_right) as f64 / rows.len().max(1) as f64,
         pl_nominal_mm: mark(&accepted, |outcome| &outcome.nominal_mm),
         pl_nominal_deg: mark(&accepted, |outcome| &outcome.nominal_cdeg).map(|hundredths| 0.01 * hundredths),
         error_over_pl_max: sound.most(|outcome| outcome.most_over_level),
         first_claim_s: [first_claims.p95, first_claims.max],
+        worst: worst_values(&all, &sound, &accepted),
+        bounds: Bounds {
+            failures_of_singles: exact_bound::of_share(singles.failures() as u64, singles.rows.len() as u64),
+            nominal_mi: exact_bound::of_share(sound.count(|outcome| outcome.misleading > 0), sound_runs),
+            nominal_hmi: exact_bound::of_share(sound.count(|outcome| outcome.hazards > 0), sound_runs),
+            losses_per_100km: per_100km(exact_bound::of_count(losses)),
+            false_alarms_per_100km: per_100km(exact_bound::of_count(false_alarms.values().sum())),
+        },
+        false_alarms,
         seeds: [seeds.clone().min().unwrap_or_default(), seeds.max().unwrap_or_default()],
         class_c: of_kinds.iter().filter(|of| of.class == Class::C).map(|of| of.kind.clone()).collect(),
         per_fault: of_kinds,
@@ -155,11 +189,7 @@ fn mark(of: &OfSize, values: fn(&Outcome) -> &BTreeMap<u32, u64>) -> Option<f64>
 
 /// Times to the first claim, s.
 fn first_claims(of: &OfSize) -> Spread {
-    Spread::of(of.rows.iter().filter_map(|row| {
-        let outcome = row.outcome.as_ref()?;
-        // A vehicle that never claims has waited for all of the run.
-        Some(outcome.first_claim.unwrap_or(outcome.outputs) as f64 * super::judge::STEP)
-    }))
+    Spread::of(of.rows.iter().filter_map(|row| Some(seconds_to_first_claim(row.outcome.as_ref()?))))
 }
 
 fn false_alarms(of: &OfSize) -> BTreeMap<String, u64> {

@@ -1,6 +1,7 @@
 //! Whether the vehicle may be trusted: kinds of faults at every size, in halls that are drawn, judged at the bus.
 
 pub mod blinding;
+pub mod exact_bound;
 pub mod figures;
 pub mod hall;
 pub mod judge;
@@ -14,5 +15,7 @@ pub mod row;
 pub mod sight;
 pub mod stanford;
 pub mod sweep;
+pub mod threats;
 pub mod trace;
 pub mod trial;
+pub mod worst;

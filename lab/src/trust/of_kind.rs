@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::exact_bound;
 use super::judge::{MOST_OVER, STEP};
 use super::kinds::Catalogue;
 use super::outcome::Found;
@@ -22,7 +23,7 @@ pub struct OfKind {
     pub runs: usize,
     /// Of these, runs with an integrity failure or a panic.
     pub failures: usize,
-    /// Exact 95 % bound of the share of failures, if there were none.
+    /// Exact 95 % bound of the share of failures, from above.
     pub bound: Option<f64>,
     /// The worst run.
     pub worst_seed: u64,
@@ -46,6 +47,45 @@ pub struct OfKind {
     pub found_m: f64,
     /// What has found it most often.
     pub found_by: String,
+    /// All its sizes, on the seeds of the sweep by which the worst one was found; empty if they are not known.
+    pub sizes: Vec<Swept>,
+}
+
+/// What one size of a kind has shown in the sweep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Swept {
+    /// The size.
+    pub size: f64,
+    /// Runs.
+    pub runs: usize,
+    /// Of these, runs with an integrity failure or a panic.
+    pub failures: usize,
+    /// Longest time in hazardous outputs of one event, s.
+    pub worst_hmi_s: f64,
+    /// Largest share of error over protection level; none if there was no claim, or one without a bound.
+    pub error_over_pl_max: Option<f64>,
+    /// Share of the time in claims with a protection level within the alert limit of travelling.
+    pub share_claimed: f64,
+}
+
+impl Swept {
+    fn of(of: &OfSize) -> Self {
+        Self {
+            size: of.size,
+            runs: of.rows.len(),
+            failures: of.failures(),
+            worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
+            error_over_pl_max: error_over_level(of),
+            share_claimed: of.share_claimed(),
+        }
+    }
+}
+
+/// Largest share of error over protection level; none if there was no claim.
+fn error_over_level(of: &OfSize) -> Option<f64> {
+    let over = of.most(|outcome| outcome.most_over_level);
+    let claims = of.sum(|outcome| outcome.claims);
+    (claims > 0 && over < MOST_OVER).then_some(over)
 }
 
 /// Class of a threat.
@@ -60,7 +100,7 @@ pub enum Class {
 }
 
 /// Each kind at its worst size, worst first.
-pub(super) fn per_fault(rows: &[&Row], catalogue: &Catalogue) -> Vec<OfKind> {
+pub(super) fn per_fault(rows: &[&Row], swept: &[Row], catalogue: &Catalogue) -> Vec<OfKind> {
     let mut names: Vec<&str> = Vec::new();
     for row in rows.iter().filter(|row| row.with.is_none()) {
         if !names.contains(&row.kind.as_str()) {
@@ -72,7 +112,6 @@ pub(super) fn per_fault(rows: &[&Row], catalogue: &Catalogue) -> Vec<OfKind> {
         let worst = worst_size(&sizes)?;
         let of = sizes.into_iter().find(|of| of.size.to_bits() == worst.to_bits())?;
         let (runs, failures) = (of.rows.len(), of.failures());
-        let over = of.most(|outcome| outcome.most_over_level);
         let kind = catalogue.kinds.iter().find(|kind| kind.name == name);
         let found = found(&of);
         Some(OfKind {
@@ -81,12 +120,12 @@ pub(super) fn per_fault(rows: &[&Row], catalogue: &Catalogue) -> Vec<OfKind> {
             unit: kind.map_or_else(String::new, |kind| kind.unit.clone()),
             runs,
             failures,
-            bound: (failures == 0 && runs > 0).then(|| 1.0 - 0.05_f64.powf(1.0 / runs as f64)),
+            bound: exact_bound::of_share(failures as u64, runs as u64),
             worst_seed: of.worst()?.seed,
             worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
             worst_hmi_m: of.most(|outcome| outcome.worst_hazard_m),
             hidden_s: of.sum(|outcome| outcome.hidden_hazardous) as f64 * STEP,
-            error_over_pl_max: (over < MOST_OVER).then_some(over),
+            error_over_pl_max: error_over_level(&of),
             share_claimed: of.share_claimed(),
             class: match kind {
                 Some(kind) if kind.revealed.is_some() => Class::C,
@@ -97,12 +136,15 @@ pub(super) fn per_fault(rows: &[&Row], catalogue: &Catalogue) -> Vec<OfKind> {
             found_s: found.iter().map(|found| 1e-3 * found.after_ms as f64).fold(0.0, f64::max),
             found_m: found.iter().map(|found| 1e-3 * found.after_mm as f64).fold(0.0, f64::max),
             found_by: most_often(found.iter().map(|found| found.by.as_str())),
+            sizes: by_size(swept, name).iter().map(Swept::of).collect(),
         })
     };
     let mut kinds: Vec<OfKind> = names.into_iter().filter_map(of_kind).collect();
     kinds.sort_by(|a, b| {
         let share = |of: &OfKind| of.failures as f64 / of.runs.max(1) as f64;
-        share(b).total_cmp(&share(a)).then(b.worst_hmi_s.total_cmp(&a.worst_hmi_s))
+        let over = |of: &OfKind| of.error_over_pl_max.unwrap_or(0.0);
+        let by_hazard = share(b).total_cmp(&share(a)).then(b.worst_hmi_s.total_cmp(&a.worst_hmi_s));
+        by_hazard.then(over(b).total_cmp(&over(a)))
     });
     kinds
 }

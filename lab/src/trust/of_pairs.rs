@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::exact_bound;
 use super::row::{OfSize, Row};
 
 /// What pairs of faults have shown.
@@ -11,6 +12,8 @@ pub struct OfPairs {
     pub runs: usize,
     /// Of these, those with an integrity failure or a panic.
     pub failures: usize,
+    /// Exact 95 % bound of the share of failures, from above; none of no pair.
+    pub bound: Option<f64>,
     /// Events of hazardous outputs.
     pub hmi_events: u64,
     /// Longest time in hazardous outputs of one event, s.
@@ -50,6 +53,7 @@ pub(super) fn pairs<'a>(rows: impl Iterator<Item = &'a Row>, hidden: impl Fn(&Ro
     OfPairs {
         runs: of.rows.len(),
         failures: of.failures(),
+        bound: exact_bound::of_share(of.failures() as u64, of.rows.len() as u64),
         hmi_events: of.sum(|outcome| u64::from(outcome.hazards)),
         worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),
         worst_hmi_m: of.most(|outcome| outcome.worst_hazard_m),

@@ -4,6 +4,7 @@ use agv_core::integrity::AlertLimits;
 use agv_host_sim::report::{Figure, FigureError, Page, StanfordDiagram, Table, stanford_diagram};
 
 use super::figures::Figures;
+use super::of_kind::{OfKind, Swept};
 use super::stanford::{CELLS, Stanford};
 
 /// A page with the Stanford diagrams and the kinds of faults.
@@ -38,7 +39,33 @@ pub fn page(figures: &Figures) -> Result<Page, FigureError> {
         ]
     });
     page.table(&Table { heading: heading.map(str::to_owned).to_vec(), rows: rows.collect() });
+    if figures.per_fault.iter().any(|of| !of.sizes.is_empty()) {
+        sizes(&mut page, figures);
+    }
     Ok(page)
+}
+
+/// What each size of each kind has shown.
+fn sizes(page: &mut Page, figures: &Figures) {
+    page.section("Every size").paragraph("The sweep by which the worst sizes were found.");
+    let heading = ["kind", "size", "failures", "runs", "HMI, s", "error over level, at most", "claimed, %"];
+    let of_kind = |of: &OfKind| {
+        let (kind, unit) = (of.kind.clone(), of.unit.clone());
+        let row = move |of: &Swept| {
+            vec![
+                kind.clone(),
+                format!("{} {unit}", of.size),
+                of.failures.to_string(),
+                of.runs.to_string(),
+                format!("{:.2}", of.worst_hmi_s),
+                of.error_over_pl_max.map_or_else(String::new, |share| format!("{share:.2}")),
+                format!("{:.1}", 100.0 * of.share_claimed),
+            ]
+        };
+        of.sizes.iter().map(row).collect::<Vec<_>>()
+    };
+    let rows = figures.per_fault.iter().flat_map(of_kind).collect();
+    page.table(&Table { heading: heading.map(str::to_owned).to_vec(), rows });
 }
 
 /// The Stanford diagrams without faults and with them.

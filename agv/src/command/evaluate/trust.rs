@@ -9,7 +9,9 @@ use agv_lab::trust::kinds::{self, Catalogue, Kind, NOTHING};
 use agv_lab::trust::page::{diagrams, page};
 use agv_lab::trust::row::{self, Row};
 use agv_lab::trust::sweep::{self, run};
+use agv_lab::trust::threats::threats;
 use agv_lab::trust::trial::Trial;
+use agv_lab::trust::worst::{Worst, WorstValues};
 use anyhow::{Context as _, ensure};
 
 use super::tested_arguments::TestedArguments;
@@ -54,11 +56,11 @@ pub struct Trust {
     /// Where the rows of a part go, a line of JSON each.
     #[arg(long, requires = "shard")]
     output: Option<PathBuf>,
-    /// The rows of all parts of the sweep, so that it is not driven again.
+    /// The rows of all parts of the sweep, so that it is not driven again; with --merge, to tell what each size has shown.
     #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with = "set")]
     swept: Vec<PathBuf>,
     /// Tell the figures of the rows of all parts, and drive nothing.
-    #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with_all = ["shard", "swept", "set"])]
+    #[arg(long, num_args = 1.., value_name = "ROWS", conflicts_with_all = ["shard", "set"])]
     merge: Vec<PathBuf>,
     /// Write a page with the Stanford diagrams.
     #[arg(long, value_name = "FILE.html", conflicts_with = "shard")]
@@ -66,6 +68,9 @@ pub struct Trust {
     /// Write the Stanford diagrams, `stanford_nominal.svg` and `stanford_faults.svg`, into a folder.
     #[arg(long, value_name = "FOLDER", conflicts_with = "shard")]
     diagrams: Option<PathBuf>,
+    /// Write the table of all kinds, and of every size if the sweep is known, as a page of Markdown.
+    #[arg(long, value_name = "FILE.md", conflicts_with = "shard")]
+    threats: Option<PathBuf>,
     /// One JSON object instead of the table.
     #[arg(long)]
     json: bool,
@@ -86,15 +91,19 @@ Examples:
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
   agv evaluate trust --merge worst0.jsonl worst1.jsonl --json --diagrams docs/src/trust
+  agv evaluate trust --merge worst0.jsonl worst1.jsonl --swept sweep0.jsonl sweep1.jsonl --threats threats.md
 
 Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, integrity_failures, nominal_hours, nominal_km,
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
-continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg, error_over_pl_max, first_claim_s
-[95 %, worst], seeds [first, last], class_c [kind], per_fault [kind, worst_size, unit, runs, failures, bound, worst_seed,
-worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed, class, found, found_s, found_m, found_by], pairs and
-pairs_apart {runs, failures, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]}, stanford_nominal
-and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro, contours, slip [if --slip],
-gyro_scale_error [if --gyro-scale-error].";
+continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg,
+error_over_pl_max, first_claim_s [95 %, worst], worst {hmi_s, hmi_m, availability_travel, availability_docking, losses,
+pl_nominal_mm, pl_nominal_deg, error_over_pl, first_claim_s: value and seed}, bounds {failures_of_singles, nominal_mi,
+nominal_hmi, losses_per_100km, false_alarms_per_100km: exact, 95 %}, seeds [first, last], class_c [kind], per_fault [kind,
+worst_size, unit, runs, failures, bound, worst_seed, worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed,
+class, found, found_s, found_m, found_by, sizes [size, runs, failures, worst_hmi_s, error_over_pl_max, share_claimed]], pairs
+and pairs_apart {runs, failures, bound, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]},
+stanford_nominal and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro,
+contours, slip [if --slip], gyro_scale_error [if --gyro-scale-error].";
 
 /// The Stanford diagrams: without faults, and with them.
 const DIAGRAMS: [&str; 2] = ["stanford_nominal.svg", "stanford_faults.svg"];
@@ -103,7 +112,8 @@ impl Trust {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         let diagrams = self.diagrams.iter().flat_map(|folder| DIAGRAMS.map(|name| folder.join(name)));
-        check_files(&diagrams.chain(self.report.clone()).chain(self.output.clone()).collect::<Vec<_>>())?;
+        let files = [&self.report, &self.threats, &self.output].into_iter().flatten().cloned();
+        check_files(&diagrams.chain(files).collect::<Vec<_>>())?;
         let mut catalogue = kinds::read(&self.tested.kinds)?;
         self.leave_out(&mut catalogue)?;
         let all = &catalogue.kinds;
@@ -112,12 +122,12 @@ impl Trust {
             all.iter().filter(is_wanted).cloned().partition(|kind| kind.name == NOTHING);
         ensure!(!sound.is_empty() || !faults.is_empty(), "no kind has {:?} in its name", self.only.unwrap_or_default());
         if !self.merge.is_empty() {
-            return self.tell(&row::read(&self.merge, all)?, &catalogue);
+            return self.tell(&row::read(&self.merge, all)?, &row::read(&self.swept, all)?, &catalogue);
         }
         self.tested.parameters()?;
         if let Some(runs) = self.sample {
             let rows = self.make("spot check", &sweep::sample(&faults, runs, self.seed), Shard::ALL)?;
-            return self.tell(&rows, &catalogue);
+            return self.tell(&rows, &[], &catalogue);
         }
         let shard = self.shard.unwrap_or(Shard::ALL);
         let swept = if self.swept.is_empty() {
@@ -136,7 +146,7 @@ impl Trust {
         let rows = self.make("worst sizes", &trials, shard)?;
         match &self.output {
             Some(output) => Ok(row::write(output, &rows)?),
-            None => self.tell(&rows, &catalogue),
+            None => self.tell(&rows, &swept, &catalogue),
         }
     }
 
@@ -165,11 +175,14 @@ impl Trust {
         Ok(rows)
     }
 
-    fn tell(&self, rows: &[Row], catalogue: &Catalogue) -> anyhow::Result<()> {
+    fn tell(&self, rows: &[Row], swept: &[Row], catalogue: &Catalogue) -> anyhow::Result<()> {
         ensure!(!rows.is_empty(), "there is no run");
-        let figures = figures(rows, catalogue);
+        let figures = figures(rows, swept, catalogue);
         if let Some(report) = &self.report {
             page(&figures)?.write(report).with_context(|| report.display().to_string())?;
+        }
+        if let Some(path) = &self.threats {
+            output_file::write(path, threats(&figures)).with_context(|| path.display().to_string())?;
         }
         if let Some(folder) = &self.diagrams {
             for (name, diagram) in DIAGRAMS.iter().zip(diagrams(&figures)?) {
@@ -249,4 +262,23 @@ fn print(figures: &Figures) {
         share(figures.availability_travel),
         share(figures.availability_docking)
     );
+    print_worst(&figures.worst);
+}
+
+/// What the worst of the drives without faults has shown, and its seed.
+fn print_worst(worst: &WorstValues) {
+    let lines = [
+        ("available to travel, %", worst.availability_travel, 100.0),
+        ("available to dock, %", worst.availability_docking, 100.0),
+        ("losses of availability", worst.losses, 1.0),
+        ("protection level, mm", worst.pl_nominal_mm, 1.0),
+        ("protection level, deg", worst.pl_nominal_deg, 1.0),
+        ("error over protection level", worst.error_over_pl, 1.0),
+        ("time to the first claim, s", worst.first_claim_s, 1.0),
+    ];
+    for (name, worst, scale) in lines {
+        if let Some(Worst { value, seed }) = worst {
+            println!("the worst drive without faults, {name}: {:.2}, seed {seed}", scale * value);
+        }
+    }
 }
