@@ -55,11 +55,13 @@ fn the_emulated_controller_says_the_same_bits() {
 }
 
 /// Most instructions that a piece of work may take: with 480 MHz, the scan cycle ends in about 10 ms.
-const BUDGETS: [(&str, u64); 13] = [
+const BUDGETS: [(&str, u64); 15] = [
     ("prediction", 4_000),
     ("one reflector update", 25_000),
     ("solutions of a revolution of 6 reflectors", 200_000),
     ("solutions of a revolution of 20 reflectors", 1_500_000),
+    ("monitor of a revolution of 6 reflectors", 200_000),
+    ("monitor of a revolution of 20 reflectors and its scan", 1_500_000),
     ("falko on 1440 beams", 3_000_000),
     ("scan cycle", 5_000_000),
     ("scan cycle with landmarks and key scans in the state", 12_000_000),

@@ -4,8 +4,8 @@
 #![no_main]
 
 mod contours;
+mod monitor;
 mod search;
-mod separation;
 mod vehicles;
 
 use core::fmt::Write;
@@ -181,8 +181,8 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut 
     let Counts { prediction, reflector, scan, slam, behind, blind, falko, association, map_update } = counts;
     let [few, many] = search::count(stopwatch, map);
     let [in_map, slice, whole] = kept.counts();
-    let [six, twenty] = separation::count(stopwatch);
-    for count in [
+    let of_monitor = monitor::count(stopwatch);
+    let costs = [
         prediction,
         reflector,
         association,
@@ -195,12 +195,8 @@ fn write_table(stopwatch: &Stopwatch, counts: Counts, kept: Contours, map: &mut 
         decode(stopwatch),
         few,
         many,
-        six,
-        twenty,
-        in_map,
-        slice,
-        whole,
-    ] {
+    ];
+    for count in costs.into_iter().chain(of_monitor).chain([in_map, slice, whole]) {
         writeln!(text, "{count}").expect("the table fits");
     }
     for count in predictions {
