@@ -106,14 +106,14 @@ impl Row {
         self.outcome.as_ref().is_none_or(|outcome| outcome.failures > 0)
     }
 
-    /// How bad it was, worst first when sorted: failures, hazards, misleading outputs.
-    fn badness(&self) -> (bool, u32, u64) {
-        let outcome = self.outcome.as_ref();
-        (
-            self.has_failed(),
-            outcome.map_or(0, |outcome| outcome.hazards),
-            outcome.map_or(0, |outcome| outcome.misleading),
-        )
+    /// How bad it was: whether it failed, its longest hazardous event, ms, its misleading outputs, and its largest share of error over
+    /// protection level, in millionths.
+    fn badness(&self) -> (bool, u64, u64, u64) {
+        let of_outcome = self.outcome.as_ref().map_or((0, 0, 0), |outcome| {
+            let (hazard_ms, over) = (1e3 * outcome.worst_hazard_s, 1e6 * outcome.most_over_level);
+            (hazard_ms.round() as u64, outcome.misleading, over as u64)
+        });
+        (self.has_failed(), of_outcome.0, of_outcome.1, of_outcome.2)
     }
 }
 
