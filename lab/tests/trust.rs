@@ -514,3 +514,22 @@ fn the_worst_values_say_whose_they_are() {
     let sizes = &found.per_fault[0].sizes;
     assert_eq!((sizes.len(), sizes[0].size, sizes[0].error_over_pl_max), (1, 5.0, Some(0.5)));
 }
+
+#[test]
+fn the_worst_run_is_the_one_with_the_longest_hazard() {
+    let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
+    let row = |seed, hazards, worst_hazard_s, misleading, most_over_level| Row {
+        kind: "laser silent".to_owned(),
+        size: 5.0,
+        with: None,
+        seed,
+        is_accepted: true,
+        can_recover: false,
+        outcome: Some(Outcome { hazards, worst_hazard_s, misleading, most_over_level, ..Outcome::default() }),
+    };
+    let worst = |rows: &[Row]| figures(rows, &[], &catalogue).per_fault[0].worst_seed;
+    // Two short events are less than a long one.
+    assert_eq!(worst(&[row(1, 2, 0.05, 9, 2.0), row(2, 1, 0.2, 1, 1.5)]), 2);
+    assert_eq!(worst(&[row(1, 0, 0.0, 3, 1.2), row(2, 0, 0.0, 2, 5.0)]), 1);
+    assert_eq!(worst(&[row(1, 0, 0.0, 0, 0.4), row(2, 0, 0.0, 0, 0.3)]), 1);
+}

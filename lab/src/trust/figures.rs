@@ -9,7 +9,7 @@ use super::kinds::{Catalogue, NOTHING};
 use super::of_kind::{Class, OfKind, per_fault};
 use super::of_pairs::{OfPairs, pairs};
 use super::outcome::Outcome;
-use super::row::{OfSize, Row};
+use super::row::{OfSize, Row, share};
 use super::stanford::Stanford;
 use super::worst::{WorstValues, seconds_to_first_claim, worst_values};
 use agv_host_sim::accuracy::Spread;
@@ -112,7 +112,6 @@ pub fn figures(every_row: &[Row], swept: &[Row], catalogue: &Catalogue) -> Figur
     let sound = OfSize { size: 0.0, rows: sound };
     let all = OfSize { size: 0.0, rows: rows.clone() };
     let accepted = OfSize { size: 0.0, rows: sound.rows.iter().copied().filter(|row| row.is_accepted).collect() };
-    let share = |part: u64, whole: u64| (whole > 0).then(|| part as f64 / whole as f64);
     let km = accepted.sum(|outcome| outcome.driven_um) as f64 * 1e-9;
     let recovering = OfSize { size: 0.0, rows: rows.iter().copied().filter(|row| row.can_recover).collect() };
     let first_claims = first_claims(&sound);

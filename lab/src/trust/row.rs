@@ -170,6 +170,11 @@ impl OfSize<'_> {
     }
 }
 
+/// A share; none of nothing.
+pub(super) fn share(part: u64, whole: u64) -> Option<f64> {
+    (whole > 0).then(|| part as f64 / whole as f64)
+}
+
 /// The rows of a kind that comes alone by its sizes, in order of size.
 #[must_use]
 pub fn by_size<'a>(rows: impl IntoIterator<Item = &'a Row>, kind: &str) -> Vec<OfSize<'a>> {

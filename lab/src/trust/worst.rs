@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::judge::STEP;
 use super::outcome::Outcome;
-use super::row::OfSize;
+use super::row::{OfSize, share};
 
 /// A value, and whose it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -63,10 +63,6 @@ pub(super) fn seconds_to_first_claim(outcome: &Outcome) -> f64 {
 
 fn above_nought(value: f64) -> Option<f64> {
     (value > 0.0).then_some(value)
-}
-
-fn share(part: u64, whole: u64) -> Option<f64> {
-    (whole > 0).then(|| part as f64 / whole as f64)
 }
 
 fn values<'a>(of: &'a OfSize, value: impl Fn(&Outcome) -> Option<f64> + 'a) -> impl Iterator<Item = Worst> + 'a {
