@@ -50,6 +50,10 @@ impl Kinematics for Differential {
     fn longest_interval(&self, _: f64) -> f64 {
         f64::INFINITY
     }
+
+    fn resolution(&self) -> Option<f64> {
+        Some(self.scale)
+    }
 }
 
 /// Drives a quarter of a circle of 2 m.

@@ -45,6 +45,7 @@ mod reflector_detection;
 mod reflector_search;
 mod second_laser;
 mod separation;
+mod simulated;
 mod slam;
 mod slip_check;
 mod slot_life;

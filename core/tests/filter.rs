@@ -4,7 +4,7 @@
 use agv_core::filter::{Cartesian, Correction, Ekf, Observation, RangeBearing, Timeline, TimelineError};
 use agv_core::geometry::{Point, Pose, difference};
 use agv_core::measurement::Time;
-use agv_core::odometry::Motion;
+use agv_core::odometry::{Motion, UnknownAcceleration};
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 use proptest::prelude::*;
 
@@ -122,7 +122,7 @@ fn motion(step: u64) -> Motion {
 }
 
 fn past() -> Timeline<160> {
-    let mut timeline = Timeline::new(0.1);
+    let mut timeline = Timeline::new(0.1, UnknownAcceleration { along: 0.0, aside: 0.0, turn: 0.0 });
     assert!(timeline.begun().is_none());
     timeline.begin(Time::default(), Ekf::new(Pose::default(), 0.05, 0.02));
     timeline

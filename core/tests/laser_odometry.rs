@@ -165,7 +165,7 @@ fn surfaces_bound_an_odometry_that_is_hardly_known() {
     let (mut by_surfaces, mut blind) = (Drive::behind(1, true), Drive::behind(1, false));
     let level = |drive: &mut Drive| (0..60).map(|_| drive.go(&BEND)).last().unwrap().level.position;
     let (level, without) = (level(&mut by_surfaces), level(&mut blind));
-    assert!(level < 0.5 * without, "{level} {without}");
+    assert!(level < 0.6 * without, "{level} {without}");
     for scale in [0.85, 0.95, 1.05, 1.15] {
         let mut drive = Drive::behind(1, true);
         drive.scale = scale;

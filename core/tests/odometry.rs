@@ -621,6 +621,10 @@ impl Kinematics for Told {
     fn longest_interval(&self, _: f64) -> f64 {
         f64::INFINITY
     }
+
+    fn resolution(&self) -> Option<f64> {
+        None
+    }
 }
 
 #[test]

@@ -103,3 +103,47 @@ fn a_gyro_that_is_fitted_has_a_factor() {
         assert_eq!(changed.check().err().map(|error| error.leaf), error, "{is_fitted}, {factor}");
     }
 }
+
+/// Numbers that no setting changes: each is refused under its own name.
+#[test]
+fn numbers_of_the_map_in_the_state_and_of_the_detectors_are_bounded_too() {
+    use agv_core::odometry::TricycleSpeed;
+    use agv_core::sensing::ReflectorDetection;
+    type Set = fn(&mut Parameters, f64);
+    const LEAVES: [(&str, Set); 16] = [
+        ("vehicle.encoder_offset", |parameters, value| {
+            parameters.vehicle = Vehicle::Ackermann(Ackermann { wheelbase: 2.8, encoder_offset: value });
+        }),
+        ("vehicle.steering_offset_forward", |parameters, value| {
+            parameters.vehicle = Vehicle::TricycleSpeed(TricycleSpeed { wheelbase: 1.2, steering_offset: value });
+        }),
+        ("slam.biases.scale", |parameters, value| parameters.slam.biases.scale = value),
+        ("slam.biases.laser_yaw", |parameters, value| parameters.slam.biases.laser_yaw = value),
+        ("slam.bias_walk.scale", |parameters, value| parameters.slam.bias_walk.scale = value as f32),
+        ("slam.orientation_tolerance", |parameters, value| parameters.slam.orientation_tolerance = value as f32),
+        ("slam.least_distance", |parameters, value| parameters.slam.least_distance = value),
+        ("slam.place_size", |parameters, value| parameters.slam.place_size = value),
+        ("slam.key_scans.spacing", |parameters, value| parameters.slam.key_scans.spacing = value),
+        ("slam.key_scans.inflation", |parameters, value| parameters.slam.key_scans.inflation = value),
+        ("slam.key_scans.gate", |parameters, value| parameters.slam.key_scans.gate = value),
+        ("slam.key_scans.surfaces.radius", |parameters, value| {
+            parameters.slam.key_scans.surfaces.radius = value as f32;
+        }),
+        ("slam.key_scans.alignment.reach", |parameters, value| {
+            parameters.slam.key_scans.alignment.reach = value as f32;
+        }),
+        ("reflectors.detection.centre_offset", |parameters, value| {
+            let detection = ReflectorDetection { centre_offset: value as f32, ..ReflectorDetection::default() };
+            parameters.reflectors.detection = Some(detection);
+        }),
+        ("features.detector", |parameters, value| parameters.features.detector.radius_scale = value as f32),
+        ("features.detector", |parameters, value| parameters.features.detector.jump = Some(value as f32)),
+    ];
+    for (leaf, set) in LEAVES {
+        for value in [f64::NAN, f64::INFINITY, 1e30, -1e30] {
+            let mut changed = parameters();
+            set(&mut changed, value);
+            assert_eq!(changed.check(), Err(ParameterError { leaf }), "{value}");
+        }
+    }
+}

@@ -13,7 +13,7 @@ const TICK: f64 = 1e-5;
 const STEP: f64 = 0.01;
 /// What lasts, as a share of the way.
 const LASTING: f64 = 2.2e-3;
-const ERRORS: WheelErrors = WheelErrors { slip: 6e-3, lasting: LASTING * LASTING };
+const ERRORS: WheelErrors = WheelErrors { slip: 6e-3, lasting: LASTING * LASTING, step: 3e-4 };
 
 const DRIVEN: DrivenWheel =
     DrivenWheel { radius: 1.0, turn: AngleEncoder { scale: TICK, range: CounterRange::BITS_32 } };
@@ -203,9 +203,11 @@ fn even(check: &mut RedundancyCheck, way: f64, slip: f64, errors: &WheelErrors, 
 /// A window of 0.3 m: the sum of `n` steps has the variance of so much way, that of what lasts, and a step of a wheel.
 #[test]
 fn the_limit_is_that_of_the_stated_errors() {
-    for errors in
-        [ERRORS, WheelErrors { slip: 0.0, lasting: LASTING * LASTING }, WheelErrors { slip: 6e-3, lasting: 0.0 }]
-    {
+    for errors in [
+        ERRORS,
+        WheelErrors { slip: 0.0, lasting: LASTING * LASTING, step: 3e-4 },
+        WheelErrors { slip: 6e-3, lasting: 0.0, step: 3e-4 },
+    ] {
         let way: f64 = 0.15;
         // One step: what was learnt is still what is stated.
         let limit = 5.6 * (errors.slip.powi(2) * way + errors.lasting * way * way + 3e-4_f64.powi(2)).sqrt();
@@ -218,7 +220,7 @@ fn the_limit_is_that_of_the_stated_errors() {
 
 #[test]
 fn what_is_behind_a_new_pose_is_forgotten() {
-    let errors = WheelErrors { slip: 0.0, lasting: 0.0 };
+    let errors = WheelErrors { slip: 0.0, lasting: 0.0, step: 3e-4 };
     // Three steps of 0.6 times the limit of a step: two are too much, one is not.
     let slip = 0.6 * 5.6 * 3e-4;
     let mut check = RedundancyCheck::new();
@@ -231,7 +233,7 @@ fn what_is_behind_a_new_pose_is_forgotten() {
 /// Wheels that fit are known to slip by half of what is stated, after ten metres; then less is told.
 #[test]
 fn wheels_that_fit_are_held_to_less() {
-    let errors = WheelErrors { slip: 6e-3, lasting: 0.0 };
+    let errors = WheelErrors { slip: 6e-3, lasting: 0.0, step: 3e-4 };
     let limit = |slip: f64, way: f64| 5.6 * (slip * slip * way + 3e-4_f64.powi(2)).sqrt();
     let mut check = RedundancyCheck::new();
     // 9 m without slip: (0 + 3.6e-5 1) / (9 + 1) is below a quarter of what is stated, which is the least.
@@ -247,7 +249,7 @@ fn wheels_that_fit_are_held_to_less() {
 /// Half of the way to what was learnt: as much as was seen, and what is stated for a metre.
 #[test]
 fn what_was_seen_for_a_metre_weighs_as_much_as_what_is_stated() {
-    let errors = WheelErrors { slip: 6e-3, lasting: 0.0 };
+    let errors = WheelErrors { slip: 6e-3, lasting: 0.0, step: 3e-4 };
     // Three metres in twelve steps, the first two of which are off to either side, so that nothing is told.
     let (off, way): (f64, f64) = (6e-3, 0.25);
     let mut check = RedundancyCheck::new();
@@ -269,7 +271,7 @@ fn what_was_seen_for_a_metre_weighs_as_much_as_what_is_stated() {
 /// The sums begin anew all along the way: what was driven long ago does not hide what slips now.
 #[test]
 fn a_long_way_behind_hides_no_slip() {
-    let errors = WheelErrors { slip: 0.0, lasting: LASTING * LASTING };
+    let errors = WheelErrors { slip: 0.0, lasting: LASTING * LASTING, step: 3e-4 };
     let mut check = RedundancyCheck::new();
     assert!(!even(&mut check, 0.01, 0.0, &errors, 2000));
     // 20 m: what lasts may be 44 mm; of 0.3 m it is below a millimetre.

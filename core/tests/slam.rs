@@ -248,7 +248,7 @@ fn a_scale_that_changes_is_learnt_again_on_the_way_and_at_once_when_a_pose_is_gi
 
 /// What a controller asks any localiser: the same as of the one behind it.
 fn asked(localizer: &impl agv_core::localizer::Localize) -> agv_core::odometry::OdometryBias {
-    localizer.odometry_bias()
+    localizer.prediction_state().bias
 }
 
 #[test]

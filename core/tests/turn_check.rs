@@ -5,7 +5,7 @@ use agv_core::integrity::{LastingErrors, TurnCheck};
 use agv_core::measurement::Time;
 use agv_core::odometry::Motion;
 
-const LASTING: LastingErrors = LastingErrors { steering: 5.8e-4, turn: 4.2e-3, bias: 4e-5 };
+const LASTING: LastingErrors = LastingErrors { steering: 5.8e-4, turn: 4.2e-3, bias: 4e-5, step: 1e-4 };
 const PERIOD: f64 = 0.01;
 
 /// A motion in the period of that number, m and rad, with the variance of its turn.
@@ -51,7 +51,7 @@ fn a_turn_while_the_wheels_stand_is_told() {
 /// Sums since the window began: the square of the difference over what is expected of it, over that of the gate of six deviations.
 #[test]
 fn the_ratio_is_that_of_the_sums() {
-    let lasting = LastingErrors { steering: 2e-3, turn: 0.05, bias: 1e-3 };
+    let lasting = LastingErrors { steering: 2e-3, turn: 0.05, bias: 1e-3, step: 1e-4 };
     let mut check = TurnCheck::new();
     let (mut difference, mut variance, mut way, mut turned, mut seconds) = (0.0_f64, 0.0, 0.0, 0.0, 0.0);
     // All of it within the first half of the first window.
@@ -77,7 +77,7 @@ fn the_ratio_is_that_of_the_sums() {
 
 /// A difference that grows evenly for so many samples from one on, of a vehicle that stands.
 fn is_told(spans: &[(u32, u32)], rate: f64) -> bool {
-    let lasting = LastingErrors { steering: 0.0, turn: 0.0, bias: 0.0 };
+    let lasting = LastingErrors { steering: 0.0, turn: 0.0, bias: 0.0, step: 1e-4 };
     let mut check = TurnCheck::new();
     (0..700).any(|number| {
         let grows = spans.iter().any(|(from, until)| (*from..*until).contains(&number));
@@ -109,7 +109,7 @@ fn a_gyro_is_frozen_only_if_the_wheels_move() {
             if has_turn {
                 let _ = check.travel(&moved, &moved, 0.01, &LASTING);
             } else {
-                check.travel_alone(&moved, Some(moved.start));
+                check.travel_alone(&moved, false);
             }
             !check.sample(&reading(number))
         });
@@ -117,14 +117,16 @@ fn a_gyro_is_frozen_only_if_the_wheels_move() {
     }
 }
 
+/// Motions of a hundredth of a second. One that stands need not tell a turn.
 #[test]
-fn a_gyro_is_missing_after_a_tenth_of_a_second() {
+fn a_gyro_that_tells_no_turn_for_more_than_a_tenth_of_a_second_is_missing() {
     use agv_core::integrity::GyroFault;
-    let moved = motion(30, 0.01, 0.0, 1e-9);
-    for (last, fault) in [(21, None), (20, None), (19, Some(GyroFault::Missing))] {
+    for (alone, stands, fault) in [(11, false, None), (12, false, Some(GyroFault::Missing)), (40, true, None)] {
         let mut check = TurnCheck::new();
-        check.travel_alone(&moved, Some(motion(last, 0.0, 0.0, 0.0).end));
-        assert_eq!(check.fault(moved.end), fault, "{last}");
+        let moved = |number: u32| motion(number, 0.01, 0.0, 1e-9);
+        let _ = check.travel(&moved(0), &moved(0), 0.0, &LASTING);
+        (1..=alone).for_each(|number| check.travel_alone(&moved(number), stands));
+        assert_eq!(check.fault(moved(alone).end), fault, "{alone}");
     }
 }
 
@@ -132,7 +134,7 @@ fn a_gyro_is_missing_after_a_tenth_of_a_second() {
 /// there, it has the last two.
 #[test]
 fn the_second_window_begins_in_the_middle() {
-    let lasting = LastingErrors { steering: 0.0, turn: 0.0, bias: 0.0 };
+    let lasting = LastingErrors { steering: 0.0, turn: 0.0, bias: 0.0, step: 1e-4 };
     for (way, micros) in [(0.075, 10_000), (0.0, 750_000)] {
         let mut check = TurnCheck::new();
         let at = |number: u64| Time::from_micros(1_000_000 + micros * number);

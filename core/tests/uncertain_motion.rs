@@ -6,7 +6,7 @@ use agv_core::geometry::{Pose, Twist};
 use agv_core::measurement::{PoseIncrement, SpeedSample, Time};
 use agv_core::odometry::{
     Ackermann, Coasting, Control, CounterRange, Integration, Motion, OdometerParameters, OdometryBias, OdometryError,
-    OdometryNoise, Tricycle, Vehicle, VehicleOdometer,
+    OdometryNoise, Tricycle, UnknownAcceleration, Vehicle, VehicleOdometer,
 };
 use nalgebra::{Matrix2, Matrix3, Matrix3x2};
 
@@ -20,6 +20,8 @@ const TRICYCLE: Vehicle = Vehicle::Tricycle(Tricycle {
     steering_offset_backward: 0.0,
 });
 const CAR: Vehicle = Vehicle::Ackermann(Ackermann { wheelbase: 2.83, encoder_offset: 0.76 });
+
+const UNKNOWN: UnknownAcceleration = UnknownAcceleration { along: 1.5, aside: 0.0, turn: 0.7 };
 
 const NOISE: OdometryNoise = OdometryNoise {
     speed: 0.05,
@@ -77,7 +79,10 @@ fn noise_of_controls_enters_by_their_derivatives_and_the_rest_by_the_way() {
     assert!((NOISE.of_displacement(0.3, 0.0, 0.2) - expected).norm() < 1e-15);
     // A turn on the spot moves nothing, and its heading is uncertain all the same.
     for turn in [0.8, -0.8] {
-        let expected = Matrix3::from_diagonal(&[(0.05_f64 * 0.2).powi(2), 0.0, 0.05_f64.powi(2) * 0.8].into());
+        // Two wheels 0.8 m apart roll 0.32 m each, with a slip of 6 mm for a root of a metre.
+        let by_slip = 2.0 * 0.006_f64.powi(2) * 0.32 / 0.8_f64.powi(2);
+        let of_heading = 0.05_f64.powi(2) * 0.8 + by_slip;
+        let expected = Matrix3::from_diagonal(&[(0.05_f64 * 0.2).powi(2), 0.0, of_heading].into());
         assert!((NOISE.of_displacement(0.0, turn, 0.2) - expected).norm() < 1e-15);
     }
 }
@@ -119,22 +124,6 @@ fn parts_of_a_motion_keep_its_velocity() {
 }
 
 #[test]
-fn a_motion_that_goes_on_keeps_its_velocity() {
-    let (motion, at) = arc();
-    for (seconds, share) in [(0.5, 0.0), (1.04, 0.0), (1.05, 0.25), (1.24, 5.0)] {
-        let more = motion.extrapolate(Time::from_seconds(seconds));
-        let end = time(1_040_000 + (share * 40_000.0) as u64);
-        assert_eq!((more.start, more.end), (motion.end, end));
-        assert!(is_same(&more.displacement, &at(0.04 * share)), "{seconds}");
-        assert!((more.covariance - motion.covariance * share).norm() < 1e-18);
-        assert!((more.distance - 0.05 * share).abs() < 1e-15);
-    }
-    let standing = Motion::none(time(7));
-    assert_eq!(standing.extrapolate(time(1_000_007)).displacement, Pose::default());
-    assert_eq!(standing.extrapolate(time(1_000_007)).end, time(1_000_007));
-}
-
-#[test]
 fn a_wrong_assumption_is_made_up_for_by_the_rest() {
     let (motion, _) = arc();
     let assumed = Pose::new(0.02, -0.01, 0.1);
@@ -148,20 +137,20 @@ fn a_wrong_assumption_is_made_up_for_by_the_rest() {
 fn who_coasts_keeps_the_velocity_with_the_doubt_of_an_unknown_acceleration() {
     let (believed, at) = arc();
     let mut coasting = Coasting::new(believed);
-    assert!(coasting.to(believed.end, &NOISE).is_none() && coasting.to(time(1), &NOISE).is_none());
+    assert!(coasting.to(believed.end, &UNKNOWN).is_none() && coasting.to(time(1), &UNKNOWN).is_none());
     let mut pose = Pose::default();
     let (mut doubt, mut distance, mut until) = (Matrix3::zeros(), 0.0, believed.end);
     for micros in [10_000, 90_000, 100_000, 1_500_000] {
         let now = time(1_040_000 + micros);
         let seconds = micros as f64 * 1e-6;
-        assert!(coasting.to(now, &NOISE).is_some_and(|motion| {
+        assert!(coasting.to(now, &UNKNOWN).is_some_and(|motion| {
             assert_eq!((motion.start, motion.end), (until, now));
             pose = pose.compose(&motion.displacement);
             doubt += motion.covariance;
             distance += motion.distance;
             true
         }));
-        assert!(coasting.to(now, &NOISE).is_none());
+        assert!(coasting.to(now, &UNKNOWN).is_none());
         until = now;
         assert!(is_same(&pose, &at(seconds)), "{seconds}");
         assert!((distance - 0.05 / 0.04 * seconds).abs() < 1e-12);
@@ -173,11 +162,54 @@ fn who_coasts_keeps_the_velocity_with_the_doubt_of_an_unknown_acceleration() {
     }
     // Standing, it stays; and after a long time the doubt has no end that overflows.
     let mut coasting = Coasting::new(Motion::none(time(0)));
-    let moved = coasting.to(time(u64::MAX), &NOISE);
+    let moved = coasting.to(time(u64::MAX), &UNKNOWN);
     assert!(moved.is_some_and(|motion| {
         let longest = (1.5_f64 * 1e6 / 2.0).powi(2);
         motion.displacement == Pose::default() && (motion.covariance.m11 / longest - 1.0).abs() < 1e-12
     }));
+}
+
+/// After the pose was corrected `c` seconds on, the distance since has the error `a (t^2 - c^2) / 2` of one acceleration.
+#[test]
+fn who_coasts_from_a_corrected_pose_has_the_doubt_of_the_velocity_alone() {
+    let believed = Motion { covariance: Matrix3::zeros(), ..Motion::none(time(1_000_000)) };
+    let mut coasting = Coasting::new(believed);
+    let at = |seconds: f64| time(1_000_000 + (1e6 * seconds) as u64);
+    assert!(coasting.to(at(0.5), &UNKNOWN).is_some());
+    coasting.correct(at(0.5));
+    let mut doubt = Matrix3::zeros();
+    for seconds in [0.6, 0.75, 1.0] {
+        doubt += coasting.to(at(seconds), &UNKNOWN).map_or(Matrix3::zeros(), |motion| motion.covariance);
+        let way = (seconds * seconds - 0.25) / 2.0;
+        let expected = Matrix3::from_diagonal(&[(1.5 * way).powi(2), 0.0, (0.7 * way).powi(2)].into());
+        assert!((doubt - expected).norm() < 1e-12, "{seconds} {doubt} {expected}");
+    }
+}
+
+/// Two corrected poses tell the mean velocity between them, which the vehicle had in the middle; a worse one is not taken.
+#[test]
+fn corrected_poses_tell_the_velocity_of_who_coasts() {
+    let at = |seconds: f64| time(1_000_000 + (1e6 * seconds) as u64);
+    for (deviation, is_taken) in [(0.002, true), (0.2, false)] {
+        let mut coasting = Coasting::new(Motion::none(at(0.0)));
+        assert!(coasting.to(at(0.5), &UNKNOWN).is_some());
+        let seen = Motion {
+            start: at(0.4),
+            end: at(0.5),
+            displacement: Pose::new(0.03, 0.0, 0.01),
+            covariance: Matrix3::from_diagonal_element(deviation * deviation),
+            distance: 0.03,
+        };
+        coasting.correct_velocity(&seen, &UNKNOWN);
+        let Some(motion) = coasting.to(at(0.6), &UNKNOWN) else { panic!("it goes on") };
+        let way = if is_taken { 0.03 } else { 0.0 };
+        assert!((motion.displacement.x - way).abs() < 1e-12, "{motion:?}");
+        // Since the middle, a twentieth of a second before the correction; or since the odometry was believed.
+        let since = if is_taken { (0.15_f64, 0.05_f64) } else { (0.6, 0.5) };
+        let growth = 1.5 * (since.0 * since.0 - since.1 * since.1) / 2.0;
+        let own = if is_taken { deviation * deviation } else { 0.0 };
+        assert!((motion.covariance.m11 - own - growth * growth).abs() < 1e-12, "{motion:?}");
+    }
 }
 
 #[test]
@@ -252,7 +284,8 @@ fn an_increment_is_taken_as_it_is_if_the_vehicle_can_be_so_fast() {
     }));
     assert_eq!(vehicle.increment(&increment(100_000, 0.0, 0.0, 0.0)), Err(OdometryError::OutOfOrder));
     assert_eq!(vehicle.increment(&increment(50_000, 0.0, 0.0, 0.0)), Err(OdometryError::OutOfOrder));
-    assert_eq!(vehicle.increment(&increment(200_000, 0.121, -0.161, 0.0)), Err(OdometryError::Implausible));
+    // So much in two tenths of a second, of which the times may be off by half a tenth each; and no more in the next one.
+    assert_eq!(vehicle.increment(&increment(200_000, 0.25, -0.322, 0.0)), Err(OdometryError::Implausible));
     assert_eq!(vehicle.increment(&increment(300_000, 0.1, f64::NAN, 0.0)), Err(OdometryError::Implausible));
     // What was refused in its order has not moved the start of the next.
     assert!(vehicle.increment(&increment(400_000, 0.1, 0.0, 0.0)).is_ok_and(|motion| motion.start == time(300_000)));
@@ -263,7 +296,7 @@ fn the_fastest_motion_is_still_possible() {
     let mut vehicle = odometer(Vehicle::Increments, 2.0);
     let mut car = odometer(CAR, 2.0);
     let mut answers = Vec::new();
-    for (micros, speed) in [(0, 2.0), (500_000, 2.0), (1_000_000, 2.001)] {
+    for (micros, speed) in [(0, 2.0), (500_000, 2.0), (1_000_000, 4.001)] {
         let displacement = Pose::new(0.5 * speed, 0.0, 0.0);
         let by_increment = vehicle.increment(&PoseIncrement { time: time(micros), displacement });
         let by_speed = car.speed(&SpeedSample { time: time(micros), speed, steering: 0.0 });
@@ -271,6 +304,20 @@ fn the_fastest_motion_is_still_possible() {
     }
     let expected = [Some(OdometryError::First), None, Some(OdometryError::Implausible)];
     assert_eq!(answers, expected.map(|answer| [answer; 2]));
+}
+
+/// A step may hold more than its time, as times are off; all steps together may not.
+#[test]
+fn a_vehicle_that_is_too_fast_all_the_time_is_refused() {
+    for (speed, is_refused) in [(1.99, false), (2.2, true), (3.0, true)] {
+        let mut vehicle = odometer(Vehicle::Increments, 2.0);
+        let steps = (0..100_u64).map(|number| {
+            let displacement = Pose::new(0.01 * speed, 0.0, 0.0);
+            vehicle.increment(&PoseIncrement { time: time(10_000 * number), displacement })
+        });
+        let refused = steps.filter(|step| *step == Err(OdometryError::Implausible)).count();
+        assert_eq!(refused > 0, is_refused, "{speed} m/s: {refused}");
+    }
 }
 
 #[test]

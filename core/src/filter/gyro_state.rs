@@ -8,7 +8,8 @@
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use crate::geometry::{Pose, difference};
-use crate::odometry::{GyroErrors, GyroParameters, GyroTurn};
+use crate::measurement::Time;
+use crate::odometry::{GyroErrors, GyroParameters, GyroTurn, Motion};
 
 /// A pose, and its covariance in W: x, y, heading.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +18,19 @@ pub struct KnownPose {
     pub pose: Pose,
     /// Its covariance, m and rad.
     pub covariance: Matrix3<f64>,
+}
+
+impl KnownPose {
+    /// The motion to a pose that was known later, apart from this one: in R here.
+    #[must_use]
+    pub fn motion_to(&self, later: &Self, start: Time, end: Time) -> Motion {
+        let displacement = self.pose.between(&later.pose);
+        let (sine, cosine) = libm::sincos(self.pose.theta);
+        let to_robot = Matrix3::new(cosine, sine, 0.0, -sine, cosine, 0.0, 0.0, 0.0, 1.0);
+        let covariance = to_robot * (self.covariance + later.covariance) * to_robot.transpose();
+        let distance = libm::hypot(displacement.x, displacement.y);
+        Motion { start, end, displacement, covariance, distance }
+    }
 }
 
 /// Bias and scale, their covariance, and that with the pose of now.

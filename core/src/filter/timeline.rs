@@ -15,7 +15,7 @@ use heapless::Deque;
 use super::{Ekf, Landmark, Observation, PoseObservation};
 use crate::geometry::{Point, Pose};
 use crate::measurement::{LaserId, Time};
-use crate::odometry::Motion;
+use crate::odometry::{Coasting, MeanMotion, Motion, UnknownAcceleration};
 
 /// Motions become one up to this time, us; one that takes more than half of it stays as it is.
 const LONGEST_JOINED: u64 = 14_000;
@@ -105,26 +105,31 @@ pub struct Timeline<const ENTRIES: usize> {
     settled: usize,
     /// Motion that was assumed behind the last sample of the odometry, and until when.
     ahead: Option<(Pose, Time)>,
-    /// The last motion that the odometry reported.
-    last_motion: Motion,
+    /// When the last motion ended that the odometry reported.
+    last_report: Time,
+    /// The mean of those of late.
+    recent: MeanMotion,
     odometry_pose: Pose,
     start: Time,
     longest_extrapolation: f64,
+    unknown: UnknownAcceleration,
 }
 
 impl<const ENTRIES: usize> Timeline<ENTRIES> {
-    /// A timeline that has not begun.
+    /// A timeline that has not begun. Behind the last motion it goes on at the mean velocity of late, at most for so long, s.
     #[must_use]
-    pub fn new(longest_extrapolation: f64) -> Self {
+    pub fn new(longest_extrapolation: f64, unknown: UnknownAcceleration) -> Self {
         let time = Time::default();
         Self {
             entries: Deque::new(),
             settled: 1,
             ahead: None,
-            last_motion: Motion::none(time),
+            last_report: time,
+            recent: MeanMotion::NONE,
             odometry_pose: Pose::default(),
             start: time,
             longest_extrapolation,
+            unknown,
         }
     }
 
@@ -142,7 +147,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         let _ = self.entries.push_back(Entry { motion: Motion::none(time), fusion: Fusion::Nothing, state });
         self.settled = 1;
         self.ahead = None;
-        self.last_motion = Motion::none(time);
+        (self.last_report, self.recent) = (time, MeanMotion::from(time));
         self.odometry_pose = state.pose;
         self.start = time;
     }
@@ -164,8 +169,19 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
             entry.fusion = Fusion::Nothing;
             self.odometry_pose = self.odometry_pose.compose(&entry.motion.displacement);
         }
+        // Of what was assumed only the rest is made up for by the odometry, which counts from the new start on.
+        if time > self.last_report
+            && let Some((assumed, _)) = &mut self.ahead
+        {
+            *assumed = state.pose.between(&self.odometry_pose);
+        }
         self.settled = 1;
         self.start = time;
+    }
+
+    /// Forgets everything: its times were of a clock that is wrong.
+    pub fn forget(&mut self) {
+        self.entries.clear();
     }
 
     /// The timeline, if it has begun.
@@ -216,7 +232,8 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
             None if motion.end > self.now() => self.append(&motion.split(self.now()).1),
             None => {}
         }
-        self.last_motion = *motion;
+        self.last_report = motion.end;
+        self.recent.add(motion);
     }
 
     /// Goes on from the newest entry by a motion that is assumed until the odometry reports what it was.
@@ -224,6 +241,11 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         let (assumed, _) = self.ahead.unwrap_or((Pose::default(), motion.end));
         self.ahead = Some((assumed.compose(&motion.displacement), motion.end));
         self.append(motion);
+    }
+
+    /// Takes what was assumed as what it was: the odometry will not report it.
+    pub fn accept_assumed(&mut self) {
+        self.ahead = None;
     }
 
     /// Whether the state at `time` can be told.
@@ -234,24 +256,22 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         if self.position(time).is_none() {
             return Err(TimelineError::TooLate);
         }
-        if time > self.now() && time.since(self.last_motion.end) > self.longest_extrapolation {
+        if time > self.now() && time.since(self.last_report) > self.longest_extrapolation {
             return Err(TimelineError::TooEarly);
         }
         Ok(())
     }
 
-    /// The last motion that the odometry reported.
+    /// When the last motion ended that the odometry reported.
     #[must_use]
-    pub fn last_motion(&self) -> &Motion {
-        &self.last_motion
+    pub fn last_report(&self) -> Time {
+        self.last_report
     }
 
-    /// The last motion that the odometry reported, at the mean velocity of the last `span`, s, as far as it is remembered.
+    /// The mean of the motions that the odometry has reported of late.
     #[must_use]
-    pub fn recent_motion(&self, span: f64) -> Motion {
-        let end = self.last_motion.end;
-        let recent = self.motions(end.offset(-span), end).reduce(|sum, motion| sum.then(&motion));
-        recent.filter(|recent| recent.end > recent.start).unwrap_or(self.last_motion)
+    pub fn recent_motion(&self) -> Motion {
+        self.recent.motion()
     }
 
     /// The pose that only the odometry has moved since the beginning, at the time of the newest entry. What lies between it
@@ -367,7 +387,7 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         let position = self.position(from).unwrap_or(0);
         let mut is_first = true;
         let within = self.entries.iter().skip(position + 1).map(|entry| entry.motion);
-        let beyond = (to > self.now()).then(|| self.last_motion_until(to));
+        let beyond = (to > self.now()).then(|| self.assumed_until(to));
         let mut reached = false;
         within.chain(beyond).map_while(move |motion| {
             if reached {
@@ -386,17 +406,20 @@ impl<const ENTRIES: usize> Timeline<ENTRIES> {
         self.motions(from, to).fold(Pose::default(), |sum, motion| sum.compose(&motion.displacement))
     }
 
-    fn last_motion_until(&self, time: Time) -> Motion {
+    /// What is assumed from the newest entry on.
+    fn assumed_until(&self, time: Time) -> Motion {
         let now = self.now();
-        let (_, done) = self.last_motion.extrapolate(time).split(now);
-        Motion { start: now, ..done }
+        let mut coasting = Coasting::new(self.recent.motion());
+        // So far it was assumed before.
+        let _ = coasting.to(now, &self.unknown);
+        coasting.to(time, &self.unknown).map_or_else(|| Motion::none(now), |motion| Motion { start: now, ..motion })
     }
 
     fn extrapolation(&self, time: Time) -> Result<Motion, TimelineError> {
-        if time.since(self.last_motion.end) > self.longest_extrapolation {
+        if time.since(self.last_report) > self.longest_extrapolation {
             return Err(TimelineError::TooEarly);
         }
-        Ok(self.last_motion_until(time))
+        Ok(self.assumed_until(time))
     }
 
     /// The newest entry that is not later than `time`.

@@ -103,10 +103,11 @@ impl Integrity {
         self.traction.clear();
     }
 
-    /// The odometry is not believed.
+    /// The odometry is not believed, so nobody knows how the vehicle moves.
     pub fn doubt_odometry(&mut self) {
         self.jumps.forget();
         self.traction.clear();
+        self.forget_motion();
     }
 
     /// Takes the reflectors of a revolution of a laser that ended at `now`, be it none; `to_odometry` is the pose of W in the frame of the

@@ -18,8 +18,6 @@ const GATE: f64 = 5.6;
 const LEARNT_OVER: f64 = 10.0;
 const STATED_FOR: f64 = 1.0;
 const LEAST_SHARE: f64 = 0.5;
-/// Wheels tell their ways in steps, of which several may fall together, m.
-const STEP: f64 = 3e-4;
 /// How long, s, what was found is told.
 const TOLD_FOR: f64 = 1.0;
 
@@ -41,6 +39,8 @@ pub struct WheelErrors {
     pub slip: f64,
     /// Variance of what lasts: square of a share of the way.
     pub lasting: f64,
+    /// What the rounding of all readings to ticks makes of a sum at most, m.
+    pub step: f64,
 }
 
 /// The sums, and until when a slip is told.
@@ -81,7 +81,7 @@ impl RedundancyCheck {
         for window in &mut self.windows {
             window.slip += slip;
             window.way += motion.distance;
-            let expected = (variance + errors.lasting * window.way) * window.way + STEP * STEP;
+            let expected = (variance + errors.lasting * window.way) * window.way + errors.step * errors.step;
             if window.slip * window.slip > GATE * GATE * expected {
                 self.slips_until = Some(motion.end.offset(TOLD_FOR));
             }

@@ -18,12 +18,10 @@ const TOLD_FOR: f64 = 1.0;
 /// So many equal readings in a row, while the wheels move, are of a gyro that is frozen: the noise of two readings is the same
 /// once in a dozen times at a twentieth of a degree a second and sixteen bits.
 const FROZEN: u16 = 10;
-/// A gyro of which nothing is heard for so long is missing, s.
-const MISSING_AFTER: f64 = 0.1;
+/// A gyro that has told no turn for so long while the wheels move is missing, s: with 20 readings a second one may be missed.
+const MISSING_AFTER: f64 = 0.11;
 /// How far the clocks of wheels and gyro may be apart, s.
 const CLOCK: f64 = 0.01;
-/// Wheels tell a turn in steps, rad: a tick of a quarter of a millimetre in a bend of 2.5 m.
-const STEP: f64 = 1e-4;
 
 /// What is wrong with a gyro.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +45,8 @@ pub struct LastingErrors {
     pub turn: f64,
     /// Bias of the gyro, rad/s.
     pub bias: f64,
+    /// Turn for a tick of a wheel, rad: a sum of turns is off by as much.
+    pub step: f64,
 }
 
 /// Differences since a time.
@@ -83,7 +83,7 @@ impl Window {
             + square(lasting.turn * self.turned)
             + square(lasting.bias * self.time)
             + square(CLOCK * (rate - self.rate))
-            + STEP * STEP;
+            + square(lasting.step);
         if expected > 0.0 { square(self.difference) / expected } else { 0.0 }
     }
 }
@@ -100,6 +100,8 @@ pub struct TurnCheck {
     last: Option<f64>,
     equal: u16,
     has_moved: bool,
+    /// Since when the gyro has told no turn.
+    untold: Option<Time>,
 }
 
 impl TurnCheck {
@@ -115,6 +117,7 @@ impl TurnCheck {
             last: None,
             equal: 0,
             has_moved: false,
+            untold: None,
         }
     }
 
@@ -139,11 +142,18 @@ impl TurnCheck {
         self.windows = [Window::EMPTY; 2];
     }
 
-    /// The wheels have moved while the gyro told no turn; its last reading is of the time `last`.
-    pub fn travel_alone(&mut self, motion: &Motion, last: Option<Time>) {
+    /// The wheels have told a motion of which the gyro has told no turn, or need not tell one, as the vehicle `stands`.
+    pub fn travel_alone(&mut self, motion: &Motion, stands: bool) {
         self.has_moved |= motion.distance > 0.0;
         self.windows = [Window::EMPTY; 2];
-        if last.is_none_or(|last| motion.end.since(last) > MISSING_AFTER) {
+        if stands {
+            self.untold = None;
+            return;
+        }
+        let since = *self.untold.get_or_insert(motion.start);
+        if motion.end.since(since) > MISSING_AFTER
+            && self.fault(motion.end).is_none_or(|fault| fault == GyroFault::Missing)
+        {
             self.raise(GyroFault::Missing, motion.end);
         }
     }
@@ -152,6 +162,7 @@ impl TurnCheck {
     /// difference over what is expected of it, over the gate.
     pub fn travel(&mut self, wheels: &Motion, gyro: &Motion, rate: f64, lasting: &LastingErrors) -> f64 {
         self.has_moved |= wheels.distance > 0.0;
+        self.untold = None;
         let difference = wheels.displacement.theta - gyro.displacement.theta;
         let now = wheels.end;
         let [first, second] = &mut self.windows;

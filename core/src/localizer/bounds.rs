@@ -1,14 +1,15 @@
 //! Between what every number of the parameters must lie.
 
 use super::Parameters;
+use super::detail_bounds::DETAIL_BOUNDS;
 use crate::odometry::{Tricycle, Vehicle};
 
 /// The bounds of one number.
-struct Bound {
-    leaf: &'static str,
-    least: f64,
-    most: f64,
-    get: fn(&Parameters) -> Option<f64>,
+pub(super) struct Bound {
+    pub leaf: &'static str,
+    pub least: f64,
+    pub most: f64,
+    pub get: fn(&Parameters) -> Option<f64>,
 }
 
 /// A parameter with which nothing can be computed.
@@ -26,9 +27,9 @@ impl core::fmt::Display for ParameterError {
 
 impl core::error::Error for ParameterError {}
 
-const TURN: f64 = core::f64::consts::TAU;
+pub(super) const TURN: f64 = core::f64::consts::TAU;
 /// The bounds of a standard deviation: zero would be certainty.
-const SMALL: f64 = 1e-9;
+pub(super) const SMALL: f64 = 1e-9;
 
 const fn tricycle(parameters: &Parameters) -> Option<&Tricycle> {
     match &parameters.vehicle {
@@ -335,7 +336,7 @@ impl Parameters {
     /// # Errors
     /// The first parameter that is not finite, or not within its bounds.
     pub fn check(&self) -> Result<(), ParameterError> {
-        for bound in &BOUNDS {
+        for bound in BOUNDS.iter().chain(&DETAIL_BOUNDS) {
             let is_within = (bound.get)(self).is_none_or(|value| (bound.least..=bound.most).contains(&value));
             if !is_within {
                 return Err(ParameterError { leaf: bound.leaf });
@@ -360,6 +361,9 @@ impl Parameters {
         }
         if matches!(&self.vehicle, Vehicle::Wheels(vehicle) if !vehicle.is_sound()) {
             return Err(ParameterError { leaf: "vehicle" });
+        }
+        if !self.features.detector.is_sound() {
+            return Err(ParameterError { leaf: "features.detector" });
         }
         if self.features.nearest >= self.features.farthest {
             return Err(ParameterError { leaf: "features.nearest" });

@@ -40,7 +40,7 @@ where
     /// See [`KeptMapError`]; the map is as before then.
     pub fn lend_contours(&mut self, bytes: &'m [u8]) -> Result<(), KeptMapError> {
         self.contours.lend(bytes)?;
-        self.slam.forget_way_behind();
+        self.begin_other_contours();
         Ok(())
     }
 }
@@ -49,7 +49,13 @@ impl<C: Capacities> Localizer<C> {
     /// Takes another map of contours, or none; also while the vehicle drives.
     pub fn set_contours(&mut self, map: Option<<C::Contours as FindContours>::Map>) {
         self.contours.set_map(map);
+        self.begin_other_contours();
+    }
+
+    /// Scans are compared with other surfaces from now on.
+    fn begin_other_contours(&mut self) {
         self.slam.forget_way_behind();
+        self.laser_odometry.stop();
     }
 
     /// The map of contours, if scans are compared with one.

@@ -34,6 +34,9 @@ impl<C: Capacities> Localizer<C> {
         if self.parameters.protection {
             self.separation.step(self.timeline.now(), self.timeline.odometry_pose());
         }
+        if is_past && self.lost == Some(Reason::NoPose) {
+            self.timeline.forget();
+        }
         self.timeline.begin(fix.time, state);
         let was_contradicted = self.start_watch.end();
         if self.parameters.protection {
@@ -55,7 +58,7 @@ impl<C: Capacities> Localizer<C> {
         self.outputs.sources.given_pose.add(fix.time, Verdict::Accepted, true, None);
         if !is_past {
             let standing = Coasting::new(Motion::none(fix.time));
-            self.outage = self.outage.map(|outage| Outage { coasting: standing, ..outage });
+            self.outage = self.outage.map(|outage| Outage { coasting: standing, corrected: None, ..outage });
         }
         let since = self
             .timeline

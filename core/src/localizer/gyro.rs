@@ -7,7 +7,7 @@ use crate::integrity::{GyroFault, LastingErrors};
 use crate::maps::Verdict;
 use crate::measurement::GyroSample;
 use crate::odometry::{GyroErrors, GyroRefusal, Motion};
-use crate::sources::{AtRest, GyroMotion};
+use crate::sources::{AtRest, GyroMotion, NoTurn};
 
 /// What is learnt from landmarks may be wrong with them by so many deviations before other solutions doubt it.
 const TRUSTED: f64 = 3.0;
@@ -59,6 +59,9 @@ impl<C: Capacities> Localizer<C> {
         if is_jump {
             self.integrity.turns.raise(GyroFault::Jumped, sample.time);
         }
+        if gyro.is_after_gap() {
+            self.integrity.turns.raise(GyroFault::Missing, sample.time);
+        }
         if self.parameters.protection {
             let now = *gyro.state().errors();
             let change = GyroErrors { bias: now.bias - before.bias, scale: now.scale - before.scale };
@@ -77,8 +80,9 @@ impl<C: Capacities> Localizer<C> {
         let Some(gyro) = &mut self.gyro else { return };
         let turns = &mut self.integrity.turns;
         let is_believed = turns.fault(wheels.end) != Some(GyroFault::Frozen);
-        let Some(GyroMotion { mut motion, turn }) = gyro.travel(wheels).filter(|_| is_believed) else {
-            turns.travel_alone(wheels, gyro.last());
+        let told = gyro.travel(wheels);
+        let Some(GyroMotion { mut motion, turn }) = told.ok().filter(|_| is_believed) else {
+            turns.travel_alone(wheels, told.is_err_and(|why| why == NoTurn::Standing));
             let motion = gyro.go_on(heading, wheels, None);
             self.advance(&motion, wheels, None);
             return;
@@ -90,6 +94,7 @@ impl<C: Capacities> Localizer<C> {
             steering: assumed.steering / lever.unwrap_or(1.0),
             turn: libm::hypot(assumed.turn, scale),
             bias,
+            step: self.odometer.resolution() / lever.unwrap_or(SLIP_ARM),
         };
         let ratio = turns.travel(wheels, &motion, gyro.rate(), &lasting);
         if turns.slips(wheels.end) {
@@ -104,6 +109,18 @@ impl<C: Capacities> Localizer<C> {
         status.add(wheels.end, verdict, true, Some(ratio));
         let known = gyro.go_on(heading, &motion, Some(&turn));
         self.advance(&known, &motion, Some(wheels));
+    }
+
+    /// Goes on by a motion that the wheels have not told, whose turn the gyro has. False, and nothing is done, if it has not.
+    #[inline(never)]
+    pub(super) fn coast_by_gyro(&mut self, motion: &Motion) -> bool {
+        let Some(gyro) = &mut self.gyro else { return false };
+        let is_believed = self.integrity.turns.fault(motion.end).is_none();
+        let Some(GyroMotion { motion, turn }) = gyro.coast(motion).filter(|_| is_believed) else { return false };
+        let heading = self.timeline.state().pose.theta;
+        let known = gyro.go_on(heading, &motion, Some(&turn));
+        self.advance(&known, &motion, None);
+        true
     }
 
     /// Goes on by a motion; what the gyro's errors add to it is none of `noise`, and the wheels have told `wheels` instead.

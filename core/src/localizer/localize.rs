@@ -1,8 +1,7 @@
 //! A localiser of any capacities.
 
-use super::{Event, Outputs};
+use super::{Event, Outputs, PredictionState};
 use crate::maps::MapView;
-use crate::odometry::{GyroErrors, OdometryBias};
 use crate::sources::{FindContours, FindPlaces};
 
 /// The map of contours as a search has it, and its room.
@@ -20,11 +19,8 @@ pub trait Localize {
     /// See [`super::Localizer::outputs`].
     fn outputs(&self) -> &Outputs;
 
-    /// See [`super::Localizer::odometry_bias`].
-    fn odometry_bias(&self) -> OdometryBias;
-
-    /// See [`super::Localizer::gyro_errors`].
-    fn gyro_errors(&self) -> Option<GyroErrors>;
+    /// See [`super::Localizer::prediction_state`].
+    fn prediction_state(&self) -> PredictionState;
 
     /// See [`super::Localizer::reflectors`].
     fn reflectors(&self) -> MapView<'_>;
@@ -47,12 +43,8 @@ impl<L: Localize> Localize for &mut L {
         (**self).outputs()
     }
 
-    fn odometry_bias(&self) -> OdometryBias {
-        (**self).odometry_bias()
-    }
-
-    fn gyro_errors(&self) -> Option<GyroErrors> {
-        (**self).gyro_errors()
+    fn prediction_state(&self) -> PredictionState {
+        (**self).prediction_state()
     }
 
     fn reflectors(&self) -> MapView<'_> {

@@ -10,7 +10,7 @@ use super::supervisor::{Support, remark_on_motion, supervise};
 use super::travel::Outage;
 use super::{
     Capacities, ContourCapacities, ContourSearch, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseOutput,
-    Reason, StatedCapacities,
+    PredictionState, Reason, StatedCapacities,
 };
 use crate::filter::Timeline;
 use crate::geometry::{Point, Pose};
@@ -18,12 +18,13 @@ use crate::integrity::separation::SolutionSeparation;
 use crate::integrity::{Estimate, Integrity, ProtectionLevel, is_sure};
 use crate::maps::{DynamicLandmark, Landmark, LandmarkKind, LendError, MapError, MapView, Verdict};
 use crate::measurement::{LaserId, Reflectors, Scan, Time};
-use crate::odometry::{GyroErrors, Motion, OdometryBias, OdometryError, VehicleOdometer};
+use crate::odometry::{GyroErrors, Motion, OdometryBias, OdometryError, UnknownAcceleration, VehicleOdometer};
 use crate::sensing::detect_reflectors;
 use crate::sources::{
     AddLandmarks, Aid, AidOutcome, ContoursBehind, FindContours, FindFeatures, GyroSource, LandmarkMaps, LaserOdometry,
     LendLandmarks, Source, Statuses, Workspace, correct_by_aid, see_reflectors,
 };
+use crate::state::LevelGrowth;
 
 /// Entries of the filter's past: about 0.4 s at 100 samples and 230 corrections a second.
 const PAST: usize = 128;
@@ -55,6 +56,7 @@ pub struct Localizer<C: Capacities = ContourCapacities<'static>> {
     pub(super) contour_correction: ContourCorrection,
     pub(super) laser_odometry: LaserOdometry,
     pub(super) workspace: Workspace,
+    pub(super) growth: LevelGrowth,
     pub(super) outputs: Outputs,
 }
 
@@ -133,7 +135,10 @@ impl<C: Capacities> Localizer<C> {
         Self {
             odometer: VehicleOdometer::new(&parameters.vehicle, &parameters.odometer()),
             maps: C::Maps::new(parameters.dynamic_map),
-            timeline: Timeline::new(parameters.limits.longest_extrapolation),
+            timeline: Timeline::new(
+                parameters.limits.longest_extrapolation,
+                UnknownAcceleration::of(&parameters.vehicle, &parameters.odometry_noise),
+            ),
             slam: Slam::new(),
             integrity: Integrity::new(parameters.consistency),
             start_watch: StartWatch::new(&parameters),
@@ -149,6 +154,7 @@ impl<C: Capacities> Localizer<C> {
             contour_correction: ContourCorrection::None,
             laser_odometry: LaserOdometry::new(),
             workspace: Workspace::default(),
+            growth: LevelGrowth::NONE,
             outputs: Outputs { pose, uses: Vec::new(), sources: Statuses::default(), misuse: None, has_cut: false },
             parameters,
         }
@@ -156,7 +162,7 @@ impl<C: Capacities> Localizer<C> {
 
     fn separation(parameters: &Parameters) -> SolutionSeparation {
         let gyro = parameters.uses_gyro().then_some(&parameters.gyro);
-        SolutionSeparation::with_gyro(parameters.assumed, parameters.vehicle.steering_lever(), gyro)
+        SolutionSeparation::of(parameters.assumed, &parameters.vehicle, gyro)
     }
 
     /// What the localiser believes of its vehicle and its sensors.
@@ -198,6 +204,12 @@ impl<C: Capacities> Localizer<C> {
     #[must_use]
     pub fn gyro_errors(&self) -> Option<GyroErrors> {
         Some(*self.gyro.as_ref()?.state().errors())
+    }
+
+    /// What carries the pose on until the next event.
+    #[must_use]
+    pub fn prediction_state(&self) -> PredictionState {
+        PredictionState { bias: self.odometry_bias(), gyro: self.gyro_errors(), growth: self.growth }
     }
 
     /// What the last event gave.
@@ -252,6 +264,7 @@ impl<C: Capacities> Localizer<C> {
         }
         if let Some(before) = before {
             self.check(&before, revolution_of, event);
+            self.correct_coasting();
             self.follow_surfaces(event);
             self.separate(event.laser());
         }
@@ -324,7 +337,8 @@ impl<C: Capacities> Localizer<C> {
     fn check(&mut self, before: &Estimate, revolution_of: Option<LaserId>, event: &Event) {
         let Some(after) = self.estimate() else { return };
         let uses = &self.outputs.uses;
-        if let Some(laser) = revolution_of {
+        // A motion that nobody has measured contradicts nothing.
+        if let Some(laser) = revolution_of.filter(|_| self.outage.is_none()) {
             let to_odometry = before.odometry_pose.compose(&before.pose.inverse());
             let slips = self.integrity.see_reflectors(laser, self.timeline.now(), &to_odometry, uses);
             // What SLAM has not seen before is in no map.
@@ -350,7 +364,8 @@ impl<C: Capacities> Localizer<C> {
 
     /// Lets the checks compare a scan with the reflectors of its revolution, which were taken just before, and with the scan before it.
     fn compare_surfaces(&mut self, scan: &Scan) {
-        let is_asked = self.lost.is_none() && self.parameters.uses_reflectors() && self.has_reflectors();
+        let is_known = self.lost.is_none() && self.outage.is_none();
+        let is_asked = is_known && self.parameters.uses_reflectors() && self.has_reflectors();
         let Some(timeline) = self.timeline.begun().filter(|_| is_asked) else { return };
         let Some(mount) = self.parameters.lasers.mount(scan.laser) else { return };
         let since = timeline.displacement(scan.start, timeline.now());
@@ -500,12 +515,8 @@ impl<C: Capacities> Localize for Localizer<C> {
         self.outputs()
     }
 
-    fn odometry_bias(&self) -> OdometryBias {
-        self.odometry_bias()
-    }
-
-    fn gyro_errors(&self) -> Option<GyroErrors> {
-        self.gyro_errors()
+    fn prediction_state(&self) -> PredictionState {
+        self.prediction_state()
     }
 
     fn reflectors(&self) -> MapView<'_> {

@@ -7,11 +7,14 @@
 use heapless::Vec;
 use nalgebra::Matrix3;
 
-use super::Parameters;
+use super::{Parameters, PredictionState};
 use crate::filter::Ekf;
+use crate::geometry::Twist;
 use crate::integrity::separation::fault_free;
 use crate::measurement::{EncoderFaults, EncoderSample, GyroSample, PoseIncrement, SpeedSample, Time, WheelSample};
-use crate::odometry::{GyroErrors, GyroTurns, Motion, OdometryBias, OdometryError, VehicleOdometer};
+use crate::odometry::{
+    Coasting, GyroTurns, MeanMotion, Motion, OdometryError, StandingWheels, UnknownAcceleration, VehicleOdometer,
+};
 use crate::state::{Mode, PoseOutput, ProtectionLevel, Reason};
 
 /// Longest time, s, for which a localiser that says nothing is merely busy: the longest scan, twice.
@@ -28,10 +31,15 @@ pub struct OutputPredictor<const MOTIONS: usize = 40> {
     motions: Vec<Motion, MOTIONS>,
     base: Option<PoseOutput>,
     state: Ekf,
-    bias: OdometryBias,
+    prediction: PredictionState,
     /// Of a vehicle with a gyro.
     gyro: Option<GyroTurns>,
-    gyro_errors: Option<GyroErrors>,
+    wheels: StandingWheels,
+    /// How fast it goes.
+    recent: MeanMotion,
+    /// While the odometry does not report how.
+    coasting: Option<Coasting>,
+    unknown: UnknownAcceleration,
     faults: EncoderFaults,
 }
 
@@ -46,29 +54,37 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             motions: Vec::new(),
             base: None,
             state: Ekf::new(crate::geometry::Pose::default(), 0.0, 0.0),
-            bias: OdometryBias::default(),
+            prediction: PredictionState::default(),
             gyro: parameters.uses_gyro().then(|| GyroTurns::new(&parameters.gyro)),
-            gyro_errors: None,
+            wheels: StandingWheels::new(),
+            recent: MeanMotion::NONE,
+            coasting: None,
+            unknown: UnknownAcceleration::of(&parameters.vehicle, &parameters.odometry_noise),
             faults: EncoderFaults::default(),
         }
     }
 
-    /// Takes what the localiser said last, and what it has learnt of the odometry.
-    pub fn update(&mut self, output: &PoseOutput, bias: &OdometryBias) {
-        self.bias = *bias;
+    /// Takes what the localiser said last, and what it has learnt of the motion.
+    pub fn update(&mut self, output: &PoseOutput, prediction: &PredictionState) {
+        self.prediction = *prediction;
         self.motions.retain(|motion| motion.end > output.time);
         self.base = Some(*output);
         let [xx, xy, yy, x_heading, y_heading, heading] = output.covariance;
         let covariance = Matrix3::new(xx, xy, x_heading, xy, yy, y_heading, x_heading, y_heading, heading);
         self.state = Ekf::with_covariance(output.pose, &covariance);
         for motion in &self.motions {
-            go_on(&mut self.state, &motion.corrected(bias, self.lever), output.time);
+            predict(&mut self.state, &motion.corrected(&prediction.bias, self.lever), output.time);
         }
     }
 
-    /// Takes what the localiser has learnt of its gyro.
-    pub fn update_gyro(&mut self, errors: Option<GyroErrors>) {
-        self.gyro_errors = errors;
+    /// How fast the vehicle goes: the velocity of R along its axes, m/s, m/s and rad/s, and until when it is the mean of about a tenth of a
+    /// second. None before it has moved, and while nobody reports how it moves.
+    #[must_use]
+    pub fn velocity(&self) -> Option<(Time, Twist)> {
+        let velocity = self.recent.velocity();
+        let Motion { end, start, .. } = self.recent.motion();
+        let is_told = end > start && self.coasting.is_none() && !self.faults.any();
+        is_told.then_some((end, Twist { x: velocity.x, y: velocity.y, theta: velocity.z }))
     }
 
     /// Takes a reading of the gyro, at once when it is heard.
@@ -81,8 +97,9 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
 
     /// The motion with the turn of the gyro, if there is one.
     fn by_gyro(&mut self, motion: &Motion) -> Motion {
-        let Some((gyro, errors)) = self.gyro.as_mut().zip(self.gyro_errors) else { return *motion };
-        match gyro.turn(motion.start, motion.end).filter(|_| motion.distance > 0.0) {
+        let Some((gyro, errors)) = self.gyro.as_mut().zip(self.prediction.gyro) else { return *motion };
+        let stands = self.wheels.add(motion);
+        match gyro.turn(motion.start, motion.end).filter(|_| !stands) {
             Some(turn) => motion.with_turn(turn.corrected(&errors), turn.variance),
             None => *motion,
         }
@@ -91,39 +108,66 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
     /// Takes a sample of the encoders, at once when it is heard.
     pub fn encoders(&mut self, sample: &EncoderSample) {
         let motion = self.odometer.encoders(sample);
-        self.travel(motion);
+        self.travel(sample.time, motion);
     }
 
     /// The same of the encoders of several wheels.
     pub fn wheels(&mut self, sample: &WheelSample) {
         let motion = self.odometer.wheels(sample);
-        self.travel(motion);
+        self.travel(sample.time, motion);
     }
 
     /// The same of speed and steering angle.
     pub fn speed(&mut self, sample: &SpeedSample) {
         let motion = self.odometer.speed(sample);
-        self.travel(motion);
+        self.travel(sample.time, motion);
     }
 
     /// The same of a motion that the vehicle has integrated itself.
     pub fn increment(&mut self, increment: &PoseIncrement) {
         let motion = self.odometer.increment(increment);
-        self.travel(motion);
+        self.travel(increment.time, motion);
     }
 
-    fn travel(&mut self, motion: Result<Motion, OdometryError>) {
+    fn travel(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
         self.faults = EncoderFaults::default();
-        let Ok(motion) = motion else { return };
-        let motion = if self.gyro.is_some() { self.by_gyro(&motion) } else { motion };
+        match motion {
+            Ok(motion) => {
+                self.coasting = None;
+                let motion = if self.gyro.is_some() { self.by_gyro(&motion) } else { motion };
+                self.recent.add(&motion);
+                self.go_on(motion);
+            }
+            Err(OdometryError::Pause | OdometryError::Implausible) => self.coast(time),
+            // The first report behind a fault.
+            Err(OdometryError::First) if self.coasting.is_some() => self.coast(time),
+            Err(_) => {}
+        }
+    }
+
+    /// Goes on to `time` as it has gone before, as the odometry does not report how.
+    fn coast(&mut self, time: Time) {
+        let recent = self.recent.motion();
+        // Of a pose that nobody knows, and a vehicle that was never heard to move, there is nothing to carry on.
+        let is_unknown = self.base.is_none_or(|base| base.mode == Mode::NotLocalised);
+        if is_unknown && recent.end <= recent.start {
+            return;
+        }
+        let coasting = self.coasting.get_or_insert_with(|| Coasting::new(recent));
+        if let Some(motion) = coasting.to(time, &self.unknown) {
+            self.go_on(motion);
+        }
+    }
+
+    fn go_on(&mut self, motion: Motion) {
         if self.motions.is_full() {
             self.join_shortest();
         }
         // There is room.
         let _ = self.motions.push(motion);
         if let Some(base) = self.base.filter(|base| motion.end > base.time) {
-            let motion = motion.corrected(&self.bias, self.lever);
-            go_on(&mut self.state, &motion, base.time);
+            let motion = motion.corrected(&self.prediction.bias, self.lever);
+            predict(&mut self.state, &motion, base.time);
         }
     }
 
@@ -150,6 +194,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         self.faults = *faults;
         if faults.any() {
             self.odometer.restart();
+            self.coast(faults.time);
         }
     }
 
@@ -183,7 +228,7 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
             pose: self.state.pose,
             smooth: base.smooth.compose(&base.pose.between(&self.state.pose)),
             covariance: self.state.covariance_entries(),
-            level: self.level(&base, travelled),
+            level: self.level(&base, travelled, time.since(base.time)),
             mode,
             reason,
             dead_reckoning_distance: distance,
@@ -191,21 +236,23 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         })
     }
 
-    /// That of the localiser's pose, grown with what the pose is less sure of, and with the heading's share in the distance since.
-    fn level(&self, base: &PoseOutput, travelled: f64) -> ProtectionLevel {
+    /// That of the localiser's pose, grown with what the pose is less sure of, and with the heading's share in the distance since; or as the
+    /// localiser expects it to grow.
+    fn level(&self, base: &PoseOutput, travelled: f64, passed: f64) -> ProtectionLevel {
         let now = fault_free(&self.state.covariance_entries());
         let then = fault_free(&base.covariance);
+        let expected = self.prediction.growth.after(passed);
+        let by_heading = base.level.heading.min(1.0) * travelled;
         ProtectionLevel {
             position: base.level.position
-                + (now.position - then.position).max(0.0)
-                + base.level.heading.min(1.0) * travelled,
-            heading: base.level.heading + (now.heading - then.heading).max(0.0),
+                + ((now.position - then.position).max(0.0) + by_heading).max(expected.position),
+            heading: base.level.heading + (now.heading - then.heading).max(expected.heading),
         }
     }
 }
 
 /// Goes on by a motion. Of one that the localiser has used, or assumed, up to `known`, the rest counts.
-fn go_on(state: &mut Ekf, motion: &Motion, known: Time) {
+fn predict(state: &mut Ekf, motion: &Motion, known: Time) {
     if motion.start < known {
         state.predict(&motion.split(known).1);
     } else {

@@ -4,13 +4,13 @@ use nalgebra::Matrix2;
 
 use super::contours::ContourCorrection;
 use super::{Capacities, Localizer};
-use crate::filter::RangeBearing;
+use crate::filter::{Cartesian, Observation, RangeBearing};
 use crate::geometry::{Point, Pose};
 use crate::integrity::Suspect;
 use crate::integrity::separation::{LandmarkKey, Laser, Seen, SensorInformation};
 use crate::maps::{Landmark, LandmarkKind, Verdict};
 use crate::measurement::{LaserId, Time};
-use crate::sources::LandmarkMaps;
+use crate::sources::{LandmarkMaps, Sighting};
 use crate::state::{LandmarkSource, LandmarkUse};
 
 impl<C: Capacities> Localizer<C> {
@@ -43,6 +43,7 @@ impl<C: Capacities> Localizer<C> {
         self.separation.doubt_laser(self.integrity.suspect() == Some(Suspect::Laser));
         let square = self.integrity.innovations.mean_normalised_square();
         self.separation.end_event(&pose, &from, libm::sqrt((0.5 * square).max(1.0)));
+        self.growth = self.separation.growth(&self.timeline.recent_motion());
     }
 
     /// Tells where contours have the laser, moved to now by the odometry.
@@ -75,13 +76,13 @@ impl<C: Capacities> Localizer<C> {
                 let at_first = path.to_start(seen.time.since(first), &Point::new(x, y));
                 let position = path.from_start(self.timeline.now().since(first), &at_first);
                 let deviation = f64::from(landmark.deviation);
-                let seen = Seen {
+                let told = Seen {
                     position,
-                    covariance: self.covariance_of(&position, is_reflector),
+                    covariance: self.covariance_of(seen, &position),
                     landmark: landmark.position(),
                     landmark_variance: deviation * deviation,
                 };
-                self.separation.see(key, &seen, from);
+                self.separation.see(key, &told, from);
             }
             (Some(landmark), Verdict::Gated) if is_reflector => {
                 let [x, y] = seen.located;
@@ -111,11 +112,14 @@ impl<C: Capacities> Localizer<C> {
         }
     }
 
-    /// How exactly something is seen at a position in S, m^2.
-    fn covariance_of(&self, position: &Point, is_reflector: bool) -> Matrix2<f64> {
-        if !is_reflector {
-            let deviation = self.parameters.features.added_deviation;
-            return Matrix2::identity() * (2.0 * deviation * deviation);
+    /// How exactly something is seen at a position in S, m^2: features as their detector states it, and as the filter has used them.
+    fn covariance_of(&self, seen: &LandmarkUse, position: &Point) -> Matrix2<f64> {
+        if seen.kind != LandmarkKind::Reflector {
+            let is_it = |sighting: &&Sighting| sighting.time == seen.time && sighting.kind == seen.kind;
+            let sighting = self.workspace.sightings.iter().find(is_it);
+            if let Some(Observation::Cartesian(Cartesian { covariance, .. })) = sighting.map(|one| one.observation) {
+                return covariance;
+            }
         }
         let reflectors = &self.parameters.reflectors;
         RangeBearing {

@@ -1,10 +1,11 @@
 //! What the odometry says of the motion, and how the vehicle goes on where it says nothing.
 
 use super::{Capacities, Localizer, Misuse, Parameters, Reason};
-use crate::filter::Timeline;
+use crate::filter::{KnownPose, Timeline};
 use crate::integrity::WheelErrors;
+use crate::maps::Verdict;
 use crate::measurement::{EncoderFaults, Time};
-use crate::odometry::{Coasting, Motion, OdometryError};
+use crate::odometry::{Coasting, Motion, OdometryError, UnknownAcceleration};
 
 /// The odometry is not believed, or not heard.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +14,8 @@ pub(super) struct Outage {
     pub coasting: Coasting,
     /// What was seen until this time raised the doubt; nothing that was seen, if it is the beginning of time.
     pub since: Time,
+    /// The pose when landmarks corrected it last, if they have since the outage began.
+    pub corrected: Option<(Time, KnownPose)>,
 }
 
 /// An odometry that says so often in a row what is not later than before has a clock that stands.
@@ -24,6 +27,15 @@ const LONGEST_LEAD: f64 = 0.5;
 /// A measurement that is further ahead of everything than this, s, tells nothing of where the vehicle has gone meanwhile.
 const LONGEST_BRIDGE: f64 = 1.0;
 
+/// The largest root of the sum of the squares of four differences of readings, each rounded to a tick, in ticks.
+const ROUNDING: f64 = 2.0;
+
+/// Landmarks that tell position and heading.
+const TELLING: usize = 2;
+
+/// Two corrections that are further apart, s, tell no velocity of now: of two revolutions one may be missed.
+const LONGEST_APART: f64 = 0.3;
+
 impl<C: Capacities> Localizer<C> {
     /// Lets the check of redundant wheels take a motion, and what of it does not fit.
     #[inline(never)]
@@ -32,7 +44,8 @@ impl<C: Capacities> Localizer<C> {
         let Ok((motion, slip)) = found else { return check.clear() };
         let Parameters { assumed, odometry_noise, .. } = &self.parameters;
         let lasting = assumed.scale * assumed.scale + assumed.steering * assumed.steering;
-        check.travel(motion, *slip, &WheelErrors { slip: odometry_noise.slip, lasting });
+        let step = ROUNDING * self.odometer.resolution();
+        check.travel(motion, *slip, &WheelErrors { slip: odometry_noise.slip, lasting, step });
     }
 
     pub(super) fn move_by(&mut self, time: Time, motion: Result<Motion, OdometryError>) {
@@ -79,6 +92,10 @@ impl<C: Capacities> Localizer<C> {
                 if self.repeated >= MOST_REPEATED {
                     self.doubt_odometry(Reason::OdometryImplausible, Time::default());
                 }
+                // One report was stamped so far ahead that the vehicle went on to where it is not yet.
+                if self.repeated >= MOST_REPEATED && self.timeline.now().since(time) > LONGEST_LEAD {
+                    (self.lost, self.repeated) = (Some(Reason::NoPose), 0);
+                }
             }
             // Whoever gave that pose has a clock that is ahead: the vehicle has not been there yet.
             Ok(motion) if start.since(motion.end) > LONGEST_LEAD => self.lost = Some(Reason::NoPose),
@@ -91,11 +108,11 @@ impl<C: Capacities> Localizer<C> {
     #[inline(never)]
     pub(super) fn bridge(&mut self, from: Time, time: Time) {
         let limit = self.parameters.limits.longest_extrapolation;
-        let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_motion().end) > limit)
-        else {
+        let Some(timeline) = self.timeline.begun().filter(|timeline| time.since(timeline.last_report()) > limit) else {
             return;
         };
         let now = timeline.now();
+        let unknown = self.unknown_acceleration();
         let Some(Outage { reason, since, .. }) = self.outage else {
             self.doubt_odometry(Reason::OdometrySilent, time);
             return;
@@ -106,22 +123,51 @@ impl<C: Capacities> Localizer<C> {
         }
         let mut coasting = self.doubt_odometry(reason, since);
         // What was extrapolated has been assumed already.
-        let _ = coasting.to(now, &self.parameters.odometry_noise);
+        let _ = coasting.to(now, &unknown);
         if time.since(now) <= LONGEST_BRIDGE
-            && let Some(motion) = coasting.to(time, &self.parameters.odometry_noise)
+            && let Some(motion) = coasting.to(time, &unknown)
         {
+            let motion = self.gyro.as_ref().map_or(motion, |gyro| gyro.turn_assumed(&motion));
             self.keep_up();
             self.timeline.assume(&motion);
+            if self.parameters.protection {
+                self.separation.assume(&motion);
+            }
         }
+    }
+
+    fn unknown_acceleration(&self) -> UnknownAcceleration {
+        UnknownAcceleration::of(&self.parameters.vehicle, &self.parameters.odometry_noise)
     }
 
     /// Does not believe the odometry from its last motion on, and returns how the vehicle may go on.
     pub(super) fn doubt_odometry(&mut self, reason: Reason, since: Time) -> Coasting {
-        let recent = || Coasting::new(self.timeline.recent_motion(Coasting::SPAN));
-        let coasting = self.outage.map_or_else(recent, |outage| outage.coasting);
-        self.outage = Some(Outage { reason, coasting, since });
+        let outage = self.outage.map_or_else(
+            || Outage { reason, coasting: Coasting::new(self.timeline.recent_motion()), since, corrected: None },
+            |outage| Outage { reason, since, ..outage },
+        );
+        self.outage = Some(outage);
         self.integrity.doubt_odometry();
-        coasting
+        self.separation.lose_motion();
+        outage.coasting
+    }
+
+    /// Lets landmarks that have corrected the pose without odometry tell how fast the vehicle goes.
+    #[inline(never)]
+    pub(super) fn correct_coasting(&mut self) {
+        let unknown = self.unknown_acceleration();
+        let telling = self.outputs.uses.iter().filter(|seen| seen.verdict == Verdict::Accepted).count();
+        let Some(timeline) = self.timeline.begun_mut().filter(|_| telling >= TELLING && self.lost.is_none()) else {
+            return;
+        };
+        let Some(outage) = &mut self.outage else { return };
+        let (now, state) = (timeline.now(), timeline.state());
+        let known = KnownPose { pose: state.pose, covariance: state.covariance() };
+        let before = outage.corrected.replace((now, known));
+        match before.filter(|(time, _)| now > *time && now.since(*time) <= LONGEST_APART) {
+            Some((time, before)) => outage.coasting.correct_velocity(&before.motion_to(&known, time, now), &unknown),
+            None => outage.coasting.correct(now),
+        }
     }
 
     pub(super) fn go_on(&mut self, motion: &Motion) {
@@ -162,13 +208,24 @@ impl<C: Capacities> Localizer<C> {
         if self.timeline.begun().is_none() {
             return;
         }
+        let is_first = self.outage.is_none();
         let mut coasting = self.doubt_odometry(reason, Time::default());
-        if let Some(motion) = coasting.to(time, &self.parameters.odometry_noise) {
-            if let Some(gyro) = &mut self.gyro {
-                gyro.forget_rest();
+        let unknown = self.unknown_acceleration();
+        // What was extrapolated so far, no report makes up for.
+        self.timeline.accept_assumed();
+        let _ = coasting.to(self.timeline.now(), &unknown);
+        if let Some(mut motion) = coasting.to(time, &unknown) {
+            if is_first && reason == Reason::OdometryImplausible {
+                // It may have been right, as far as the vehicle can go.
+                let refused = self.odometer.refused();
+                motion.covariance.m11 += refused * refused;
             }
-            self.go_on(&motion);
+            if !self.coast_by_gyro(&motion) {
+                self.go_on(&motion);
+            }
         }
-        self.outage = Some(Outage { reason, coasting, since: Time::default() });
+        if let Some(outage) = &mut self.outage {
+            outage.coasting = coasting;
+        }
     }
 }

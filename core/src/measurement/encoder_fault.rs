@@ -24,6 +24,8 @@ pub enum EncoderFault {
     HeartbeatLost,
     /// The encoder tells another number of positions than the vehicle's settings do.
     WrongRange,
+    /// The encoder counts the other way than the vehicle's settings say.
+    WrongDirection,
 }
 
 /// The faults that a vehicle's encoders have at one moment.

@@ -51,4 +51,8 @@ impl Kinematics for Ackermann {
     fn longest_interval(&self, _: f64) -> f64 {
         f64::INFINITY
     }
+
+    fn resolution(&self) -> Option<f64> {
+        None
+    }
 }

@@ -30,14 +30,23 @@ impl BiasJacobian {
     /// there is one. It goes less far along the more it is turned; a turn that is not reported changes no distance.
     #[must_use]
     pub fn of(displacement: &Pose, lever: Option<f64>) -> Self {
-        let (turn, along) = match lever {
-            Some(lever) => (displacement.x / lever, -lever * displacement.theta),
-            None => (displacement.x, 0.0),
+        Self::of_length(displacement, lever, displacement.x)
+    }
+
+    /// The same of a vehicle that may move sideways: without a lever it turns for each metre of `length`, in the direction of travel.
+    ///
+    /// The arc of a body velocity `(u, v, w)` ends at `(u - v w / 2, v + u w / 2, w)` up to second order; its derivative by the length of
+    /// that velocity is written here in the displacement itself.
+    #[must_use]
+    pub fn of_length(displacement: &Pose, lever: Option<f64>, length: f64) -> Self {
+        let Pose { x, y, theta } = *displacement;
+        let half = 0.5 * theta;
+        let scale = [x - half * y, y + half * x, theta];
+        let steering = match lever {
+            Some(lever) => [-lever * theta, 0.5 * x * x / lever, x / lever],
+            None => [-0.5 * y * length, 0.5 * x * length, length],
         };
-        Self {
-            scale: [displacement.x, 2.0 * displacement.y, displacement.theta],
-            steering: [along, 0.5 * displacement.x * turn, turn],
-        }
+        Self { scale, steering }
     }
 }
 

@@ -6,10 +6,13 @@ use super::{GyroErrors, GyroParameters, Motion};
 use crate::geometry::Pose;
 use crate::measurement::{GyroSample, Time};
 
-/// Samples that are remembered: what the wheels say may come later than what the gyro says by so many of its samples.
+/// Angles that are remembered, and the time between two of them at least, s: the wheels may report later than the gyro by 0.14 s.
 const REMEMBERED: usize = 16;
-/// A gyro that has said nothing for so long, s, tells no turn.
-const LONGEST_SILENCE: f64 = 0.05;
+const SPACING: f64 = 0.01;
+/// A gyro that has said nothing for so long, s, tells no turn: of one with 20 readings a second one may be missed.
+const LONGEST_SILENCE: f64 = 0.11;
+/// After so many readings in a row that follow each other but are not later than the one before, that one had a wrong time.
+const MOST_EARLIER: u8 = 10;
 
 /// The turn of a motion as a gyro tells it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +50,13 @@ pub struct GyroTurns {
     /// Times and angles, rad.
     angles: Deque<(Time, f64), REMEMBERED>,
     rate: f64,
-    /// By how much the last two rates differ, rad/s.
+    /// By how much the last two rates differ, rad/s, and the time between them, s.
     change: f64,
+    period: f64,
+    /// Whether nothing was heard for long before the last reading.
+    is_after_gap: bool,
+    /// Readings in a row that are not later than the last one, and the newest of them.
+    earlier: (u8, Time),
     /// Until when turns were told, and the angle then.
     told: Option<(Time, f64)>,
 }
@@ -57,7 +65,16 @@ impl GyroTurns {
     /// Nothing was heard yet.
     #[must_use]
     pub const fn new(parameters: &GyroParameters) -> Self {
-        Self { parameters: *parameters, angles: Deque::new(), rate: 0.0, change: 0.0, told: None }
+        Self {
+            parameters: *parameters,
+            angles: Deque::new(),
+            rate: 0.0,
+            change: 0.0,
+            period: 0.0,
+            is_after_gap: false,
+            earlier: (0, Time::from_micros(0)),
+            told: None,
+        }
     }
 
     /// Forgets everything.
@@ -74,8 +91,14 @@ impl GyroTurns {
         let time = sample.time.offset(-self.parameters.latency);
         let last = self.angles.back().copied();
         if last.is_some_and(|(last, _)| time <= last) {
+            let (count, newest) = self.earlier;
+            self.earlier = (if count > 0 && time <= newest { 1 } else { count.saturating_add(1) }, time);
+            if self.earlier.0 >= MOST_EARLIER {
+                self.restart();
+            }
             return Err(GyroRefusal::OutOfOrder);
         }
+        self.earlier.0 = 0;
         let is_told = libm::fabs(sample.rate) < self.parameters.range;
         if !is_told {
             self.restart();
@@ -85,16 +108,34 @@ impl GyroTurns {
         let before = core::mem::replace(&mut self.rate, rate);
         self.change = rate - before;
         let passed = last.map(|(last, _)| time.since(last)).filter(|passed| *passed <= LONGEST_SILENCE);
+        self.is_after_gap = last.is_some() && passed.is_none();
         if passed.is_none() {
             self.restart();
         }
+        self.period = passed.unwrap_or_default();
         let angle = last.zip(passed).map_or(0.0, |((_, angle), passed)| angle + 0.5 * (before + rate) * passed);
-        if self.angles.is_full() {
+        self.remember(time, angle);
+        Ok((rate, passed))
+    }
+
+    /// The newest angle stays as it is; those before it are [`SPACING`] apart.
+    fn remember(&mut self, time: Time, angle: f64) {
+        let mut behind = self.angles.iter().rev();
+        let is_close =
+            behind.next().zip(behind.next()).is_some_and(|((last, _), (before, _))| last.since(*before) < SPACING);
+        if is_close {
+            self.angles.pop_back();
+        } else if self.angles.is_full() {
             self.angles.pop_front();
         }
         // There is room.
         let _ = self.angles.push_back((time, angle));
-        Ok((rate, passed))
+    }
+
+    /// Whether nothing was heard for so long before the last reading that no turn was told.
+    #[must_use]
+    pub const fn is_after_gap(&self) -> bool {
+        self.is_after_gap
     }
 
     /// The time of the last reading without its latency.
@@ -114,7 +155,8 @@ impl GyroTurns {
         let (newest, angle) = *self.angles.back()?;
         let ahead = time.since(newest);
         if ahead >= 0.0 {
-            return (ahead <= LONGEST_SILENCE).then_some(angle + self.rate * ahead);
+            // What is heard late is no silence.
+            return (ahead <= LONGEST_SILENCE + self.parameters.latency).then_some(angle + self.rate * ahead);
         }
         let mut next = (newest, angle);
         for &(before, angle) in self.angles.iter().rev() {
@@ -134,12 +176,25 @@ impl GyroTurns {
         let from = told.or_else(|| self.angle_at(start));
         let to = self.angle_at(end)?;
         self.told = Some((end, to));
-        let duration = end.since(start);
+        Some(self.turn_of(to - from?, end, end.since(start)))
+    }
+
+    /// The turn of an interval of which the vehicle has reported nothing yet; what was told stays.
+    #[must_use]
+    pub fn turn_between(&self, start: Time, end: Time) -> Option<GyroTurn> {
+        let angle = self.angle_at(end)? - self.angle_at(start)?;
+        Some(self.turn_of(angle, end, end.since(start)))
+    }
+
+    fn turn_of(&self, angle: f64, end: Time, duration: f64) -> GyroTurn {
         let GyroParameters { noise, .. } = self.parameters;
         let between = self.change * duration;
-        // When the rate has changed between two readings is even over the interval.
-        let variance = noise * noise * duration + between * between / 12.0;
-        Some(GyroTurn { angle: to - from?, duration, variance })
+        // When the rate has changed between two readings is even over the interval. Where it is held for longer than that, it goes on
+        // changing as it did, and the turn is off by as much more as the interval is long.
+        let ahead = self.last().map_or(0.0, |last| end.since(last).max(0.0));
+        let held = if self.period > 0.0 { between * ahead / self.period } else { 0.0 };
+        let variance = noise * noise * duration + between * between / 12.0 + held * held;
+        GyroTurn { angle, duration, variance }
     }
 }
 

@@ -41,4 +41,8 @@ impl Kinematics for Increments {
     fn longest_interval(&self, _: f64) -> f64 {
         f64::INFINITY
     }
+
+    fn resolution(&self) -> Option<f64> {
+        Some(0.0)
+    }
 }

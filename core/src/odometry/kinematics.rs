@@ -29,6 +29,10 @@ pub trait Kinematics: Copy + Debug {
     /// Longest time between two reports that tell the motion without doubt, s, for a vehicle that is no faster than `fastest`
     /// (m/s).
     fn longest_interval(&self, fastest: f64) -> f64;
+
+    /// Smallest distance that a report can hold beside none, m: the way of a tick, or zero. None if it reports a speed, of which the
+    /// time makes no more and no less.
+    fn resolution(&self) -> Option<f64>;
 }
 
 /// What is believed of a step.

@@ -75,18 +75,4 @@ impl Motion {
         let (_, rest) = self.split(time);
         Motion { displacement: done.between(&self.displacement), ..rest }
     }
-
-    /// The motion that follows if the body velocity of this one is kept until `time`.
-    #[must_use]
-    pub fn extrapolate(&self, time: Time) -> Motion {
-        let duration = self.end.since(self.start);
-        let share = if duration > 0.0 { time.since(self.end).max(0.0) / duration } else { 0.0 };
-        Motion {
-            start: self.end,
-            end: time.max(self.end),
-            displacement: self.displacement.fraction(share),
-            covariance: self.covariance * share,
-            distance: self.distance * share,
-        }
-    }
 }

@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Control;
 
+/// Distance of the wheels of a vehicle that integrates its motion itself, m: that of a vehicle as wide as a pallet.
+const UNKNOWN_TRACK: f64 = 0.8;
+
 /// Noise of the odometry. Noise of the controls enters through their Jacobian, unlike K 5.3, where it is added to the
 /// state; the other terms are the floor for what the model of the vehicle does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,19 +65,25 @@ impl OdometryNoise {
     }
 
     /// Covariance of a displacement of that length, m, and turn, rad, that the vehicle has integrated itself.
+    ///
+    /// Its wheels are not known. Two that stand [`UNKNOWN_TRACK`] apart roll half of it for each radian on the spot, and their slip
+    /// has the variance `2 slip^2 (track / 2) / track^2` for each radian.
     #[must_use]
     pub fn of_displacement(&self, distance: f64, turn: f64, duration: f64) -> Matrix3<f64> {
         let speed = self.speed * duration;
         let mut covariance = self.floor(distance, turn);
         covariance.m11 += speed * speed + self.slip * self.slip * distance;
+        covariance.m33 += self.slip * self.slip / UNKNOWN_TRACK * libm::fabs(turn);
         covariance
     }
 
+    /// Variance of the heading behind so many m and rad, beside that of the wheels, rad^2.
+    pub(super) fn of_heading(&self, distance: f64, turn: f64) -> f64 {
+        self.yaw * self.yaw * distance + self.turn * self.turn * libm::fabs(turn)
+    }
+
     fn floor(&self, distance: f64, turn: f64) -> Matrix3<f64> {
-        Matrix3::from_diagonal(&nalgebra::Vector3::new(
-            0.0,
-            self.side_slip * self.side_slip * distance,
-            self.yaw * self.yaw * distance + self.turn * self.turn * libm::fabs(turn),
-        ))
+        let side_slip = self.side_slip * self.side_slip * distance;
+        Matrix3::from_diagonal(&nalgebra::Vector3::new(0.0, side_slip, self.of_heading(distance, turn)))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::kinematics::Believed;
 use super::{Increments, Integration, Kinematics, Motion, OdometryNoise, Vehicle, WheelBased, WheelSet};
-use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, WheelSample};
+use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time, WheelSample};
 
 /// Why a report gave no motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,34 @@ pub struct Odometer<K: Kinematics> {
     parameters: OdometerParameters,
     last: Option<K::Report>,
     was_backward: bool,
+    interval: MeanInterval,
+    /// How much further the vehicle may have gone by now, m.
+    margin: Option<f64>,
+    /// The largest step that was possible when one was refused as implausible, m.
+    refused: f64,
+    /// Reports in a row that are not later than the last one, and the newest of them.
+    earlier: (u8, Time),
+}
+
+/// After so many reports in a row that follow each other but are not later than the one before, that one had a wrong time.
+const MOST_EARLIER: u8 = 10;
+
+/// The mean time between two reports, of about the last sixteen, s.
+#[derive(Clone, Copy, Debug, Default)]
+struct MeanInterval {
+    mean: f64,
+    count: u8,
+}
+
+impl MeanInterval {
+    const MEMORY: u8 = 16;
+
+    /// Takes the next one; gives the mean with it.
+    fn add(&mut self, duration: f64) -> f64 {
+        self.count = Self::MEMORY.min(self.count + 1);
+        self.mean += (duration - self.mean) / f64::from(self.count);
+        self.mean
+    }
 }
 
 impl<K: Kinematics> Odometer<K> {
@@ -47,12 +75,39 @@ impl<K: Kinematics> Odometer<K> {
     pub fn new(kinematics: K, parameters: &OdometerParameters) -> Self {
         let longest_interval = parameters.longest_interval.min(kinematics.longest_interval(parameters.fastest));
         let parameters = OdometerParameters { longest_interval, ..*parameters };
-        Self { kinematics, parameters, last: None, was_backward: false }
+        let (interval, earlier) = (MeanInterval::default(), (0, Time::default()));
+        Self { kinematics, parameters, last: None, was_backward: false, interval, margin: None, refused: 0.0, earlier }
     }
 
     /// Forgets the last report: what comes next cannot be compared with it.
     pub fn restart(&mut self) {
         self.last = None;
+    }
+
+    /// How far the vehicle may have gone in the step that was refused last, m.
+    #[must_use]
+    pub const fn refused(&self) -> f64 {
+        self.refused
+    }
+
+    /// How far the vehicle can have gone in a step of that duration, m.
+    ///
+    /// The times of two reports may each be off by half of the time between them, so that a step may hold the way of twice that time, but
+    /// not one step after the other: what was gone is taken from the margin. A tick more may fall into any step.
+    fn longest_step(&mut self, duration: f64, interval: f64) -> f64 {
+        let fastest = self.parameters.fastest;
+        let Some(tick) = self.kinematics.resolution() else { return fastest * duration };
+        let most = fastest * (duration + interval);
+        let margin = self.margin.map_or(most, |margin| (margin + fastest * duration).min(most));
+        self.margin = Some(margin);
+        margin + tick
+    }
+
+    /// Whether a report that is not later than the last one shows that it was the last one whose time was wrong.
+    fn is_clock_behind(&mut self, time: Time) -> bool {
+        let (count, newest) = self.earlier;
+        self.earlier = (if count > 0 && time <= newest { 1 } else { count.saturating_add(1) }, time);
+        self.earlier.0 >= MOST_EARLIER
     }
 
     /// The motion since the last report.
@@ -77,10 +132,14 @@ impl<K: Kinematics> Odometer<K> {
         };
         let (start, end) = (K::time(&last), K::time(report));
         if end <= start {
+            if self.is_clock_behind(end) {
+                (self.last, self.earlier.0) = (Some(*report), 0);
+            }
             return Err(OdometryError::OutOfOrder);
         }
+        self.earlier.0 = 0;
         self.last = Some(*report);
-        let OdometerParameters { noise, integration, fastest, longest_interval } = self.parameters;
+        let OdometerParameters { noise, integration, longest_interval, .. } = self.parameters;
         let duration = end.since(start);
         let believed = Believed { noise, integration, was_backward: self.was_backward };
         let step = self.kinematics.step(&last, report, duration, &believed);
@@ -89,10 +148,14 @@ impl<K: Kinematics> Odometer<K> {
         if duration > longest_interval {
             return Err(OdometryError::Pause);
         }
+        let interval = self.interval.add(duration);
         let is_finite = step.displacement.is_finite() && step.covariance.iter().all(|entry| entry.is_finite());
-        if step.distance.is_nan() || step.distance > fastest * duration || !is_finite {
+        let longest = self.longest_step(duration, interval);
+        if step.distance.is_nan() || step.distance > longest || !is_finite {
+            self.refused = longest;
             return Err(OdometryError::Implausible);
         }
+        self.margin = self.margin.map(|margin| margin - step.distance);
         let (displacement, covariance, distance) = (step.displacement, step.covariance, step.distance);
         Ok((Motion { start, end, displacement, covariance, distance }, step.slip))
     }
@@ -137,6 +200,31 @@ impl VehicleOdometer {
             Self::Increments(odometer) => odometer.restart(),
             Self::Wheels(odometer) => odometer.restart(),
             Self::TricycleSpeed(odometer) => odometer.restart(),
+        }
+    }
+
+    /// See [`Kinematics::resolution`], m; zero without one.
+    #[must_use]
+    pub fn resolution(&self) -> f64 {
+        let resolution = match self {
+            Self::Tricycle(odometer) => odometer.kinematics.resolution(),
+            Self::Ackermann(odometer) => odometer.kinematics.resolution(),
+            Self::Increments(odometer) => odometer.kinematics.resolution(),
+            Self::Wheels(odometer) => odometer.kinematics.resolution(),
+            Self::TricycleSpeed(odometer) => odometer.kinematics.resolution(),
+        };
+        resolution.unwrap_or_default()
+    }
+
+    /// See [`Odometer::refused`].
+    #[must_use]
+    pub const fn refused(&self) -> f64 {
+        match self {
+            Self::Tricycle(odometer) => odometer.refused(),
+            Self::Ackermann(odometer) => odometer.refused(),
+            Self::Increments(odometer) => odometer.refused(),
+            Self::Wheels(odometer) => odometer.refused(),
+            Self::TricycleSpeed(odometer) => odometer.refused(),
         }
     }
 

@@ -63,6 +63,10 @@ impl Kinematics for Tricycle {
     fn longest_interval(&self, fastest: f64) -> f64 {
         0.5 * self.drive_range.values() as f64 * libm::fabs(self.drive_scale) / fastest
     }
+
+    fn resolution(&self) -> Option<f64> {
+        Some(libm::fabs(self.drive_scale))
+    }
 }
 
 impl Tricycle {

@@ -43,4 +43,8 @@ impl Kinematics for TricycleSpeed {
     fn longest_interval(&self, _: f64) -> f64 {
         f64::INFINITY
     }
+
+    fn resolution(&self) -> Option<f64> {
+        None
+    }
 }

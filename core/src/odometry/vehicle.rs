@@ -21,6 +21,16 @@ pub enum Vehicle {
 }
 
 impl Vehicle {
+    /// Whether it can move to the side without turning; who integrates its own motion may.
+    #[must_use]
+    pub const fn moves_sideways(&self) -> bool {
+        match self {
+            Self::Tricycle(_) | Self::Ackermann(_) | Self::TricycleSpeed(_) => false,
+            Self::Increments => true,
+            Self::Wheels(vehicle) => !matches!(vehicle, WheelVehicle::Differential(_) | WheelVehicle::Ackermann(_)),
+        }
+    }
+
     /// See [`Kinematics::steering_lever`].
     #[must_use]
     pub fn steering_lever(&self) -> Option<f64> {

@@ -7,7 +7,7 @@ use super::{Contact, OdometryNoise, Wheel, WheelMotion, WheelParameter};
 use crate::measurement::MOST_WHEELS;
 
 /// Slips that are stated as less than this, m for a square root of a metre, are taken as this.
-const LEAST_SLIP: f64 = 1e-6;
+pub(super) const LEAST_SLIP: f64 = 1e-6;
 
 /// Wheels whose normal equations have a smaller determinant than this share of the product of their diagonal, the most that it
 /// can be, do not determine the motion.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::counter::ticks_as_f64;
 use super::kinematics::{Believed, Kinematics, Step};
-use super::wheel_equations::WheelFit;
+use super::wheel_equations::{LEAST_SLIP, WheelFit};
 use super::wheel_path::WheelPath;
 use super::wheel_set::RollingWheel;
 use super::{AngleEncoder, OdometryNoise, Wheel, WheelMotion, WheelParameter, WheelSet};
@@ -49,13 +49,16 @@ impl DrivenWheel {
 /// What a wheel did between two readings of its counters.
 #[must_use]
 pub fn wheel_motion_between(wheel: &Wheel, from: &WheelReading, to: &WheelReading) -> WheelMotion {
-    let angle = |reading: u32| {
-        wheel.steering.map_or(0.0, |encoder| encoder.scale * ticks_as_f64(encoder.range.signed(reading)))
-    };
+    let angle = |ticks: i64| wheel.steering.map_or(0.0, |encoder| encoder.scale * ticks_as_f64(ticks));
+    // The wheel may pass the end of the counter's range.
+    let (start, end) = wheel.steering.map_or((0, 0), |AngleEncoder { range, .. }| {
+        let start = range.signed(from.steering);
+        (start, start + range.step(from.steering, to.steering))
+    });
     WheelMotion {
         turn: wheel.turn.map_or(0.0, |encoder| encoder.scale * ticks_as_f64(encoder.range.step(from.count, to.count))),
-        steering_start: angle(from.steering),
-        steering_end: angle(to.steering),
+        steering_start: angle(start),
+        steering_end: angle(end),
     }
 }
 
@@ -78,7 +81,9 @@ fn covariance(
     duration: f64,
     noise: &OdometryNoise,
 ) -> Matrix3<f64> {
-    let expected = fit.redundancy as f64 * distance;
+    // A reading is rounded to a tick, so that a difference of two has the variance of a sixth of its square.
+    let tick = if fit.redundancy > 0 { set.resolution().unwrap_or_default() / noise.slip.max(LEAST_SLIP) } else { 0.0 };
+    let expected = fit.redundancy as f64 * (distance + tick * tick / 6.0);
     let excess = if expected > 0.0 { libm::fmax(fit.misfit / expected, 1.0) } else { 1.0 };
     let mut covariance = path.spread() * (distance * excess);
     let mut add = |by: Vector3<f64>, deviation: f64| covariance += by * by.transpose() * (deviation * deviation);
@@ -90,7 +95,7 @@ fn covariance(
             add(path.derivative(number, WheelParameter::Heading), noise.steering);
         }
     }
-    covariance.m33 += noise.yaw * noise.yaw * distance;
+    covariance.m33 += noise.of_heading(distance, path.middle().z);
     covariance
 }
 
@@ -139,6 +144,11 @@ impl Kinematics for WheelSet {
         };
         self.wheels().iter().filter_map(longest).fold(f64::INFINITY, libm::fmin)
     }
+
+    fn resolution(&self) -> Option<f64> {
+        let tick = |rolling: &RollingWheel| Some(libm::fabs(rolling.wheel.turn?.scale * rolling.wheel.radius));
+        Some(self.wheels().iter().filter_map(tick).fold(0.0, libm::fmax))
+    }
 }
 
 /// As the [`WheelSet`] of its wheels, which an odometer would rather have: it is prepared once.
@@ -163,5 +173,9 @@ impl<V: WheelBased> Kinematics for V {
 
     fn longest_interval(&self, fastest: f64) -> f64 {
         WheelSet::of(self.wheels().as_ref()).longest_interval(fastest)
+    }
+
+    fn resolution(&self) -> Option<f64> {
+        WheelSet::of(self.wheels().as_ref()).resolution()
     }
 }

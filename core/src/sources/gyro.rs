@@ -4,14 +4,9 @@
 //! lasts of their errors is not independent from motion to motion.
 
 use crate::filter::{GyroState, KnownPose};
-use crate::geometry::Pose;
-use crate::measurement::{GyroSample, Time};
-use crate::odometry::{GyroErrors, GyroParameters, GyroRefusal, GyroTurn, GyroTurns, Motion};
+use crate::measurement::GyroSample;
+use crate::odometry::{GyroErrors, GyroParameters, GyroRefusal, GyroTurn, GyroTurns, Motion, StandingWheels};
 
-/// A vehicle whose wheels have not moved for so long stands, s.
-const STANDS_AFTER: f64 = 0.5;
-/// Wheels that tremble by no more than this stand: m and rad.
-const TREMBLE: (f64, f64) = (5e-4, 5e-4);
 /// Normalised squared innovation of a rate at rest that is not believed: five deviations.
 const REST_GATE: f64 = 25.0;
 /// For so long, s, one rate after the other must be none of a vehicle at rest before the bias has jumped.
@@ -49,22 +44,13 @@ impl RestSum {
     }
 }
 
-/// Since when the wheels stand.
-#[derive(Clone, Copy, Debug)]
-struct Rest {
-    since: Time,
-    /// Where the wheels have led since.
-    moved: Pose,
-    stands: bool,
-}
-
 /// A gyro with what is known of it.
 #[derive(Clone, Debug)]
 pub struct GyroSource {
     parameters: GyroParameters,
     turns: GyroTurns,
     state: GyroState,
-    rest: Option<Rest>,
+    wheels: StandingWheels,
     /// For how long the rates at rest were not believed, s.
     doubted: f64,
     turns_at_rest: bool,
@@ -80,6 +66,15 @@ pub struct GyroMotion {
     pub turn: GyroTurn,
 }
 
+/// Why a gyro tells no turn of a motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoTurn {
+    /// It has not told all of it.
+    Silent,
+    /// The vehicle stands, and so does not turn.
+    Standing,
+}
+
 impl GyroSource {
     /// A gyro that has said nothing.
     #[must_use]
@@ -88,7 +83,7 @@ impl GyroSource {
             parameters: *parameters,
             turns: GyroTurns::new(parameters),
             state: GyroState::new(parameters),
-            rest: None,
+            wheels: StandingWheels::new(),
             doubted: 0.0,
             turns_at_rest: false,
             seen_at_rest: RestSum::default(),
@@ -101,10 +96,10 @@ impl GyroSource {
         &self.state
     }
 
-    /// The time of its last reading.
+    /// See [`GyroTurns::is_after_gap`].
     #[must_use]
-    pub fn last(&self) -> Option<Time> {
-        self.turns.last()
+    pub const fn is_after_gap(&self) -> bool {
+        self.turns.is_after_gap()
     }
 
     /// The last rate without the bias, rad/s.
@@ -129,7 +124,7 @@ impl GyroSource {
     /// See [`GyroRefusal`].
     pub fn sample(&mut self, sample: &GyroSample) -> Result<AtRest, GyroRefusal> {
         let (rate, passed) = self.turns.sample(sample)?;
-        let Some(passed) = passed.filter(|_| self.rest.is_some_and(|rest| rest.stands)) else {
+        let Some(passed) = passed.filter(|_| self.wheels.stands()) else {
             (self.doubted, self.turns_at_rest) = (0.0, false);
             return Ok(AtRest::No);
         };
@@ -155,34 +150,32 @@ impl GyroSource {
         Ok(AtRest::Jumped)
     }
 
-    /// Takes a motion of the wheels, and tells it with the turn of the gyro. None if the gyro does not tell it, or if the vehicle
-    /// stands and so does not turn.
-    pub fn travel(&mut self, motion: &Motion) -> Option<GyroMotion> {
-        let stands = self.stands(motion);
-        let turn = self.turns.turn(motion.start, motion.end)?;
+    /// Takes a motion of the wheels, and tells it with the turn of the gyro.
+    ///
+    /// # Errors
+    /// See [`NoTurn`].
+    pub fn travel(&mut self, motion: &Motion) -> Result<GyroMotion, NoTurn> {
+        let stands = self.wheels.add(motion);
+        let turn = self.turns.turn(motion.start, motion.end).ok_or(NoTurn::Silent)?;
         if stands && !self.turns_at_rest {
-            return None;
+            return Err(NoTurn::Standing);
         }
+        Ok(GyroMotion { motion: motion.with_turn(turn.corrected(self.state.errors()), turn.variance), turn })
+    }
+
+    /// The turn of a motion of which the wheels have told nothing: nobody knows whether the vehicle stands.
+    pub fn coast(&mut self, motion: &Motion) -> Option<GyroMotion> {
+        self.wheels.forget();
+        let turn = self.turns.turn(motion.start, motion.end)?;
         Some(GyroMotion { motion: motion.with_turn(turn.corrected(self.state.errors()), turn.variance), turn })
     }
 
-    fn stands(&mut self, motion: &Motion) -> bool {
-        // A vehicle of which nothing is known stands until its wheels move.
-        let since = motion.start.offset(-STANDS_AFTER);
-        let rest = self.rest.get_or_insert(Rest { since, moved: Pose::default(), stands: false });
-        rest.moved = rest.moved.compose(&motion.displacement);
-        let Pose { x, y, theta } = rest.moved;
-        let (way, turn) = TREMBLE;
-        if libm::fabs(x) > way || libm::fabs(y) > way || libm::fabs(theta) > turn {
-            *rest = Rest { since: motion.end, moved: Pose::default(), stands: false };
-        }
-        rest.stands = motion.end.since(rest.since) >= STANDS_AFTER;
-        rest.stands
-    }
-
-    /// Nobody knows whether the vehicle stands.
-    pub fn forget_rest(&mut self) {
-        self.rest = None;
+    /// A motion that is assumed until the wheels report what it was, with the turn that the gyro has told, if it has told it.
+    #[must_use]
+    pub fn turn_assumed(&self, motion: &Motion) -> Motion {
+        let Some(turn) = self.turns.turn_between(motion.start, motion.end) else { return *motion };
+        let bias = self.state.deviations().0 * turn.duration;
+        motion.with_turn(turn.corrected(self.state.errors()), turn.variance + bias * bias)
     }
 
     /// Lets the errors go on with a motion from a heading in W, rad, whose turn the gyro has told, if it has. Returns the motion

@@ -25,7 +25,7 @@ pub use aid::{Aid, AidOutcome};
 pub use association::{AssociationParameters, MapUse};
 pub use contours::{Contours, FindContours, LendContours, NoContours, pose_by_contours};
 pub use features::FeatureParameters;
-pub use gyro::{AtRest, GyroMotion, GyroSource, RestSum};
+pub use gyro::{AtRest, GyroMotion, GyroSource, NoTurn, RestSum};
 pub use key_scans::KeyScanParameters;
 pub use places::{FindPlaces, NoPlaces, Places};
 pub use reflectors::ReflectorParameters;

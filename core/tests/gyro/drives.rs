@@ -162,7 +162,7 @@ fn a_gyro_that_nobody_knows_is_a_misuse() {
 #[test]
 fn a_localiser_that_was_lent_says_what_it_has_learned_of_the_gyro() {
     fn errors(localizer: impl Localize) -> Option<GyroErrors> {
-        localizer.gyro_errors()
+        localizer.prediction_state().gyro
     }
     for is_fitted in [false, true] {
         let mut localizer: Box<Localizer> =

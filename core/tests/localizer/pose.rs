@@ -102,7 +102,7 @@ fn a_jump_is_told_to_who_asks_later() {
     let moved = (after.pose.x - before.pose.x).hypot(after.pose.y - before.pose.y);
     // The encoders say something before anybody asks.
     drive.revolutions(1, |_| false);
-    predictor.update(&drive.localizer.outputs().pose, &drive.localizer.odometry_bias());
+    predictor.update(&drive.localizer.outputs().pose, &drive.localizer.prediction_state());
     for told in [drive.localizer.outputs().pose, predictor.output().unwrap()] {
         assert!(!told.has_jumped() && moved > PoseOutput::NOTABLE_CORRECTION);
         assert_eq!((told.resets, told.last_reset), (2, moved as f32));

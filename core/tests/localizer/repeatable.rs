@@ -19,7 +19,7 @@ fn the_predictor_says_at_once_what_the_localiser_will_say() {
     drive.localizer.handle(&Event::Encoders(sample(0)));
     predictor.encoders(&sample(0));
     drive.set_pose(Pose::new(0.1, -0.2, 0.3));
-    predictor.update(&drive.localizer.outputs().pose, &drive.localizer.odometry_bias());
+    predictor.update(&drive.localizer.outputs().pose, &drive.localizer.prediction_state());
     let mut pending = Vec::new();
     for step in 1..200 {
         predictor.encoders(&sample(step));
@@ -39,7 +39,7 @@ fn the_predictor_says_at_once_what_the_localiser_will_say() {
             for sample in pending.drain(..) {
                 drive.localizer.handle(&Event::Encoders(sample));
             }
-            predictor.update(&drive.localizer.outputs().pose, &drive.localizer.odometry_bias());
+            predictor.update(&drive.localizer.outputs().pose, &drive.localizer.prediction_state());
         }
     }
     let faults = EncoderFaults { time: sample(200).time, drive: None, steering: Some(EncoderFault::Late) };

@@ -191,7 +191,7 @@ fn a_localiser_that_hangs_is_told_and_its_pose_does_not_step_back() {
         drive.go(SETTLED, |drive| {
             let micros = drive.time().micros() - 1_000_000;
             predictor.encoders(&encoders(drive.sample(micros)));
-            predictor.update(&drive.said(), &drive.localizer.odometry_bias());
+            predictor.update(&drive.said(), &drive.localizer.prediction_state());
         });
         assert_eq!(predictor.output().unwrap().mode, Mode::Reflectors);
         let last = predictor.output().unwrap();
@@ -212,7 +212,7 @@ fn a_localiser_that_hangs_is_told_and_its_pose_does_not_step_back() {
         for sample in samples.iter().take(rate as usize / 2) {
             drive.localizer.handle(&Event::Encoders(*sample));
         }
-        predictor.update(&drive.said(), &drive.localizer.odometry_bias());
+        predictor.update(&drive.said(), &drive.localizer.prediction_state());
         let after = predictor.output().unwrap();
         let step = (after.pose.position() - before.pose.position()).norm();
         assert!(after.time >= before.time && step < 1e-3, "{step} m at {rate} Hz");
@@ -374,7 +374,7 @@ fn what_the_localiser_has_assumed_already_is_not_published_twice() {
     let observations = &seen[seen.len() - 1..];
     drive.localizer.handle(&Event::Reflectors(Reflectors::of_first(observations)));
     assert!(drive.said().time > drive.time());
-    predictor.update(&drive.said(), &drive.localizer.odometry_bias());
+    predictor.update(&drive.said(), &drive.localizer.prediction_state());
     let sample = encoders(drive.sample(3_000_000));
     predictor.encoders(&sample);
     drive.localizer.handle(&Event::Encoders(sample));
@@ -391,7 +391,7 @@ fn what_was_learnt_of_the_odometry_is_in_what_is_published() {
     drive.go(30.0, |_| {});
     let mut predictor: OutputPredictor<16> = OutputPredictor::new(&parameters(Kind::Encoders, true));
     predictor.encoders(&encoders(drive.sample(30_000_000)));
-    predictor.update(&drive.said(), &drive.localizer.odometry_bias());
+    predictor.update(&drive.said(), &drive.localizer.prediction_state());
     for step in 1..=16 {
         let sample = encoders(drive.sample(30_000_000 + step * 10_000));
         predictor.encoders(&sample);

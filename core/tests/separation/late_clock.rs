@@ -1,6 +1,6 @@
 //! A laser that is late since the vehicle was switched on.
 
-use agv_core::geometry::Pose;
+use agv_core::geometry::{Pose, Twist};
 
 use super::drive::Drive;
 
@@ -79,7 +79,7 @@ fn a_laser_that_is_late_of_a_vehicle_that_finds_itself_while_it_moves_is_held() 
             for (count, along, turn) in parts {
                 for _ in 0..count {
                     drive.true_mount = before(late, along, turn).compose(&mount);
-                    drive.revolve(&Pose::new(along, 0.0, turn));
+                    drive.revolve(&Pose::exp(&Twist { x: along, y: 0.0, theta: turn }));
                     drive.assert_held(format_args!("{late} s"));
                     last = drive.monitor.level().position;
                 }

@@ -6,7 +6,7 @@ use agv_core::integrity::separation::{
     SolutionSeparation, Step, fault_free,
 };
 use agv_core::measurement::Time;
-use agv_core::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion};
+use agv_core::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion, TricycleSpeed, Vehicle};
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::drive::Drive;
@@ -406,7 +406,8 @@ fn the_heading_is_bounded_by_what_is_known_of_the_bias_of_a_gyro() {
     let gyro = GyroParameters { is_fitted: true, ..GyroParameters::default() };
     let wheels = AssumedDeviations { scale: 1e-6, steering: 1e-6, turn: 1e-6, ..AssumedDeviations::default() };
     for known in [1e-3, 4e-3, 1.0] {
-        let mut monitor = SolutionSeparation::with_gyro(wheels, Some(1.4), Some(&gyro));
+        let vehicle = Vehicle::TricycleSpeed(TricycleSpeed { wheelbase: 1.4, steering_offset: 0.0 });
+        let mut monitor = SolutionSeparation::of(wheels, &vehicle, Some(&gyro));
         monitor.rebase_gyro(&GyroErrors::default(), known, gyro.bias);
         let (begin, mut odometry) = (Time::from_micros(1_000_000), Pose::default());
         monitor.begin(begin, &odometry, &[1e-8, 0.0, 1e-8, 0.0, 0.0, 1e-10], &odometry);

@@ -252,9 +252,7 @@ impl Drive {
             return;
         }
         let said = self.localizer.outputs().pose;
-        let biases = self.localizer.odometry_bias();
-        self.predictor.update(&said, &biases);
-        self.predictor.update_gyro(self.localizer.gyro_errors());
+        self.predictor.update(&said, &self.localizer.prediction_state());
     }
 
     fn report(&mut self, displacement: &Pose) {

@@ -23,6 +23,8 @@ pub struct GyroSeparation {
     wheels: (Pose, Matrix3<f64>),
     /// What was told of all motions since.
     by_gyro: Pose,
+    /// Covariance of what the wheels tell in a second, as they did before.
+    rate: Matrix3<f64>,
     /// The solution that holds if the gyro is wrong.
     alone: Solution,
 }
@@ -37,6 +39,7 @@ impl GyroSeparation {
             told: 0.0,
             wheels: (Pose::default(), Matrix3::zeros()),
             by_gyro: Pose::default(),
+            rate: Matrix3::zeros(),
             alone: Solution::new(Pose::default(), &[0.0; 6], assumed),
         }
     }
@@ -63,6 +66,12 @@ impl GyroSeparation {
     pub const fn wheels_covariance(&self) -> &Matrix3<f64> {
         let (_, covariance) = &self.wheels;
         covariance
+    }
+
+    /// What the wheels alone will have told after so many seconds more, s, as they have told before: its covariance.
+    #[must_use]
+    pub fn wheels_covariance_after(&self, seconds: f64) -> Matrix3<f64> {
+        self.wheels_covariance() + self.rate * seconds
     }
 
     /// The bias is known to so much, rad/s, by what does not rest on landmarks or has been corrected by them.
@@ -113,13 +122,20 @@ impl GyroSeparation {
     }
 
     /// Lets the solution of the wheels go on, while the others do by `moved`: what of that no motion has told was extrapolated, and is
-    /// in both. Returns by how much the bias of all others may have drifted in so many seconds: a
+    /// in both. A steered wheel has its lever, m, and other vehicles go a length in the direction of travel, m. Returns by how much the bias of all others may have drifted in so many seconds: a
     /// variance.
     #[must_use]
-    pub fn step(&mut self, moved: &Pose, lever: Option<f64>, passed: f64) -> f64 {
+    pub fn step(&mut self, moved: &Pose, (lever, length): (Option<f64>, f64), passed: f64) -> f64 {
         let (displacement, covariance) = self.wheels;
         let displacement = displacement.compose(&self.by_gyro.between(moved));
-        self.alone.predict(&Step { displacement, covariance, by_bias: BiasJacobian::of(&displacement, lever) });
+        if passed > 0.0 {
+            self.rate = covariance / passed;
+        }
+        self.alone.predict(&Step {
+            displacement,
+            covariance,
+            by_bias: BiasJacobian::of_length(&displacement, lever, length),
+        });
         self.pending_done();
         self.drift * passed.max(0.0)
     }

@@ -145,14 +145,16 @@ impl FreeSince {
         if self.awaits_heading && self.solution.is_heading_sure() {
             self.awaits_heading = false;
             self.solution.forget_places();
+            // Only what follows shows them.
+            (self.turned, self.driven) = (0.0, 0.0);
         }
         self.fit.refutes(square)
     }
 
-    /// Whether a free place and yaw of the laser have been found.
+    /// Whether a free place and yaw of the laser have been found: while the heading is hardly known, no turn shows the place.
     #[must_use]
     pub fn has_found_mounting(&self) -> bool {
-        self.turned >= ENOUGH.0 && self.has_found_yaw()
+        !self.awaits_heading && self.turned >= ENOUGH.0 && self.has_found_yaw()
     }
 
     /// Whether it knows its pose well, mounting and all.

@@ -13,10 +13,10 @@ mod envelope;
 mod gyro;
 mod hypothesis;
 mod late_clock;
-mod mean_velocity;
 mod misfit;
 mod sensor_information;
 mod solution;
+mod travel_direction;
 mod unheard;
 
 use heapless::Vec;
@@ -30,18 +30,18 @@ use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
 use late_clock::LateClock;
-use mean_velocity::MeanVelocity;
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
 pub use solution::{Drift, Laser, OdometryErrors, Solution, Step};
+use travel_direction::TravelDirection;
 use unheard::Unheard;
 
 use crate::geometry::{Pose, larger_axis};
 use crate::measurement::Time;
-use crate::odometry::{BiasJacobian, GyroErrors, GyroParameters, Motion};
+use crate::odometry::{BiasJacobian, GyroErrors, GyroParameters, MeanMotion, Motion, Vehicle};
 use crate::sources::BySurfaces;
-use crate::state::ProtectionLevel;
+use crate::state::{LevelGrowth, ProtectionLevel};
 
 /// Solutions without landmarks, and with a knock in an interval.
 const LEAVE_OUTS: usize = 16;
@@ -89,10 +89,12 @@ impl Pending {
 pub struct SolutionSeparation {
     assumed: AssumedDeviations,
     steering_lever: Option<f64>,
+    /// Of a vehicle that can move sideways.
+    direction: Option<TravelDirection>,
     time: Time,
     odometry_pose: Pose,
     pending: Pending,
-    velocity: MeanVelocity,
+    velocity: MeanMotion,
     /// Distance and turn since landmarks were last seen, m and rad.
     unseen: (f64, f64),
     all: Solution,
@@ -113,6 +115,8 @@ pub struct SolutionSeparation {
     unheard: Unheard,
     /// Whether it is doubtful that the laser has moved as the odometry says.
     is_motion_doubtful: bool,
+    /// Whether nobody has measured the motion since the last event.
+    is_motion_unknown: bool,
     /// Of a vehicle with a gyro.
     gyro: Option<GyroSeparation>,
     told: SensorInformation,
@@ -165,21 +169,32 @@ impl SolutionSeparation {
     /// one.
     #[must_use]
     pub fn new(assumed: AssumedDeviations, steering_lever: Option<f64>) -> Self {
-        Self::with_gyro(assumed, steering_lever, None)
+        Self::made(assumed, steering_lever, false, None)
     }
 
-    /// The same of a vehicle whose turns that gyro tells, if it is fitted. It is made in one piece, as it is large.
+    /// Solutions of a vehicle whose turns that gyro tells, if it is fitted.
     #[must_use]
-    pub fn with_gyro(assumed: AssumedDeviations, steering_lever: Option<f64>, gyro: Option<&GyroParameters>) -> Self {
+    pub fn of(assumed: AssumedDeviations, vehicle: &Vehicle, gyro: Option<&GyroParameters>) -> Self {
+        Self::made(assumed, vehicle.steering_lever(), vehicle.moves_sideways(), gyro)
+    }
+
+    /// It is made in one piece, as it is large.
+    fn made(
+        assumed: AssumedDeviations,
+        steering_lever: Option<f64>,
+        moves_sideways: bool,
+        gyro: Option<&GyroParameters>,
+    ) -> Self {
         let nowhere = Solution::new(Pose::default(), &[0.0; 6], &assumed);
         Self {
             gyro: gyro.filter(|gyro| gyro.is_fitted).map(|gyro| GyroSeparation::new(gyro, &assumed)),
             assumed,
             steering_lever,
+            direction: moves_sideways.then_some(TravelDirection::FORWARD),
             time: Time::default(),
             odometry_pose: Pose::default(),
             pending: Pending::NONE,
-            velocity: MeanVelocity::NONE,
+            velocity: MeanMotion::NONE,
             unseen: (0.0, 0.0),
             all: nowhere.clone(),
             leave_outs: Vec::new(),
@@ -195,6 +210,7 @@ impl SolutionSeparation {
             odometry_when_told: SolutionBound::UNBOUNDED,
             unheard: Unheard::new(),
             is_motion_doubtful: false,
+            is_motion_unknown: false,
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
             misfit: Misfit::NONE,
@@ -295,6 +311,12 @@ impl SolutionSeparation {
         self.is_motion_doubtful = is_doubtful;
     }
 
+    /// Nobody measures the motion until the next event. A laser that is knocked meanwhile looks like a vehicle that moves; that both happen
+    /// at once are two faults, which no solution allows for.
+    pub const fn lose_motion(&mut self) {
+        self.is_motion_unknown = true;
+    }
+
     /// What was wrong before may have been learnt as something else; so nothing is kept but about where the vehicle is.
     fn free_mounting(&self, since: Time) -> FreeSince {
         let mut solution = Solution::new(*self.all.pose(), &UNKNOWN_POSE, self.assumed());
@@ -340,10 +362,16 @@ impl SolutionSeparation {
         }
     }
 
+    /// Takes a motion that is assumed until the odometry reports what it was: the odometry pose has it, and its error is as large.
+    pub fn assume(&mut self, motion: &Motion) {
+        self.pending.covariance += motion.covariance;
+    }
+
     /// Lets all solutions go on to where the odometry is now. The level is found anew at the end of the event that follows.
     pub fn step(&mut self, now: Time, odometry_pose: &Pose) {
         let displacement = self.odometry_pose.between(odometry_pose);
         let distance = self.pending.distance;
+        self.turn_direction(&displacement);
         let step = Step { displacement, covariance: self.pending.covariance, by_bias: self.by_bias(&displacement) };
         let passed = now.since(self.time);
         let lasted = distance.max(0.5 * now.since(self.time).max(0.0));
@@ -354,7 +382,8 @@ impl SolutionSeparation {
             solution.loosen_mounting(place, yaw);
         }
         if let Some(gyro) = &mut self.gyro {
-            let drift = gyro.step(&displacement, self.steering_lever, passed);
+            let length = self.direction.as_ref().map_or(displacement.x, |direction| direction.length_of(&displacement));
+            let drift = gyro.step(&displacement, (self.steering_lever, length), passed);
             let [place, yaw] = wear;
             gyro.alone_mut().loosen_mounting(place, yaw);
             for solution in self.solutions() {
@@ -382,7 +411,29 @@ impl SolutionSeparation {
     fn by_bias(&self, displacement: &Pose) -> BiasJacobian {
         match &self.gyro {
             Some(gyro) => gyro.jacobian(displacement),
-            None => BiasJacobian::of(displacement, self.steering_lever),
+            None => BiasJacobian::of_length(displacement, self.steering_lever, self.length_of(displacement)),
+        }
+    }
+
+    /// Length in the direction of travel, m.
+    fn length_of(&self, displacement: &Pose) -> f64 {
+        self.direction.as_ref().map_or(displacement.x, |direction| direction.length_of(displacement))
+    }
+
+    /// What was learnt of the odometry in one direction is not known of another one.
+    fn turn_direction(&mut self, displacement: &Pose) {
+        let Some(cosine) = self.direction.as_mut().and_then(|direction| direction.go_on(displacement)) else { return };
+        let AssumedDeviations { scale, steering, .. } = self.assumed;
+        // A gyro has its bias in place of the steering, which has no direction.
+        let steering = if self.gyro.is_some() { None } else { Some(steering * steering) };
+        let variances = (scale * scale, steering);
+        for solution in self.solutions() {
+            solution.turn_direction(cosine, variances);
+        }
+        self.odometry.free_direction(cosine, steering.is_some());
+        if let Some(gyro) = &mut self.gyro {
+            gyro.alone_mut()
+                .turn_direction(cosine, (scale * scale, Some(self.assumed.steering * self.assumed.steering)));
         }
     }
 
@@ -508,7 +559,11 @@ impl SolutionSeparation {
 
     fn correct(&mut self, laser: &Laser) {
         let (told, now) = (self.told, self.time);
-        self.begin_knock(now);
+        if core::mem::take(&mut self.is_motion_unknown) {
+            self.knocks.iter_mut().for_each(|knock| knock.is_over = true);
+        } else {
+            self.begin_knock(now);
+        }
         let all_before = self.all.clone();
         self.all.correct(&told, laser);
         for one in &mut self.leave_outs {
@@ -638,7 +693,37 @@ impl SolutionSeparation {
     /// The protection level of the pose that the odometry has led on to since the last step.
     #[must_use]
     pub fn level(&self) -> ProtectionLevel {
-        let Pending { covariance, distance, moved, .. } = &self.pending;
+        let wheels = self.gyro.as_ref().map(|gyro| *gyro.wheels_covariance());
+        self.level_behind(&self.pending, wheels.as_ref())
+    }
+
+    /// How the level grows if the vehicle goes on by the motion of late.
+    #[must_use]
+    pub fn growth(&self, recent: &Motion) -> LevelGrowth {
+        let now = self.level();
+        let lasted = recent.end.since(recent.start);
+        LevelGrowth::of(|seconds| {
+            let share = if lasted > 0.0 { seconds / lasted } else { 0.0 };
+            let Pose { x, y, theta } = recent.displacement;
+            let moved = &self.pending.moved;
+            let pending = Pending {
+                covariance: self.pending.covariance + recent.covariance * share,
+                distance: self.pending.distance + recent.distance * share,
+                moved: Pose { x: moved.x + share * x, y: moved.y + share * y, theta: moved.theta + share * theta },
+                last: self.pending.last,
+            };
+            let wheels = self.gyro.as_ref().map(|gyro| gyro.wheels_covariance_after(seconds));
+            let level = self.level_behind(&pending, wheels.as_ref());
+            ProtectionLevel {
+                position: (level.position - now.position).max(0.0),
+                heading: (level.heading - now.heading).max(0.0),
+            }
+        })
+    }
+
+    /// The level behind a motion since the last step, of which the wheels alone have told the covariance `by_wheels`.
+    fn level_behind(&self, pending: &Pending, by_wheels: Option<&Matrix3<f64>>) -> ProtectionLevel {
+        let Pending { covariance, distance, moved, .. } = pending;
         let Bounds { envelope, odometry, odometry_errors, without_wheels, wheels, widening, .. } = &self.bounds;
         if *odometry == SolutionBound::UNBOUNDED {
             return ProtectionLevel::UNBOUNDED;
@@ -653,10 +738,10 @@ impl SolutionSeparation {
             by_odometry = by_odometry.and(&laser.after_drift(&noise, &drift));
         }
         let mut level = envelope.after(&noise).or(&by_odometry);
-        if let Some((wheels, gyro)) = wheels.as_ref().zip(self.gyro.as_ref()) {
-            level = level.or(&wheels.after(&self.growth_by(gyro.wheels_covariance(), *distance)));
+        if let Some((wheels, covariance)) = wheels.as_ref().zip(by_wheels) {
+            level = level.or(&wheels.after(&self.growth_by(covariance, *distance)));
         }
-        let unheard = self.unheard.widening(self.pending.last.map_or(self.time, |motion| motion.end));
+        let unheard = self.unheard.widening(pending.last.map_or(self.time, |motion| motion.end));
         let heading = level.heading + widening.heading + unheard.heading;
         let position = level.position + widening.position + unheard.position;
         ProtectionLevel { position: position + heading.min(1.0) * distance, heading }

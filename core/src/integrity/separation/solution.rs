@@ -76,13 +76,16 @@ impl OdometryErrors {
     /// What they do to a pose that the odometry leads on, `turned` by so many rad; `by_bias` is how that displacement in R changes with them.
     #[must_use]
     pub fn drift(&self, by_bias: &BiasJacobian, turned: f64) -> Drift {
-        let ([scale_along, _, scale_heading], [steering_along, _, steering_heading]) =
+        let ([scale_along, scale_aside, scale_heading], [steering_along, steering_aside, steering_heading]) =
             (by_bias.scale, by_bias.steering);
         let along = Vector3::new(scale_along, steering_along, 0.0);
+        let aside = Vector3::new(scale_aside, steering_aside, 0.0);
         let heading = Vector3::new(scale_heading, steering_heading, turned);
+        let variance = |by: &Vector3<f64>| not_negative(by.dot(&(self.covariance * by)));
+        let expected = length(along.dot(&self.errors), aside.dot(&self.errors));
         Drift {
-            expected: (libm::fabs(along.dot(&self.errors)), libm::fabs(heading.dot(&self.errors))),
-            deviation: libm::sqrt(not_negative(along.dot(&(self.covariance * along)))),
+            expected: (expected, libm::fabs(heading.dot(&self.errors))),
+            deviation: libm::sqrt(variance(&along) + variance(&aside)),
             heading_variance: heading.dot(&(self.covariance * heading)) + 2.0 * heading.dot(&self.with_heading),
         }
     }
@@ -130,9 +133,11 @@ fn change_by(
     let (arm_x, arm_y) = (mount.x + lever_x, mount.y + lever_y);
     let (arm_x, arm_y) = (cosine * arm_x - sine * arm_y, sine * arm_x + cosine * arm_y);
     let clock = lasting.clock;
+    // Since then the laser went on an arc: it is linearised where it was seen, and its velocity has turned meanwhile.
+    let turned = velocity.z * clock;
     let beside = Vector3::new(
-        pose.x + arm_x - velocity.x * clock - sensor.x,
-        pose.y + arm_y - velocity.y * clock - sensor.y,
+        pose.x + arm_x - (velocity.x - 0.5 * turned * velocity.y) * clock - sensor.x,
+        pose.y + arm_y - (velocity.y + 0.5 * turned * velocity.x) * clock - sensor.y,
         difference(pose.theta + mount.theta + lasting.yaw, sensor.theta) - velocity.z * clock,
     );
     let mut change = States::zeros();
@@ -141,7 +146,7 @@ fn change_by(
         let (x, y, heading) = (row.x, row.y, row.z);
         let by_heading = heading - x * arm_y + y * arm_x;
         let (along, across) = (cosine * x + sine * y, cosine * y - sine * x);
-        let by_clock = -row.dot(velocity);
+        let by_clock = turned * (x * velocity.y - y * velocity.x) - row.dot(velocity);
         let expected = [x, y, by_heading, along, across, heading, by_clock];
         let shares = shares(covariance, &expected);
         let sum = |states: &States| {
@@ -289,6 +294,34 @@ impl Solution {
     pub fn free_scale(&mut self) {
         let [scale, ..] = FREE_ODOMETRY;
         self.forget(ODOMETRY, &[scale]);
+    }
+
+    /// The direction of travel has changed by an angle of that cosine: of the scale so much is still known, and of the steering if it has
+    /// a direction; the rest is about what is believed, with these variances.
+    pub fn turn_direction(&mut self, cosine: f64, (scale, steering): (f64, Option<f64>)) {
+        self.lasting.scale *= cosine;
+        self.fade(ODOMETRY, cosine, scale);
+        if let Some(steering) = steering {
+            self.lasting.steering *= cosine;
+            self.fade(STEERING, cosine, steering);
+        }
+    }
+
+    /// The same of a solution whose scale may be anything, and whose steering, if it has a direction: what that adds.
+    pub fn free_direction(&mut self, cosine: f64, has_steering: bool) {
+        let rest = 1.0 - cosine * cosine;
+        let [scale, steering, _] = FREE_ODOMETRY;
+        let steering = if has_steering { rest * steering * steering } else { 0.0 };
+        self.loosen_odometry(&[rest * scale * scale, steering, 0.0]);
+    }
+
+    /// So much of a state is still known; the rest has that variance, and nothing in common with others.
+    fn fade(&mut self, state: usize, share: f64, variance: f64) {
+        for other in 0..STATES {
+            let entry = self.covariance.get((state, other)).copied().unwrap_or_default();
+            self.set(state, other, if other == state { share * share * entry } else { share * entry });
+        }
+        self.loosen(state, &[(1.0 - share * share) * variance]);
     }
 
     /// Nothing is known of the second error of the odometry but that it is about what is believed, with that deviation.

@@ -178,6 +178,33 @@ impl Parameters {
         }
     }
 
+    /// Whether something can be computed with all of its numbers: none is negative, no length is beyond a kilometre, and the grid has
+    /// sectors.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let is_length = |value: &f32| (0.0..=1000.0).contains(value);
+        let own = [
+            self.radius_scale,
+            self.radius_growth,
+            self.triangle_ratio,
+            self.farthest,
+            self.suppression_radius,
+            self.sub_beam_limit,
+            self.jump.unwrap_or_default(),
+            self.range_deviation,
+            self.deviation_floor,
+        ];
+        let gate = self.gate.is_none_or(|LineGate { residual, sine, deviation, beams, concave_spacing }| {
+            [residual, sine, deviation, beams, concave_spacing].iter().all(is_length)
+        });
+        let end_points =
+            self.end_points.is_none_or(|EndPointParameters { length, shortest, residual, spacing, depth, .. }| {
+                [length, shortest, residual, spacing, depth].iter().all(is_length)
+            });
+        let has_sectors = self.sectors > 0 && self.sectors <= Self::MOST_SECTORS;
+        own.iter().all(is_length) && gate && end_points && has_sectors && self.score_share >= 0.0
+    }
+
     /// What is looked for in a scan whose beams are so far apart, rad: where they are too few for this gate a wider one, and keypoints that are
     /// as much less precise.
     #[must_use]
