@@ -1,5 +1,6 @@
 //! All that the controller hears and says on the CAN bus.
 
+use agv_core::geometry::Pose;
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::OutputPredictor;
 use agv_core::measurement::{EncoderFaults, Time};
@@ -9,10 +10,11 @@ use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller::Health;
 use agv_wire::can::controller_node::{
-    CONSUMERS, CarriedMap, ControllerNode, ErrorKind, NodeSettings, Permission, ProcessData,
+    CONSUMERS, CarriedMap, CommunicationParameters, ControllerNode, ErrorKind, NodeSettings, Permission, ProcessData,
 };
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::sdo::{AbortCode, ObjectDictionary};
+use agv_wire::nav350::SensorSpeed;
 use heapless::Vec;
 
 use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, add};
@@ -46,6 +48,19 @@ impl Troubles {
     }
 }
 
+/// What the controller says of itself on the bus.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ControllerIdentity {
+    /// What it is called there (1009h).
+    pub hardware: &'static str,
+    /// Which of all controllers it is; 0 if nobody knows (1018h, subindex 4).
+    pub serial: u32,
+    /// Its map (2014h).
+    pub map: CarriedMap,
+    /// What a master has had stored of how it speaks (1010h).
+    pub stored: Option<CommunicationParameters>,
+}
+
 /// Encoders are being set up for so long after the start, s: their faults are no errors until then.
 const SETTING_UP: f64 = 2.0;
 
@@ -63,8 +78,8 @@ pub enum BusOutput {
     Event(Told),
     /// A pose went out, in the frames before.
     Published(SentPose),
-    /// The settings are to be stored.
-    Save,
+    /// The settings are to be stored, and these of how the controller speaks; then [`Bus::saved`] is to be called.
+    Save(CommunicationParameters),
 }
 
 /// The encoders, the controller's own node, and the pose for now.
@@ -84,14 +99,16 @@ pub struct Bus {
     laser: LaserHealth,
     is_lost: bool,
     relocalization: Relocalization,
+    /// Where the laser is in R, if it is told how fast it moves.
+    laser_mount: Option<Pose>,
     start: Time,
 }
 
 impl Bus {
-    /// A bus on which nobody was heard before `start`; `hardware` is what the controller is called there (1009h), `map` what it says of
-    /// its map.
+    /// A bus on which nobody was heard before `start`.
     #[must_use]
-    pub fn new(settings: &Settings, hardware: &'static str, map: CarriedMap, troubles: Troubles, start: Time) -> Self {
+    pub fn new(settings: &Settings, identity: ControllerIdentity, troubles: Troubles, start: Time) -> Self {
+        let ControllerIdentity { hardware, serial, map, stored } = identity;
         let nodes = EncoderNodes::of(settings);
         let node = NodeSettings {
             vendor: settings.nodes.vendor,
@@ -99,7 +116,9 @@ impl Bus {
             starts_itself: settings.nodes.starts_itself,
             period: settings.publishing_period,
             hardware,
+            serial,
             map,
+            stored,
             ..NodeSettings::new(nodes.controller)
         };
         let mut node = ControllerNode::new(node, start);
@@ -114,13 +133,26 @@ impl Bus {
             accepts_settings: settings.nodes.accepts_settings,
             predictor: OutputPredictor::new(&settings.parameters),
             progress: Progress::default(),
-            standstill: Standstill::new(),
+            standstill: Standstill::new(&settings.parameters.vehicle),
             faults: EncoderFaults::default(),
             laser: LaserHealth::Unknown,
             is_lost: false,
             relocalization: Relocalization::Idle,
+            laser_mount: settings.laser.tells_speed.then(|| *settings.parameters.lasers.first()),
             start,
         }
+    }
+
+    /// How fast the laser moves, if it is told so and somebody reports it.
+    #[must_use]
+    pub fn laser_speed(&self) -> Option<SensorSpeed> {
+        let Pose { x, y, theta } = self.laser_mount?;
+        let (time, velocity) = self.predictor.velocity()?;
+        // Of its point on the vehicle, along the axes of R, then along its own.
+        let (along, across) = (velocity.x - velocity.theta * y, velocity.y + velocity.theta * x);
+        let (sine, cosine) = libm::sincos(theta);
+        let (x, y) = (cosine * along + sine * across, cosine * across - sine * along);
+        Some(SensorSpeed { time, x, y, rotation: velocity.theta })
     }
 
     /// The localiser has said something.
@@ -128,8 +160,7 @@ impl Bus {
         // Only the search may have got further. Before the first answer a vehicle without a pose is published.
         let is_first = !self.predictor.has_output();
         if core::mem::replace(&mut self.progress.answered, estimate.answered) != estimate.answered || is_first {
-            self.predictor.update_gyro(estimate.gyro);
-            self.predictor.update(&estimate.pose, &estimate.bias);
+            self.predictor.update(&estimate.pose, &estimate.prediction);
         }
         self.is_lost = estimate.pose.mode == Mode::Lost;
         self.relocalization = estimate.relocalization;
@@ -151,12 +182,17 @@ impl Bus {
         if let Some(answer) = self.node.handle(frame, heard, process.as_ref(), settings, self.permission(heard)) {
             take(BusOutput::Send(answer));
         }
-        if self.node.take_save() {
-            take(BusOutput::Save);
+        if let Some(parameters) = self.node.take_save() {
+            take(BusOutput::Save(parameters));
         }
         if let Some(order) = self.node.take_order() {
             self.hear_others(&order, heard, take);
         }
+    }
+
+    /// What was to be stored is stored, or could not be: the frame that tells whoever has asked for it.
+    pub fn saved(&mut self, is_stored: bool) -> Option<Frame> {
+        self.node.saved(is_stored)
     }
 
     /// Whether settings may be changed over the bus.
@@ -170,7 +206,7 @@ impl Bus {
 
     /// Takes what encoders and other controllers say.
     fn hear_others(&mut self, frame: &Frame, heard: Time, mut take: impl FnMut(BusOutput)) {
-        let Self { encoders, predictor, progress, standstill, node, accepts_pose, .. } = self;
+        let Self { encoders, predictor, progress, standstill, node, accepts_pose, faults, .. } = self;
         encoders.hear(frame, heard, |event| {
             match &event {
                 BusEvent::Encoders(sample) => {
@@ -188,6 +224,10 @@ impl Bus {
                 BusEvent::Increment(increment) => {
                     predictor.increment(increment);
                     standstill.increment(increment);
+                }
+                BusEvent::EncoderFaults(found) => {
+                    *faults = *found;
+                    predictor.doubt_encoders(found);
                 }
                 BusEvent::SetPose(_) if !*accepts_pose || !standstill.stands(heard) => {
                     return node.report(ErrorKind::PoseRefused, heard);

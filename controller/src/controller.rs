@@ -6,17 +6,18 @@ use agv_core::record::Record;
 use agv_core::state::PoseOutput;
 use agv_settings::Settings;
 use agv_wire::can::frame::Frame;
-use agv_wire::nav350::{Configuration, Revolution, Step};
+use agv_wire::nav350::{Revolution, Step};
 
-use super::bus::{Bus, BusOutput, Troubles};
+use super::bus::{Bus, BusOutput, ControllerIdentity, Troubles};
 use super::carried_map::carried_map;
 use super::encoders::BusEvent;
 use super::laser::Laser;
 use super::localization::Localization;
 use super::setting_objects::ChangeableSettings;
 
-/// Room for the longest telegram of a revolution with 1440 beams, in either dialect.
-pub const TELEGRAM: usize = 18 * 1024;
+/// Room for the longest telegram of a revolution with 1440 beams, in either dialect: distances and strengths of echoes, 50 reflectors with
+/// their details, and the pose, each number as long as it can be.
+pub const TELEGRAM: usize = 20 * 1024;
 
 /// What the controller is called on the bus.
 const HARDWARE: &str = "desktop";
@@ -64,11 +65,12 @@ impl<L: Localize> Controller<L> {
     #[must_use]
     pub fn new(settings: &Settings, localizer: L, now: Time) -> Self {
         let landmarks = localizer.reflectors().landmarks().iter().chain(localizer.features().landmarks());
-        let map = carried_map(landmarks);
+        let identity =
+            ControllerIdentity { hardware: HARDWARE, map: carried_map(landmarks), ..ControllerIdentity::default() };
         Self {
-            laser: Laser::new(Configuration::default()),
+            laser: Laser::new(settings.laser.configuration()),
             revolution: Revolution::new(),
-            bus: Bus::new(settings, HARDWARE, map, Troubles::default(), now),
+            bus: Bus::new(settings, identity, Troubles::default(), now),
             localization: Localization::new(localizer, settings),
             settings: settings.clone(),
         }
@@ -103,6 +105,9 @@ impl<L: Localize> Controller<L> {
 
     /// Does what there is to do with the laser.
     pub fn poll_laser(&mut self, now: Time, mut order: impl FnMut(LaserOrder<&[u8]>), mut log: impl FnMut(&Record)) {
+        if let Some(speed) = self.bus.laser_speed() {
+            self.laser.set_speed(speed);
+        }
         loop {
             match self.laser.poll(now, &mut self.revolution) {
                 Step::Wait(_) => return,
@@ -121,9 +126,15 @@ impl<L: Localize> Controller<L> {
     /// Takes a frame of the bus.
     pub fn hear_bus(&mut self, frame: &Frame, now: Time, mut send: impl FnMut(&Frame), mut log: impl FnMut(&Record)) {
         let Self { bus, localization, settings, .. } = self;
+        let mut is_save_asked = false;
         bus.hear(frame, now, &mut ChangeableSettings::new(settings), |output| {
-            take(localization, output, &mut send, &mut log)
+            is_save_asked |= matches!(output, BusOutput::Save(_));
+            take(localization, output, &mut send, &mut log);
         });
+        // It has no flash.
+        if is_save_asked && let Some(answer) = bus.saved(false) {
+            send(&answer);
+        }
         bus.update(&localization.estimate());
     }
 
@@ -174,7 +185,7 @@ fn take<L: Localize>(
         BusOutput::Send(frame) => send(&frame),
         BusOutput::Event(told) => localization.hear(&told, log),
         BusOutput::Published(published) => localization.published(&published, log),
-        // It has no flash.
-        BusOutput::Save => {}
+        // Whoever hears the bus looks after it.
+        BusOutput::Save(_) => {}
     }
 }

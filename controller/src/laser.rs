@@ -2,7 +2,7 @@
 
 use agv_core::measurement::Time;
 use agv_core::state::LaserHealth;
-use agv_wire::nav350::{Configuration, Revolution, SensorWatch, Session, Step};
+use agv_wire::nav350::{Configuration, Revolution, SensorSpeed, SensorWatch, Session, Step};
 
 /// A session of which somebody keeps the connection. `BYTES` is the room for the longest telegram.
 #[derive(Debug)]
@@ -16,6 +16,11 @@ impl<const BYTES: usize> Laser<BYTES> {
     #[must_use]
     pub fn new(configuration: Configuration) -> Self {
         Self { session: Session::new(configuration), watch: SensorWatch::new() }
+    }
+
+    /// Tells the laser how fast it moves, as soon as that may be sent.
+    pub const fn set_speed(&mut self, speed: SensorSpeed) {
+        self.session.set_speed(speed);
     }
 
     /// The connection is open.

@@ -26,7 +26,7 @@ mod progress;
 mod setting_objects;
 mod standstill;
 
-pub use bus::{Bus, BusOutput, MOTIONS, Troubles};
+pub use bus::{Bus, BusOutput, ControllerIdentity, MOTIONS, Troubles};
 pub use carried_map::carried_map;
 pub use controller::{Controller, LaserOrder, TELEGRAM};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels, counted};

@@ -1,7 +1,6 @@
 //! The localiser, and the search for a pose that it does not have.
 
-use agv_core::localizer::{Event, Localize, StartSearch};
-use agv_core::odometry::{GyroErrors, OdometryBias};
+use agv_core::localizer::{Event, Localize, PredictionState, StartSearch};
 use agv_core::record::{Output, Published, Record};
 use agv_core::sources::FindContours;
 use agv_core::state::{PoseOutput, Relocalization};
@@ -17,10 +16,8 @@ pub struct Estimate {
     pub answered: u32,
     /// Its pose.
     pub pose: PoseOutput,
-    /// What it has learnt of the odometry.
-    pub bias: OdometryBias,
-    /// What it has learnt of the gyro, if there is one.
-    pub gyro: Option<GyroErrors>,
+    /// What it has learnt of the motion.
+    pub prediction: PredictionState,
     /// How far the search for a pose has come.
     pub relocalization: Relocalization,
 }
@@ -131,8 +128,7 @@ impl<L: Localize> Localization<L> {
         Estimate {
             answered: self.answered,
             pose: self.localizer.outputs().pose,
-            bias: self.localizer.odometry_bias(),
-            gyro: self.localizer.gyro_errors(),
+            prediction: self.localizer.prediction_state(),
             relocalization: self.relocalization(),
         }
     }

@@ -1,18 +1,19 @@
 //! What the controller says and hears on its bus.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "a panic is how a test fails")]
 
-use agv_controller::{Bus, BusOutput, ChangeableSettings, Estimate, SettingObjects, Troubles, object_of};
+use agv_controller::{
+    Bus, BusOutput, ChangeableSettings, ControllerIdentity, Estimate, SettingObjects, Troubles, object_of,
+};
 use agv_core::geometry::Pose;
 use agv_core::integrity::ProtectionLevel;
-use agv_core::localizer::Event;
+use agv_core::localizer::{Event, PredictionState};
 use agv_core::measurement::{PoseFix, Time};
-use agv_core::odometry::OdometryBias;
+
 use agv_core::state::{LaserHealth, Mode, PoseOutput, Reason, Relocalization};
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::{LEAVES, Settings};
 use agv_wire::can::canopen::{Message, NodeId, transmit_pdo_id};
 use agv_wire::can::controller::Content;
-use agv_wire::can::controller_node::CarriedMap;
 use agv_wire::can::emcy::Emergency;
 use agv_wire::can::frame::{Frame, standard_id};
 
@@ -34,7 +35,7 @@ struct Bench {
 
 impl Bench {
     fn new(settings: Settings) -> Self {
-        let mut bus = Bus::new(&settings, "test", CarriedMap::default(), Troubles::default(), at(0));
+        let mut bus = Bus::new(&settings, ControllerIdentity::default(), Troubles::default(), at(0));
         bus.update(&estimate(Mode::Reflectors));
         Self { bus, settings, sent: Vec::new(), given: Vec::new(), published: 0 }
     }
@@ -48,7 +49,7 @@ impl Bench {
                     given.push(fix);
                 }
             }
-            BusOutput::Published(_) | BusOutput::Save => {}
+            BusOutput::Published(_) | BusOutput::Save(_) => {}
         });
     }
 
@@ -58,7 +59,7 @@ impl Bench {
             bus.poll(at(now), LaserHealth::Sound, |output| match output {
                 BusOutput::Send(frame) => sent.push((now, frame)),
                 BusOutput::Published(_) => *published += 1,
-                BusOutput::Event(_) | BusOutput::Save => {}
+                BusOutput::Event(_) | BusOutput::Save(_) => {}
             });
         }
     }
@@ -97,7 +98,7 @@ fn estimate(mode: Mode) -> Estimate {
         last_reset: 0.0,
         overflows: 0,
     };
-    Estimate { answered: 1, pose, bias: OdometryBias::default(), gyro: None, relocalization: Relocalization::Idle }
+    Estimate { answered: 1, pose, prediction: PredictionState::default(), relocalization: Relocalization::Idle }
 }
 
 fn tell(bench: &mut Bench, command: u8, now: u64) {
@@ -296,7 +297,7 @@ fn settings_are_changed_over_the_bus_if_that_is_permitted() {
 #[test]
 fn what_of_the_board_does_not_work_is_told_by_its_bit() {
     let troubles = Troubles { damaged_parts: 0b100, ..Troubles::default() };
-    let mut bus = Bus::new(&Settings::default(), "test", CarriedMap::default(), troubles, at(0));
+    let mut bus = Bus::new(&Settings::default(), ControllerIdentity::default(), troubles, at(0));
     let mut told = Vec::new();
     for now in 0..100 {
         bus.poll(at(now), LaserHealth::Sound, |output| match output {

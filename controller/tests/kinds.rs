@@ -1,12 +1,15 @@
 //! What tells the motion of a vehicle of each kind on the bus, and what becomes of it.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "a panic is how a test fails")]
 
-use agv_controller::{Bus, BusEvent, EncoderNodes, EncoderOutput, Encoders, Troubles, counted};
+use std::f64::consts::FRAC_PI_2;
+
+use agv_controller::{Bus, BusEvent, ControllerIdentity, EncoderNodes, EncoderOutput, Encoders, Troubles, counted};
 use agv_core::geometry::Pose;
 use agv_core::measurement::{EncoderFault, EncoderFaults, Time, WheelReading};
+use agv_core::state::LaserHealth;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::{Settings, VehicleKind};
-use agv_wire::can::controller_node::{CarriedMap, WithoutSettings};
+use agv_wire::can::controller_node::WithoutSettings;
 use agv_wire::can::encoder_group::Counts;
 use agv_wire::can::frame::{Frame, standard_id};
 use agv_wire::can::motion_frames::MotionFrames;
@@ -56,7 +59,7 @@ fn the_bus_listens_to_what_tells_the_motion() {
         (VehicleKind::CarSpeed, &[16], &[0x1A1, 0x1A1]),
         (VehicleKind::Increments, &[16], &[0x1A2]),
     ] {
-        let bus = Bus::new(&of_kind(kind), "test", CarriedMap::default(), Troubles::default(), at(0));
+        let bus = Bus::new(&of_kind(kind), ControllerIdentity::default(), Troubles::default(), at(0));
         assert_eq!(bus.nodes().iter().map(|node| node.number()).collect::<Vec<_>>(), nodes, "{kind:?}");
         let ids: Vec<_> = others.iter().map(|id| standard_id(*id)).collect();
         assert_eq!(bus.other_frames(), ids[..], "{kind:?}");
@@ -115,10 +118,81 @@ fn reports_of_the_own_controller_are_events_and_their_silence_is_a_fault() {
     }
 }
 
+/// By the velocity of a point of a rigid body, and the turn of its axes.
+#[test]
+fn a_laser_is_told_how_fast_it_moves() {
+    let mut settings = of_kind(VehicleKind::Increments);
+    *settings.parameters.lasers.first_mut() = Pose::new(0.9, 0.2, FRAC_PI_2);
+    for (tells, stops) in [(false, false), (true, false), (true, true)] {
+        settings.laser.tells_speed = tells;
+        let mut bus = Bus::new(&settings, ControllerIdentity::default(), Troubles::default(), at(0));
+        for step in 1..=40 {
+            let moved = Pose { x: 0.01, y: 0.0, theta: 0.005 };
+            let frame = MotionFrames::USUAL.encode_increment(&moved).unwrap();
+            bus.hear(&frame, at(10 * step), &mut WithoutSettings, |_| ());
+        }
+        if stops {
+            // Nobody says any more how it moves.
+            (400..600).for_each(|now| bus.poll(at(now), LaserHealth::Sound, |_| ()));
+        }
+        let Some(speed) = bus.laser_speed() else {
+            assert!(!tells || stops);
+            continue;
+        };
+        assert!(tells && !stops, "{speed:?}");
+        // 1 m/s and 0.5 rad/s of R, on the way in the middle of each step.
+        assert!((speed.x - 0.45).abs() < 0.005 && (speed.y + 0.9).abs() < 0.005, "{speed:?}");
+        assert!((speed.rotation - 0.5).abs() < 1e-6 && speed.time == at(400), "{speed:?}");
+    }
+}
+
+/// An increment holds the way since the one before it was sent, and a lost one takes its way along.
+#[test]
+fn a_lost_increment_is_told_and_a_late_one_is_not() {
+    for period in [5_u64, 10, 20, 50] {
+        for (late, lost, told) in [(0, None, 0), (9, None, 0), (0, Some(40), 1), (9, Some(40), 1)] {
+            let mut settings = of_kind(VehicleKind::Increments);
+            settings.encoder_period = period as u16;
+            let mut encoders = Encoders::new(&EncoderNodes::of(&settings), &settings.parameters, at(0));
+            let mut events = Vec::new();
+            for millisecond in 1..80 * period {
+                // In the bus a report may be held up: each third one.
+                let number = millisecond / period;
+                let held = if number.is_multiple_of(3) { late * period / 20 } else { 0 };
+                let comes = millisecond == number * period + held && number > 0 && Some(number) != lost;
+                for frame in frames_of(VehicleKind::Increments, true).iter().filter(|_| comes) {
+                    encoders.hear(frame, at(millisecond), |event| events.push(event));
+                }
+                encoders.poll(at(millisecond), |output| {
+                    if let EncoderOutput::Event(event) = output {
+                        events.push(event);
+                    }
+                });
+            }
+            let faults: Vec<_> = events
+                .iter()
+                .enumerate()
+                .filter_map(|(place, event)| match event {
+                    BusEvent::EncoderFaults(found) if found.any() => Some(place),
+                    _ => None,
+                })
+                .collect();
+            assert_eq!(faults.len(), told, "{period} ms, {late}, {lost:?}: {faults:?}");
+            for place in faults {
+                let BusEvent::EncoderFaults(found) = events[place] else { panic!() };
+                let BusEvent::Increment(increment) = events[place + 1] else { panic!("{:?}", events[place + 1]) };
+                assert_eq!((found.drive, found.time), (Some(EncoderFault::Missing), increment.time));
+                let BusEvent::EncoderFaults(ended) = events[place + 2] else { panic!("{:?}", events[place + 2]) };
+                assert!(!ended.any());
+            }
+        }
+    }
+}
+
 #[test]
 fn a_vehicle_whose_own_controller_says_so_stands() {
     for kind in [VehicleKind::TricycleSpeed, VehicleKind::Increments] {
-        let mut bus = Bus::new(&of_kind(kind), "test", CarriedMap::default(), Troubles::default(), at(0));
+        let mut bus = Bus::new(&of_kind(kind), ControllerIdentity::default(), Troubles::default(), at(0));
         let hear = |bus: &mut Bus, now: u64, is_moving: bool| {
             for frame in frames_of(kind, is_moving) {
                 bus.hear(&frame, at(now), &mut WithoutSettings, |_| ());

@@ -4,9 +4,8 @@
 //! it is while the vehicle is on; the other one is written. Its header comes last, so that a loss of power leaves the old map or the new one.
 //! Flash whose words can be written once only will do.
 
-use embedded_storage::nor_flash::NorFlash;
-
 use crate::checksum::{CHECKSUM, continued};
+use crate::patient_flash::PatientFlash;
 use crate::store::StoreError;
 
 /// Bytes before a map: a multiple of the words of any flash.
@@ -67,7 +66,7 @@ struct Writing {
 }
 
 /// Two copies of a map of contours.
-pub struct ContourStore<F: NorFlash> {
+pub struct ContourStore<F: PatientFlash> {
     flash: F,
     /// What was found at the start.
     found: Option<KeptContours>,
@@ -75,7 +74,7 @@ pub struct ContourStore<F: NorFlash> {
     writing: Option<Writing>,
 }
 
-impl<F: NorFlash> ContourStore<F> {
+impl<F: PatientFlash> ContourStore<F> {
     /// The copies in `flash`, all of it. None if it has fewer than two pages, or words of more than 32 bytes.
     #[must_use]
     pub fn open(flash: F) -> Option<Self> {
@@ -138,7 +137,7 @@ impl<F: NorFlash> ContourStore<F> {
     ///
     /// # Errors
     /// If it is larger than there is room for, or the flash refuses.
-    pub fn begin(&mut self, length: u32, checksum: u32) -> Result<(), StoreError> {
+    pub async fn begin(&mut self, length: u32, checksum: u32) -> Result<(), StoreError> {
         self.writing = None;
         if length as usize > self.room() {
             return Err(StoreError::Map);
@@ -146,7 +145,7 @@ impl<F: NorFlash> ContourStore<F> {
         let copy = self.found.map_or(0, |found| 1 - found.copy.min(1));
         let generation = self.found.map_or(0, |found| found.generation.wrapping_add(1));
         let from = u32::from(copy) * self.bytes_of_copy() as u32;
-        self.flash.erase(from, from + self.bytes_of_copy() as u32).map_err(|_| StoreError::Flash)?;
+        self.flash.erase(from, from + self.bytes_of_copy() as u32).await.map_err(|_| StoreError::Flash)?;
         let map = KeptContours { copy, length, checksum, generation };
         self.writing = Some(Writing { map, written: 0, digest: 0 });
         Ok(())
@@ -156,7 +155,7 @@ impl<F: NorFlash> ContourStore<F> {
     ///
     /// # Errors
     /// If it is no such piece, or the flash refuses. The map is given up then.
-    pub fn write(&mut self, piece: &[u8]) -> Result<(), StoreError> {
+    pub async fn write(&mut self, piece: &[u8]) -> Result<(), StoreError> {
         let mut writing = self.writing.take().ok_or(StoreError::Map)?;
         let rest = (writing.map.length - writing.written) as usize;
         if piece.is_empty() || piece.len() != rest.min(CONTOUR_PIECE) {
@@ -167,7 +166,7 @@ impl<F: NorFlash> ContourStore<F> {
         let whole = piece.len().next_multiple_of(F::WRITE_SIZE);
         let words = room.get_mut(..whole).ok_or(StoreError::Map)?;
         words.iter_mut().zip(piece).for_each(|(byte, part)| *byte = *part);
-        self.flash.write(offset, words).map_err(|_| StoreError::Flash)?;
+        self.flash.write(offset, words).await.map_err(|_| StoreError::Flash)?;
         writing.digest = continued(writing.digest, piece);
         writing.written += piece.len() as u32;
         self.writing = Some(writing);
@@ -178,7 +177,7 @@ impl<F: NorFlash> ContourStore<F> {
     ///
     /// # Errors
     /// If it is not whole or not the one whose checksum was told, or the flash refuses. The map is given up then.
-    pub fn finish(&mut self) -> Result<(), StoreError> {
+    pub async fn finish(&mut self) -> Result<(), StoreError> {
         let Writing { map, written, digest } = self.writing.take().ok_or(StoreError::Map)?;
         if written != map.length || digest != map.checksum {
             return Err(StoreError::Map);
@@ -187,7 +186,7 @@ impl<F: NorFlash> ContourStore<F> {
             return Err(StoreError::Flash);
         }
         let place = self.offset(map.copy) - HEADER as u32;
-        self.flash.write(place, &map.header()).map_err(|_| StoreError::Flash)
+        self.flash.write(place, &map.header()).await.map_err(|_| StoreError::Flash)
     }
 
     /// The flash.

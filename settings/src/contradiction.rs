@@ -1,12 +1,13 @@
 //! Whether settings go together.
 
+use agv_core::localizer::Parameters;
 use agv_core::odometry::{Counted, MOST_COUNTERS};
 use agv_wire::can::bit_timing::BIT_RATES;
 use agv_wire::can::bus_load::MOST_LOAD;
 use agv_wire::can::motion_frames::Place;
 
 use crate::bus_load::bus_load;
-use crate::{Nodes, Settings, VehicleKind};
+use crate::{Network, Nodes, Settings, VehicleKind};
 
 /// Nearer steered wheels do not tell how the vehicle turns, m.
 const LEAST_APART: f64 = 0.05;
@@ -27,6 +28,8 @@ pub enum Cause {
 pub struct Contradiction {
     /// Its name.
     pub leaf: &'static str,
+    /// The name of the one that it does not go with, where it is one.
+    pub other: Option<&'static str>,
     /// Why.
     pub cause: Cause,
 }
@@ -37,15 +40,15 @@ impl Settings {
     /// # Errors
     /// The first setting that does not, and why.
     pub fn check(&self) -> Result<(), Contradiction> {
-        let bounds = |leaf| Contradiction { leaf, cause: Cause::Bounds };
+        let bounds = |leaf| Contradiction { leaf, other: None, cause: Cause::Bounds };
         self.check_believed().map_err(bounds)?;
         if !BIT_RATES.contains(&self.bit_rate) {
             return Err(bounds("can.bit_rate"));
         }
-        self.check_nodes().map_err(bounds)?;
+        self.check_nodes()?;
         self.check_frames().map_err(bounds)?;
         if bus_load(self) > MOST_LOAD {
-            return Err(Contradiction { leaf: "can.publishing_period", cause: Cause::BusLoad });
+            return Err(Contradiction { leaf: "can.publishing_period", other: None, cause: Cause::BusLoad });
         }
         Ok(())
     }
@@ -82,8 +85,28 @@ impl Settings {
         Ok(())
     }
 
+    /// Two settings of which one must differ from the other, or not be larger, and is not so: for whoever sets up a vehicle. A controller
+    /// that runs takes one setting after the other, and asks only for what it cannot compute with ([`Self::check`]).
+    #[must_use]
+    pub fn contradicting_pair(&self) -> Option<[&'static str; 2]> {
+        let Parameters { features, dynamic_map, limits, alert_limits, .. } = &self.parameters;
+        let Network { address, laser, log_port, service_port, .. } = &self.network;
+        let (travel, docking) = (&alert_limits.travel, &alert_limits.docking);
+        let pairs = [
+            (features.nearest < features.farthest, ["features.nearest", "features.farthest"]),
+            (dynamic_map.least_hits <= dynamic_map.most_hits, ["dynamic_map.least_hits", "dynamic_map.most_hits"]),
+            (dynamic_map.first_hits <= dynamic_map.most_hits, ["dynamic_map.first_hits", "dynamic_map.most_hits"]),
+            (limits.dead_reckoning_from <= limits.lost_after, ["limits.dead_reckoning_from", "limits.lost_after"]),
+            (docking.position <= travel.position, ["alert_limits.docking.position", "alert_limits.travel.position"]),
+            (docking.heading <= travel.heading, ["alert_limits.docking.heading", "alert_limits.travel.heading"]),
+            (address != laser, ["nav350.address", "network.address"]),
+            (log_port != service_port, ["log.port", "service.port"]),
+        ];
+        pairs.iter().find(|(goes_together, _)| !goes_together).map(|(_, pair)| *pair)
+    }
+
     /// Whether no two that are heard have the same node.
-    fn check_nodes(&self) -> Result<(), &'static str> {
+    fn check_nodes(&self) -> Result<(), Contradiction> {
         const NODES: [&str; MOST_COUNTERS] =
             ["can.drive_node", "can.steering_node", "can.third_node", "can.fourth_node"];
         const PROFILES: [&str; MOST_COUNTERS] =
@@ -91,12 +114,17 @@ impl Settings {
         let Nodes { controller, encoders, .. } = &self.nodes;
         let count = self.parameters.vehicle.counters().len();
         for (number, encoder) in encoders.iter().enumerate().take(count) {
-            let is_taken = encoders.iter().take(number).any(|other| other.node == encoder.node);
-            if is_taken || encoder.node == *controller {
-                return Err(NODES.get(number).copied().unwrap_or_default());
+            let name = |names: &[&'static str]| names.get(number).copied().unwrap_or_default();
+            let taken = encoders.iter().take(number).position(|other| other.node == encoder.node);
+            let other = match taken {
+                Some(first) => NODES.get(first).copied(),
+                None => (encoder.node == *controller).then_some("can.controller_node"),
+            };
+            if other.is_some() {
+                return Err(Contradiction { leaf: name(&NODES), other, cause: Cause::Bounds });
             }
             if !matches!(encoder.profile, 402 | 406) {
-                return Err(PROFILES.get(number).copied().unwrap_or_default());
+                return Err(Contradiction { leaf: name(&PROFILES), other: None, cause: Cause::Bounds });
             }
         }
         Ok(())

@@ -99,7 +99,8 @@ impl Leaf {
         self.set(settings, value)?;
         if let Err(contradiction) = settings.check() {
             (self.set)(settings, before);
-            let other = Self::named(contradiction.leaf).filter(|leaf| leaf.key != self.key);
+            let names = [Some(contradiction.leaf), contradiction.other];
+            let other = names.into_iter().flatten().filter_map(Self::named).find(|leaf| leaf.key != self.key);
             return Err(match (contradiction.cause, other) {
                 (Cause::BusLoad, _) => LeafError::BusLoad,
                 (Cause::Bounds, Some(other)) => LeafError::Other(other.key),

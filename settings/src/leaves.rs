@@ -2,9 +2,11 @@
 
 use agv_core::localizer;
 use agv_core::odometry::CounterRange;
+use agv_wire::can::encoder::CodeSequence;
 
 use crate::VehicleKind::{self, Ackermann, BiSteerable, CarSpeed, Differential, Increments, Mecanum, Omni3, Omni4};
 use crate::VehicleKind::{Tricycle, TricycleSpeed};
+use crate::laser::{LaserMode, LaserOrientation};
 use crate::leaf::{Leaf, Value};
 
 /// The bounds that the core has for a number; a name that it does not know ends the compilation.
@@ -120,6 +122,29 @@ macro_rules! encoder {
     };
 }
 
+/// Which way a counter shall go.
+macro_rules! code_sequence {
+    ($key:literal, $name:literal, $kinds:expr, $number:literal) => {
+        Leaf {
+            key: $key,
+            name: $name,
+            unit: "",
+            bounds: (0.0, (CODE_SEQUENCES.len() - 1) as f64),
+            kinds: $kinds,
+            choices: &["any", "rising_clockwise", "falling_clockwise"],
+            get: |settings| {
+                let set = settings.nodes.encoders[$number].code_sequence;
+                Value::Whole(CODE_SEQUENCES.iter().position(|known| *known == set).unwrap_or(0) as u64)
+            },
+            set: |settings, value| {
+                let Value::Whole(number) = value else { return false };
+                let chosen = usize::try_from(number).ok().and_then(|number| CODE_SEQUENCES.get(number));
+                chosen.map(|chosen| settings.nodes.encoders[$number].code_sequence = *chosen).is_some()
+            },
+        }
+    };
+}
+
 /// A number of things that the localiser counts.
 macro_rules! count {
     ($key:literal, $name:literal, $($field:ident).+) => {
@@ -184,6 +209,25 @@ macro_rules! switch {
     };
 }
 
+/// One of several, by the numbers of the enumeration.
+macro_rules! choice {
+    ($key:literal, $name:literal, $kind:ident, $($field:ident).+) => {
+        Leaf {
+            key: $key,
+            name: $name,
+            unit: "",
+            bounds: (0.0, ($kind::NAMES.len() - 1) as f64),
+            kinds: &VehicleKind::ALL,
+            choices: &$kind::NAMES,
+            get: |settings| Value::Whole(settings.$($field).+ as u64),
+            set: |settings, value| {
+                let Value::Whole(number) = value else { return false };
+                $kind::of_number(number).map(|chosen| settings.$($field).+ = chosen).is_some()
+            },
+        }
+    };
+}
+
 macro_rules! address {
     ($key:literal, $name:literal, $($field:ident).+) => {
         Leaf {
@@ -221,9 +265,11 @@ const ANGLE: (f64, f64) = (-core::f64::consts::TAU, core::f64::consts::TAU);
 const SCALE: (f64, f64) = (-1.0, 1.0);
 const NODE: (f64, f64) = (1.0, 127.0);
 const PROFILE: (f64, f64) = (402.0, 406.0);
+const CODE_SEQUENCES: [Option<CodeSequence>; 3] =
+    [None, Some(CodeSequence::RisingClockwise), Some(CodeSequence::FallingClockwise)];
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 149] = [
+pub static LEAVES: [Leaf; 159] = [
     Leaf {
         key: 107,
         name: "vehicle.kind",
@@ -362,6 +408,10 @@ pub static LEAVES: [Leaf; 149] = [
     encoder!(311, "can.steering_profile", TWO_COUNTERS, PROFILE, [[1].profile]),
     encoder!(342, "can.third_profile", THREE_COUNTERS, PROFILE, [[2].profile]),
     encoder!(343, "can.fourth_profile", FOUR_COUNTERS, PROFILE, [[3].profile]),
+    code_sequence!(374, "can.drive_code_sequence", TWO_COUNTERS, 0),
+    code_sequence!(375, "can.steering_code_sequence", TWO_COUNTERS, 1),
+    code_sequence!(376, "can.third_code_sequence", THREE_COUNTERS, 2),
+    code_sequence!(377, "can.fourth_code_sequence", FOUR_COUNTERS, 3),
     switch!(312, "can.accept_settings", nodes.accepts_settings),
     whole!(313, "can.gyro_identifier", "", 0.0, 536_870_911.0, gyro_frame.identifier),
     switch!(314, "can.gyro_extended", gyro_frame.is_extended),
@@ -407,6 +457,12 @@ pub static LEAVES: [Leaf; 149] = [
     address!(322, "network.gateway", network.gateway),
     address!(323, "nav350.address", network.laser),
     whole!(324, "nav350.port", "", 1.0, 65_535.0, network.laser_port),
+    whole!(368, "nav350.password", "", 0.0, 4_294_967_295.0, laser.password),
+    whole!(369, "nav350.layer", "", 0.0, 65_535.0, laser.layer),
+    choice!(370, "nav350.mode", LaserMode, laser.mode),
+    whole!(371, "nav350.landmark_filter", "", 0.0, 255.0, laser.landmark_filter),
+    choice!(372, "nav350.orientation", LaserOrientation, laser.orientation),
+    switch!(373, "nav350.tells_speed", laser.tells_speed),
     whole!(325, "log.port", "", 1.0, 65_535.0, network.log_port),
     whole!(326, "service.port", "", 1.0, 65_535.0, network.service_port),
 ];

@@ -9,9 +9,11 @@ mod bus_load;
 mod checksum;
 pub mod contour_store;
 mod contradiction;
+mod laser;
 pub mod leaf;
 mod leaves;
 mod map_identity;
+pub mod patient_flash;
 pub mod service;
 mod settings;
 pub mod store;
@@ -19,6 +21,9 @@ mod vehicle;
 
 pub use bus_load::bus_load;
 pub use contradiction::{Cause, Contradiction};
+/// For whoever has nothing else to do until a store has done its work.
+pub use embassy_futures::block_on;
+pub use laser::{LaserMode, LaserOrientation, LaserSettings};
 pub use leaves::LEAVES;
 pub use map_identity::map_identity;
 pub use settings::{EncoderNode, Network, Nodes, Settings};

@@ -4,9 +4,11 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::Parameters;
 use agv_core::maps::Landmark;
 use agv_core::odometry::MOST_COUNTERS;
+use agv_wire::can::encoder::CodeSequence;
 use agv_wire::can::gyro::GyroFrame;
 use agv_wire::can::motion_frames::MotionFrames;
 
+use crate::laser::LaserSettings;
 use crate::map_identity::map_identity;
 use crate::vehicle::VehicleSettings;
 
@@ -31,6 +33,8 @@ pub struct Settings {
     pub motion_frames: MotionFrames,
     /// Who is who on the network.
     pub network: Network,
+    /// What the NAV350 is asked for.
+    pub laser: LaserSettings,
     /// Whether a vehicle that does not know where it is searches its pose among the reflectors of its map.
     pub start_search: bool,
     /// Which map it must be, see [`map_identity`]; 0 for any.
@@ -63,6 +67,8 @@ pub struct EncoderNode {
     pub node: u8,
     /// Its profile: 406 for an encoder, 402 for a drive.
     pub profile: u16,
+    /// Which way it shall count. None takes it as it is.
+    pub code_sequence: Option<CodeSequence>,
 }
 
 /// Addresses on the network, IPv4.
@@ -108,7 +114,7 @@ impl Settings {
             vehicle: VehicleSettings::of(&parameters.vehicle),
             nodes: Nodes {
                 controller: 16,
-                encoders: [1, 2, 3, 4].map(|node| EncoderNode { node, profile: 406 }),
+                encoders: [1, 2, 3, 4].map(|node| EncoderNode { node, profile: 406, code_sequence: None }),
                 vendor: 0,
                 is_master: true,
                 starts_itself: true,
@@ -129,6 +135,7 @@ impl Settings {
                 log_port: 5350,
                 service_port: 5351,
             },
+            laser: LaserSettings::default(),
             start_search: true,
             map_identity: 0,
         }

@@ -6,8 +6,9 @@
 
 use agv_core::maps::Landmark;
 use agv_core::record::LANDMARKS_A_RECORD;
+use agv_wire::can::controller_node::CommunicationParameters;
 use embassy_futures::block_on;
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use embedded_storage::nor_flash::{ErrorType, ReadNorFlash};
 use heapless::Vec;
 use sequential_storage::Error;
 use sequential_storage::cache::key_pointers::ArrayKeyPointers;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::checksum::continued;
 use crate::leaf::{Leaf, Value};
+use crate::patient_flash::PatientFlash;
 use crate::{LEAVES, Settings};
 
 /// Most landmarks of a stored map.
@@ -30,6 +32,7 @@ pub const KEY: usize = 32;
 const KEY_ITEM: u16 = 1;
 const STARTS_ITEM: u16 = 2;
 const MAP_ITEM: u16 = 3;
+const COMMUNICATION_ITEM: u16 = 4;
 /// First pieces of both generations of the map.
 const PIECES: [u16; 2] = [2000, 3000];
 
@@ -82,11 +85,11 @@ pub struct MapWriter {
     digest: u32,
 }
 
-/// Flash whose work is done when it returns, as the storage wants it.
+/// Flash as the storage wants it.
 ///
 /// The first and the last word of a page are marks of the storage: they are erased, or written with [`MARK`]. One whose writing
 /// was cut off is read as written, as it could not be written again.
-struct Immediate<F>(F);
+struct Marked<F>(F);
 
 /// What the storage marks a page with.
 const MARK: u8 = 0;
@@ -94,7 +97,7 @@ const MARK: u8 = 0;
 /// Longest word, bytes.
 const LONGEST_WORD: usize = 32;
 
-impl<F: NorFlash> Immediate<F> {
+impl<F: PatientFlash> Marked<F> {
     /// Whether a mark lies at `offset`, and anything of it was written.
     fn is_marked(&mut self, offset: u32) -> Result<bool, F::Error> {
         let place = offset as usize % F::ERASE_SIZE;
@@ -109,14 +112,15 @@ impl<F: NorFlash> Immediate<F> {
     }
 }
 
-impl<F: ErrorType> embedded_storage_async::nor_flash::ErrorType for Immediate<F> {
+impl<F: ErrorType> embedded_storage_async::nor_flash::ErrorType for Marked<F> {
     type Error = F::Error;
 }
 
-impl<F: NorFlash> embedded_storage_async::nor_flash::ReadNorFlash for Immediate<F> {
+impl<F: PatientFlash> embedded_storage_async::nor_flash::ReadNorFlash for Marked<F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.0.rest().await;
         // The storage reads marks apart from items.
         if bytes.len() <= F::WRITE_SIZE && self.is_marked(offset)? {
             bytes.fill(MARK);
@@ -130,23 +134,23 @@ impl<F: NorFlash> embedded_storage_async::nor_flash::ReadNorFlash for Immediate<
     }
 }
 
-impl<F: NorFlash> embedded_storage_async::nor_flash::NorFlash for Immediate<F> {
+impl<F: PatientFlash> embedded_storage_async::nor_flash::NorFlash for Marked<F> {
     const WRITE_SIZE: usize = F::WRITE_SIZE;
     const ERASE_SIZE: usize = F::ERASE_SIZE;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
-        self.0.erase(from, to)
+        self.0.erase(from, to).await
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.write(offset, bytes)
+        self.0.write(offset, bytes).await
     }
 }
 
 /// Where the items of that many keys are, those of all leaves among them: a page that is full is moved in one pass over its
 /// items, not in one for each of them.
-const KNOWN_KEYS: usize = 160;
-const _: () = assert!(KNOWN_KEYS >= LEAVES.len() + 3, "all leaves are known, and the key, the starts and the map");
+const KNOWN_KEYS: usize = 168;
+const _: () = assert!(KNOWN_KEYS >= LEAVES.len() + 4, "all leaves are known, and the items that are none");
 
 type KnownKeys = Cache<Uncached, Uncached, ArrayKeyPointers<u16, KNOWN_KEYS>, u16>;
 
@@ -170,20 +174,22 @@ fn make_sound(settings: &mut Settings, former: &Settings) -> Option<&'static str
 }
 
 /// The storage in a flash of two or more pages, all of it.
-pub struct Store<F: NorFlash> {
-    storage: MapStorage<u16, Immediate<F>, KnownKeys>,
+pub struct Store<F: PatientFlash> {
+    storage: MapStorage<u16, Marked<F>, KnownKeys>,
     buffer: [u8; BUFFER],
+    /// What is written: more than whoever waits for it should have to hold.
+    item: [u8; BUFFER],
 }
 
-impl<F: NorFlash> Store<F> {
+impl<F: PatientFlash> Store<F> {
     /// The storage in `flash`. None if it has fewer than two pages, or words of more than 32 bytes.
     #[must_use]
     pub fn new(flash: F) -> Option<Self> {
         let end = u32::try_from(flash.capacity()).ok()?;
         let config = MapConfig::try_new(0..end).ok()?;
         let cache = Cache::new(Uncached, Uncached, ArrayKeyPointers::new());
-        let storage = MapStorage::new(Immediate(flash), config, cache);
-        Some(Self { storage, buffer: [0; BUFFER] })
+        let storage = MapStorage::new(Marked(flash), config, cache);
+        Some(Self { storage, buffer: [0; BUFFER], item: [0; BUFFER] })
     }
 
     /// Reads everything: settings into `settings`, the map to `landmarks`, which is empty if there is none.
@@ -201,7 +207,7 @@ impl<F: NorFlash> Store<F> {
         // Of all that the storage does, only looking for one item mends a page whose erasure was cut off.
         let first = self.load_leaves(settings, &mut loaded);
         let outcome = match first {
-            Err(FetchError::Rubbish) if self.fetch(KEY_ITEM).is_ok() => self.load_leaves(settings, &mut loaded),
+            Err(FetchError::Rubbish) if self.fetch_now(KEY_ITEM).is_ok() => self.load_leaves(settings, &mut loaded),
             outcome => outcome,
         };
         let has_items = match outcome {
@@ -219,7 +225,7 @@ impl<F: NorFlash> Store<F> {
             loaded.was_formatted = true;
         }
         landmarks.clear();
-        if let Some(index) = self.map_index()
+        if let Some(index) = block_on(self.map_index())
             && self.load_map(index, landmarks).is_none()
         {
             landmarks.clear();
@@ -245,7 +251,7 @@ impl<F: NorFlash> Store<F> {
                 Err(FetchError::Item) => continue,
                 Err(error) => return Err(error),
             };
-            has_items |= [KEY_ITEM, STARTS_ITEM, MAP_ITEM].contains(&key);
+            has_items |= [KEY_ITEM, STARTS_ITEM, MAP_ITEM, COMMUNICATION_ITEM].contains(&key);
             let found = LEAVES.iter().zip(&mut are_good).find(|(leaf, _)| leaf.key == key);
             let Some((leaf, is_good)) = found else { continue };
             let value = postcard::from_bytes::<Value>(bytes).ok();
@@ -265,7 +271,7 @@ impl<F: NorFlash> Store<F> {
         let first = *PIECES.get(usize::from(index.generation))?;
         let mut digest = 0;
         for number in 0..index.count.div_ceil(PIECE as u16) {
-            let bytes = self.fetch(first + number).ok()??;
+            let bytes = self.fetch_now(first + number).ok()??;
             digest = continued(digest, bytes);
             let piece: Vec<Landmark, PIECE> = postcard::from_bytes(bytes).ok()?;
             landmarks.extend_from_slice(&piece).ok()?;
@@ -273,8 +279,8 @@ impl<F: NorFlash> Store<F> {
         (landmarks.len() == usize::from(index.count) && digest == index.checksum).then_some(())
     }
 
-    fn map_index(&mut self) -> Option<MapIndex> {
-        let bytes = self.fetch(MAP_ITEM).ok()??;
+    async fn map_index(&mut self) -> Option<MapIndex> {
+        let bytes = self.fetch(MAP_ITEM).await.ok()??;
         postcard::from_bytes(bytes).ok()
     }
 
@@ -282,33 +288,50 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// If the flash refuses or is full.
-    pub fn store_leaf(&mut self, leaf: &Leaf, settings: &Settings) -> Result<(), StoreError> {
+    pub async fn store_leaf(&mut self, leaf: &Leaf, settings: &Settings) -> Result<(), StoreError> {
         let value = leaf.value(settings);
         let mut room = [0; 16];
         let bytes = postcard::to_slice(&value, &mut room).map_err(|_| StoreError::Full)?;
-        if matches!(self.fetch(leaf.key), Ok(Some(kept)) if kept == bytes) {
-            return Ok(());
-        }
-        self.put(leaf.key, bytes)
+        self.put_new(leaf.key, bytes).await
     }
 
     /// Keeps all leaves.
     ///
     /// # Errors
     /// If the flash refuses or is full.
-    pub fn store_leaves(&mut self, settings: &Settings) -> Result<(), StoreError> {
-        LEAVES.iter().try_for_each(|leaf| self.store_leaf(leaf, settings))
+    pub async fn store_leaves(&mut self, settings: &Settings) -> Result<(), StoreError> {
+        for leaf in &LEAVES {
+            self.store_leaf(leaf, settings).await?;
+        }
+        Ok(())
+    }
+
+    /// Keeps how the controller speaks on the bus, unless the flash has it already.
+    ///
+    /// # Errors
+    /// If the flash refuses or is full.
+    pub async fn store_communication(&mut self, parameters: &CommunicationParameters) -> Result<(), StoreError> {
+        self.put_new(COMMUNICATION_ITEM, &parameters.encode()).await
+    }
+
+    /// How the controller shall speak on the bus. None if nobody has had that stored.
+    ///
+    /// # Errors
+    /// If what is there cannot be read, or means nothing.
+    pub fn communication(&mut self) -> Result<Option<CommunicationParameters>, StoreError> {
+        let bytes = self.fetch_now(COMMUNICATION_ITEM).map_err(|_| StoreError::Flash)?;
+        bytes.map(|bytes| CommunicationParameters::decode(bytes).ok_or(StoreError::Flash)).transpose()
     }
 
     /// Begins to write a map of `count` landmarks beside the one that is kept.
     ///
     /// # Errors
     /// If that is more than can be kept.
-    pub fn begin_map(&mut self, count: u16) -> Result<MapWriter, StoreError> {
+    pub async fn begin_map(&mut self, count: u16) -> Result<MapWriter, StoreError> {
         if usize::from(count) > LANDMARKS {
             return Err(StoreError::Map);
         }
-        let generation = self.map_index().map_or(0, |index| 1 - index.generation.min(1));
+        let generation = self.map_index().await.map_or(0, |index| 1 - index.generation.min(1));
         Ok(MapWriter { generation, count, written: 0, digest: 0 })
     }
 
@@ -316,17 +339,19 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// If it is no such piece, or the flash refuses or is full.
-    pub fn write_piece(&mut self, writer: &mut MapWriter, piece: &[Landmark]) -> Result<(), StoreError> {
+    pub async fn write_piece(&mut self, writer: &mut MapWriter, piece: &[Landmark]) -> Result<(), StoreError> {
         let rest = usize::from(writer.count - writer.written);
         if piece.len() != rest.min(PIECE) || piece.is_empty() {
             return Err(StoreError::Map);
         }
-        let piece = Vec::<Landmark, PIECE>::from_slice(piece).map_err(|_| StoreError::Map)?;
-        let mut room = [0; BUFFER];
-        let bytes = postcard::to_slice(&piece, &mut room).map_err(|_| StoreError::Full)?;
         let first = PIECES.get(usize::from(writer.generation)).copied().ok_or(StoreError::Map)?;
-        self.put(first + writer.written / PIECE as u16, bytes)?;
-        writer.digest = continued(writer.digest, bytes);
+        let (length, digest) = {
+            let piece = Vec::<Landmark, PIECE>::from_slice(piece).map_err(|_| StoreError::Map)?;
+            let bytes = postcard::to_slice(&piece, &mut self.item).map_err(|_| StoreError::Full)?;
+            (bytes.len(), continued(writer.digest, bytes))
+        };
+        self.put_item(first + writer.written / PIECE as u16, length).await?;
+        writer.digest = digest;
         writer.written += piece.len() as u16;
         Ok(())
     }
@@ -335,42 +360,45 @@ impl<F: NorFlash> Store<F> {
     ///
     /// # Errors
     /// If it is not whole, or the flash refuses or is full.
-    pub fn finish_map(&mut self, writer: &MapWriter) -> Result<(), StoreError> {
+    pub async fn finish_map(&mut self, writer: &MapWriter) -> Result<(), StoreError> {
         if writer.written != writer.count {
             return Err(StoreError::Map);
         }
-        let before = self.map_index();
+        let before = self.map_index().await;
         let index = MapIndex { generation: writer.generation, count: writer.count, checksum: writer.digest };
         let mut room = [0; 16];
         let bytes = postcard::to_slice(&index, &mut room).map_err(|_| StoreError::Full)?;
-        self.put(MAP_ITEM, bytes)?;
+        self.put(MAP_ITEM, bytes).await?;
         let Some(before) = before else { return Ok(()) };
         let first = PIECES.get(usize::from(before.generation)).copied().ok_or(StoreError::Map)?;
         // The old pieces shrink to nothing, as not every flash can take them away.
-        (0..before.count.div_ceil(PIECE as u16)).try_for_each(|number| self.put(first + number, &[]))
+        for number in 0..before.count.div_ceil(PIECE as u16) {
+            self.put(first + number, &[]).await?;
+        }
+        Ok(())
     }
 
     /// The key that writers of settings must know. None if none was provisioned.
     pub fn key(&mut self) -> Option<[u8; KEY]> {
-        self.fetch(KEY_ITEM).ok()??.try_into().ok()
+        self.fetch_now(KEY_ITEM).ok()??.try_into().ok()
     }
 
     /// Provisions the key.
     ///
     /// # Errors
     /// If the flash refuses or is full.
-    pub fn provision_key(&mut self, key: &[u8; KEY]) -> Result<(), StoreError> {
-        self.put(KEY_ITEM, key)
+    pub async fn provision_key(&mut self, key: &[u8; KEY]) -> Result<(), StoreError> {
+        self.put(KEY_ITEM, key).await
     }
 
     /// Counts this start, and says how many there were: a number that never comes again.
     ///
     /// # Errors
     /// If the flash refuses or is full.
-    pub fn count_start(&mut self) -> Result<u32, StoreError> {
-        let before = self.fetch(STARTS_ITEM).ok().flatten().and_then(|bytes| bytes.try_into().ok());
+    pub async fn count_start(&mut self) -> Result<u32, StoreError> {
+        let before = self.fetch(STARTS_ITEM).await.ok().flatten().and_then(|bytes| bytes.try_into().ok());
         let starts = before.map_or(0, u32::from_le_bytes).wrapping_add(1);
-        self.put(STARTS_ITEM, &starts.to_le_bytes())?;
+        self.put(STARTS_ITEM, &starts.to_le_bytes()).await?;
         Ok(starts)
     }
 
@@ -405,16 +433,35 @@ impl<F: NorFlash> Store<F> {
         Ok(true)
     }
 
-    // One copy: what it works with takes kilobytes of stack.
-    #[inline(never)]
-    fn fetch(&mut self, key: u16) -> Result<Option<&[u8]>, FetchError> {
-        block_on(self.storage.fetch_item::<&[u8]>(&mut self.buffer, &key)).map_err(FetchError::from)
+    async fn fetch(&mut self, key: u16) -> Result<Option<&[u8]>, FetchError> {
+        self.storage.fetch_item::<&[u8]>(&mut self.buffer, &key).await.map_err(FetchError::from)
     }
 
-    // One copy: what it works with takes kilobytes of stack.
+    /// The same at the start, when nobody else goes on. One copy: what it works with takes kilobytes of stack.
     #[inline(never)]
-    fn put(&mut self, key: u16, bytes: &[u8]) -> Result<(), StoreError> {
-        block_on(self.storage.store_item(&mut self.buffer, &key, &bytes)).map_err(|error| match error {
+    fn fetch_now(&mut self, key: u16) -> Result<Option<&[u8]>, FetchError> {
+        block_on(self.fetch(key))
+    }
+
+    /// Keeps an item, unless the flash has it already.
+    async fn put_new(&mut self, key: u16, bytes: &[u8]) -> Result<(), StoreError> {
+        if matches!(self.fetch(key).await, Ok(Some(kept)) if kept == bytes) {
+            return Ok(());
+        }
+        self.put(key, bytes).await
+    }
+
+    async fn put(&mut self, key: u16, bytes: &[u8]) -> Result<(), StoreError> {
+        let room = self.item.get_mut(..bytes.len()).ok_or(StoreError::Full)?;
+        room.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
+        self.put_item(key, bytes.len()).await
+    }
+
+    /// Keeps the first bytes of `item`.
+    async fn put_item(&mut self, key: u16, length: usize) -> Result<(), StoreError> {
+        let Self { storage, buffer, item } = self;
+        let bytes = item.get(..length).ok_or(StoreError::Full)?;
+        storage.store_item(buffer, &key, &bytes).await.map_err(|error| match error {
             Error::FullStorage | Error::ItemTooBig => StoreError::Full,
             _ => StoreError::Flash,
         })

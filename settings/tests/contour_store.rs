@@ -2,6 +2,7 @@
 
 mod support;
 
+use agv_settings::block_on;
 use agv_settings::contour_store::{CONTOUR_PIECE, ContourStore, HEADER, checksum};
 use agv_settings::store::StoreError;
 use proptest::prelude::*;
@@ -22,9 +23,9 @@ fn map(length: usize, seed: u8) -> Vec<u8> {
 }
 
 fn write(store: &mut Contours, map: &[u8]) -> Result<(), StoreError> {
-    store.begin(map.len() as u32, checksum(map))?;
-    map.chunks(CONTOUR_PIECE).try_for_each(|piece| store.write(piece))?;
-    store.finish()
+    block_on(store.begin(map.len() as u32, checksum(map)))?;
+    map.chunks(CONTOUR_PIECE).try_for_each(|piece| block_on(store.write(piece)))?;
+    block_on(store.finish())
 }
 
 /// What is found at the start, read in pieces of so many bytes.
@@ -64,7 +65,7 @@ fn a_map_of_any_length_is_found_at_the_next_start_and_where_it_lies() {
         assert_eq!(store.into_flash().bytes[place..place + length], map(length, 1));
     }
     let mut store = open(Flash::new());
-    assert_eq!(store.begin(room as u32 + 1, 0), Err(StoreError::Map));
+    assert_eq!(block_on(store.begin(room as u32 + 1, 0)), Err(StoreError::Map));
 }
 
 #[test]
@@ -103,19 +104,22 @@ fn what_is_not_whole_or_not_what_was_told_is_given_up() {
     let whole = map(3000, 1);
     let pieces: Vec<&[u8]> = whole.chunks(CONTOUR_PIECE).collect();
     let mut store = open(Flash::new());
-    assert_eq!((store.write(pieces[0]), store.finish()), (Err(StoreError::Map), Err(StoreError::Map)));
+    assert_eq!(
+        (block_on(store.write(pieces[0])), block_on(store.finish())),
+        (Err(StoreError::Map), Err(StoreError::Map))
+    );
     for wrong in [&[][..], &whole[..1000], &whole[..1025], &whole] {
-        store.begin(3000, checksum(&whole)).unwrap();
-        store.write(pieces[0]).unwrap();
-        assert_eq!(store.write(wrong), Err(StoreError::Map));
-        assert_eq!(store.write(pieces[1]), Err(StoreError::Map), "it was given up");
+        block_on(store.begin(3000, checksum(&whole))).unwrap();
+        block_on(store.write(pieces[0])).unwrap();
+        assert_eq!(block_on(store.write(wrong)), Err(StoreError::Map));
+        assert_eq!(block_on(store.write(pieces[1])), Err(StoreError::Map), "it was given up");
     }
-    store.begin(3000, checksum(&whole)).unwrap();
-    store.write(pieces[0]).unwrap();
-    assert_eq!(store.finish(), Err(StoreError::Map));
-    store.begin(3000, checksum(&whole) ^ 1).unwrap();
-    pieces.iter().for_each(|piece| store.write(piece).unwrap());
-    assert_eq!(store.finish(), Err(StoreError::Map));
+    block_on(store.begin(3000, checksum(&whole))).unwrap();
+    block_on(store.write(pieces[0])).unwrap();
+    assert_eq!(block_on(store.finish()), Err(StoreError::Map));
+    block_on(store.begin(3000, checksum(&whole) ^ 1)).unwrap();
+    pieces.iter().for_each(|piece| block_on(store.write(piece)).unwrap());
+    assert_eq!(block_on(store.finish()), Err(StoreError::Map));
     assert_eq!(again(store).found(), None);
 }
 
@@ -169,8 +173,8 @@ fn a_changed_byte_costs_the_copy_and_the_other_one_is_found() {
 fn a_map_of_which_no_copy_is_whole_is_damaged_and_one_that_never_was_is_not() {
     let mut store = open(Flash::new());
     assert!(!store.is_damaged());
-    store.begin(2500, checksum(&map(2500, 1))).unwrap();
-    store.write(&map(2500, 1)[..CONTOUR_PIECE]).unwrap();
+    block_on(store.begin(2500, checksum(&map(2500, 1)))).unwrap();
+    block_on(store.write(&map(2500, 1)[..CONTOUR_PIECE])).unwrap();
     store = again(store);
     assert!(!store.is_damaged(), "it was never whole");
     write(&mut store, &map(2500, 1)).unwrap();

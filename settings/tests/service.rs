@@ -11,7 +11,7 @@ use agv_settings::service::{
     Action, Change, Controller, Frames, LONGEST_MESSAGE, MessageError, Refusal, Request, Response, Session, encode,
 };
 use agv_settings::store::{PIECE, Store, StoreError};
-use agv_settings::{LEAVES, Settings, bus_load};
+use agv_settings::{LEAVES, Settings, block_on, bus_load};
 use proptest::prelude::*;
 use support::{Flash, load, map};
 
@@ -21,7 +21,7 @@ const NOW: Time = Time::from_micros(5_000_000);
 
 fn controller() -> Controller<Flash<PAGE>> {
     let mut store = Store::new(Flash::new()).unwrap();
-    store.provision_key(&KEY).unwrap();
+    block_on(store.provision_key(&KEY)).unwrap();
     Controller {
         software: "test 1",
         settings: Settings::default(),
@@ -70,7 +70,7 @@ impl Talk {
         let mut frames = Frames::new();
         assert_eq!(frames.push(bytes).unwrap(), (bytes.len(), true));
         let Self { session, controller, room, .. } = self;
-        let (length, action) = session.answer(frames.message(), controller, self.is_standing, NOW, room)?;
+        let (length, action) = block_on(session.answer(frames.message(), controller, self.is_standing, NOW, room))?;
         let mut answer = Box::new(Frames::new());
         assert_eq!(answer.push(&room[..length]).unwrap(), (length, true));
         Ok((postcard::from_bytes(Box::leak(answer).message()).unwrap(), action))
@@ -318,7 +318,7 @@ proptest! {
                 let Ok((taken, is_whole)) = frames.push(rest) else { break 'connection };
                 rest = &rest[taken..];
                 if is_whole {
-                    let answer = session.answer(frames.message(), &mut controller, true, NOW, &mut room);
+                    let answer = block_on(session.answer(frames.message(), &mut controller, true, NOW, &mut room));
                     prop_assert!(answer.is_err() || answer.is_ok_and(|(_, action)| action == Action::None));
                     frames.clear();
                 }

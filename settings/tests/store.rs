@@ -2,11 +2,12 @@
 
 mod support;
 
+use agv_core::maps::Landmark;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::store::{LANDMARKS, Store};
-use agv_settings::{LEAVES, Settings};
+use agv_settings::{LEAVES, Settings, block_on};
 use proptest::prelude::*;
-use support::{Flash, WORD, changed, load, map, write_map};
+use support::{Flash, Torn, WORD, changed, load, map, write_map};
 
 /// The size of the STM32H743's pages.
 const LARGE: usize = 128 * 1024;
@@ -42,17 +43,17 @@ fn what_is_stored_is_read() {
     let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
     assert_eq!(load(&mut store).0, Settings::default());
     let (settings, landmarks) = (changed(0.3), map(LANDMARKS as u16, 0.0));
-    store.store_leaves(&settings).unwrap();
+    block_on(store.store_leaves(&settings)).unwrap();
     write_map(&mut store, &landmarks).unwrap();
-    store.provision_key(&[7; 32]).unwrap();
-    assert_eq!([store.count_start(), store.count_start()], [Ok(1), Ok(2)]);
+    block_on(store.provision_key(&[7; 32])).unwrap();
+    assert_eq!([block_on(store.count_start()), block_on(store.count_start())], [Ok(1), Ok(2)]);
     let mut store = Store::new(Flash::<LARGE>::clone(&store.into_flash())).unwrap();
     let (found, found_map, loaded) = load(&mut store);
     assert_eq!((found, found_map), (settings, landmarks));
     assert_eq!((usize::from(loaded.leaves), loaded.bad, loaded.was_formatted), (LEAVES.len(), 0, false));
     assert_eq!(store.key(), Some([7; 32]));
-    assert_eq!(store.count_start(), Ok(3));
-    assert!(store.begin_map(LANDMARKS as u16 + 1).is_err());
+    assert_eq!(block_on(store.count_start()), Ok(3));
+    assert!(block_on(store.begin_map(LANDMARKS as u16 + 1)).is_err());
 }
 
 #[test]
@@ -65,7 +66,7 @@ fn a_stored_setting_that_does_not_go_with_the_others_is_named_and_not_taken() {
         set(&mut settings, "features.nearest", nearest);
         set(&mut settings, "features.farthest", if is_default_enough { 20.0 } else { 0.3 });
         let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
-        store.store_leaves(&settings).unwrap();
+        block_on(store.store_leaves(&settings)).unwrap();
         let (found, _, loaded) = load(&mut store);
         assert_eq!(loaded.contradiction, Some("features.nearest"));
         assert_eq!(found.parameters.check(), Ok(()));
@@ -86,7 +87,7 @@ fn a_stored_bus_that_is_loaded_too_much_is_named_and_not_taken() {
     // 71.8 % of 125 kbit/s, by hand: see `service.rs`.
     Leaf::named("can.bit_rate").unwrap().set(&mut settings, Value::Whole(125)).unwrap();
     let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
-    store.store_leaves(&settings).unwrap();
+    block_on(store.store_leaves(&settings)).unwrap();
     let (found, _, loaded) = load(&mut store);
     assert_eq!((loaded.contradiction, found), (Some("can.publishing_period"), Settings::default()));
 }
@@ -95,7 +96,7 @@ fn a_stored_bus_that_is_loaded_too_much_is_named_and_not_taken() {
 fn the_largest_map_can_be_replaced_for_ever() {
     let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
     for turn in 0..6 {
-        store.store_leaves(&changed(0.1 * f64::from(turn))).unwrap();
+        block_on(store.store_leaves(&changed(0.1 * f64::from(turn)))).unwrap();
         let landmarks = map(LANDMARKS as u16 - turn, f64::from(turn));
         write_map(&mut store, &landmarks).unwrap();
         assert_eq!(load(&mut store).1, landmarks);
@@ -105,21 +106,21 @@ fn the_largest_map_can_be_replaced_for_ever() {
 #[test]
 fn the_same_settings_wear_nothing_out() {
     let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
-    store.store_leaves(&changed(0.3)).unwrap();
+    block_on(store.store_leaves(&changed(0.3))).unwrap();
     let flash = store.into_flash();
     let work = flash.work;
     let mut store = Store::new(flash).unwrap();
-    store.store_leaves(&changed(0.3)).unwrap();
+    block_on(store.store_leaves(&changed(0.3))).unwrap();
     assert_eq!(store.into_flash().work, work);
 }
 
 #[test]
 fn a_full_page_is_read_a_few_times_and_not_once_for_each_setting() {
     let mut store = Store::new(Flash::<LARGE>::new()).unwrap();
-    store.store_leaves(&changed(0.3)).unwrap();
+    block_on(store.store_leaves(&changed(0.3))).unwrap();
     let items = LARGE / (2 * WORD);
     for _ in LEAVES.len()..items - 2 {
-        store.count_start().unwrap();
+        block_on(store.count_start()).unwrap();
     }
     let mut flash = store.into_flash();
     flash.reads = 0;
@@ -134,27 +135,77 @@ fn a_full_page_is_read_a_few_times_and_not_once_for_each_setting() {
 fn a_loss_of_power_at_any_point_leaves_each_setting_old_or_new() {
     // So that pages are full, and erased, at other points of the work.
     for starts in [0, 20, 40, 60, 80] {
-        lose_power_after(starts);
+        lose_power_after(starts, Torn::Half);
+    }
+    lose_power_after(90, Torn::Zeros);
+}
+
+#[test]
+fn so_does_a_second_loss_while_the_first_one_is_made_good() {
+    let (starts, torn) = (80, Torn::Zeros);
+    let (old, new) = (changed(0.3), changed(0.6));
+    let flash = with_starts(&old, starts);
+    for first in (1..).step_by(13) {
+        let (cut, is_whole) = cut_after(&flash, first, torn, &new);
+        for second in [1, 2, 3, 8, 60] {
+            let (twice, _) = cut_after(&cut, second, torn, &new);
+            let mut store = Store::new(twice).unwrap();
+            let (found, _, loaded) = load(&mut store);
+            let at = format!("cut at {first} and {second}");
+            assert_eq!(
+                (usize::from(loaded.leaves), loaded.bad, loaded.was_formatted),
+                (LEAVES.len(), 0, false),
+                "{at}"
+            );
+            assert_eq!(store.key(), Some([9; 32]), "{at}");
+            for leaf in &LEAVES {
+                let value = leaf.value(&found);
+                assert!(value == leaf.value(&new) || value == leaf.value(&old), "{at}: {}", leaf.name);
+            }
+            block_on(store.store_leaves(&new)).unwrap();
+            assert_eq!(load(&mut store).0, new, "{at}");
+        }
+        if is_whole {
+            break;
+        }
     }
 }
 
-fn lose_power_after(starts: usize) {
-    let (old, new) = (changed(0.3), changed(0.6));
+/// Flash with these settings, which were kept behind others, and so many starts.
+fn with_starts(settings: &Settings, starts: usize) -> Flash<SMALL> {
     let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
-    store.provision_key(&[9; 32]).unwrap();
-    store.store_leaves(&Settings::default()).unwrap();
-    store.store_leaves(&old).unwrap();
+    block_on(store.provision_key(&[9; 32])).unwrap();
+    block_on(store.store_leaves(&Settings::default())).unwrap();
+    block_on(store.store_leaves(settings)).unwrap();
     for _ in 0..starts {
-        store.count_start().unwrap();
+        block_on(store.count_start()).unwrap();
     }
-    let flash = store.into_flash();
+    store.into_flash()
+}
+
+/// What is left when a controller starts, keeps settings, and the power goes with a piece of its work; and whether that was all of it.
+fn cut_after(flash: &Flash<SMALL>, work: usize, torn: Torn, settings: &Settings) -> (Flash<SMALL>, bool) {
+    let mut cut = flash.clone();
+    (cut.power, cut.torn) = (Some(work), torn);
+    let mut store = Store::new(cut).unwrap();
+    let mut landmarks = heapless::Vec::<Landmark, LANDMARKS>::new();
+    let has_loaded = store.load(&mut Settings::default(), &mut landmarks).is_ok();
+    let has_finished = has_loaded && block_on(store.store_leaves(settings)).is_ok();
+    let mut flash = store.into_flash();
+    flash.power = None;
+    (flash, has_finished)
+}
+
+fn lose_power_after(starts: usize, torn: Torn) {
+    let (old, new) = (changed(0.3), changed(0.6));
+    let flash = with_starts(&old, starts);
     let mut has_finished = false;
     let mut met = [0; 2];
     for power in 1.. {
         let mut cut = flash.clone();
-        cut.power = Some(power);
+        (cut.power, cut.torn) = (Some(power), torn);
         let mut store = Store::new(cut).unwrap();
-        has_finished = store.store_leaves(&new).is_ok();
+        has_finished = block_on(store.store_leaves(&new)).is_ok();
         let mut flash = store.into_flash();
         flash.power = None;
         let mut store = Store::new(flash).unwrap();
@@ -168,7 +219,7 @@ fn lose_power_after(starts: usize) {
             met[usize::from(is_new)] += 1;
         }
         // It can be done again.
-        store.store_leaves(&new).unwrap();
+        block_on(store.store_leaves(&new)).unwrap();
         assert_eq!(load(&mut store).0, new, "{power}");
         if has_finished {
             break;
@@ -182,7 +233,7 @@ fn a_loss_of_power_leaves_the_old_map_or_the_new_one() {
     const PAGE: usize = 24 * 1024;
     let (old, new) = (map(180, 0.0), map(170, 0.5));
     let mut store = Store::new(Flash::<PAGE>::new()).unwrap();
-    store.store_leaves(&changed(0.3)).unwrap();
+    block_on(store.store_leaves(&changed(0.3))).unwrap();
     write_map(&mut store, &old).unwrap();
     let flash = store.into_flash();
     let mut kept = [0; 2];
@@ -212,7 +263,7 @@ fn a_loss_of_power_leaves_the_old_map_or_the_new_one() {
 fn a_bad_item_costs_one_setting() {
     let mut store = Store::new(Flash::<SMALL>::new()).unwrap();
     let settings = changed(0.4);
-    store.store_leaves(&settings).unwrap();
+    block_on(store.store_leaves(&settings)).unwrap();
     let flash = store.into_flash();
     let mut worst = 0;
     for word in 0..2 * SMALL / WORD {
@@ -227,7 +278,7 @@ fn a_bad_item_costs_one_setting() {
         if !loaded.was_formatted {
             worst = worst.max(lost.count());
         }
-        store.store_leaves(&settings).unwrap();
+        block_on(store.store_leaves(&settings)).unwrap();
         assert_eq!(load(&mut store).0, settings);
     }
     assert!(worst <= 1, "{worst}");
@@ -249,7 +300,7 @@ proptest! {
         prop_assert_eq!((found, landmarks.len()), (Settings::default(), 0));
         prop_assert_eq!(loaded.was_formatted, end > 0);
         let settings = changed(0.4);
-        store.store_leaves(&settings).unwrap();
+        block_on(store.store_leaves(&settings)).unwrap();
         prop_assert_eq!(load(&mut store).0, settings);
     }
 }

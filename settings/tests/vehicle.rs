@@ -6,7 +6,7 @@ mod support;
 use agv_core::odometry::{Vehicle, WheelVehicle};
 use agv_settings::leaf::{Leaf, LeafError, Value};
 use agv_settings::store::Store;
-use agv_settings::{LEAVES, Settings, VehicleKind, VehicleSettings, bus_load};
+use agv_settings::{LEAVES, Settings, VehicleKind, VehicleSettings, block_on, bus_load};
 use support::{Flash, load};
 
 fn set(settings: &mut Settings, name: &str, value: impl Into<f64>) {
@@ -98,7 +98,7 @@ fn a_vehicle_of_any_kind_is_stored_and_read() {
         set(&mut settings, "vehicle.wheel_1_scale", 3e-5);
         set(&mut settings, "can.third_node", 77);
         let mut store = Store::new(Flash::<{ 128 * 1024 }>::new()).unwrap();
-        store.store_leaves(&settings).unwrap();
+        block_on(store.store_leaves(&settings)).unwrap();
         let (found, _, loaded) = load(&mut store);
         assert_eq!((found, loaded.contradiction), (settings, None), "{kind:?}");
     }
@@ -133,7 +133,7 @@ fn a_contradiction_is_named() {
         assert_eq!(settings.check().err().map(|contradiction| contradiction.leaf), leaf, "{kind:?} {changes:?}");
         // Out of flash they come sound.
         let mut store = Store::new(Flash::<{ 128 * 1024 }>::new()).unwrap();
-        store.store_leaves(&settings).unwrap();
+        block_on(store.store_leaves(&settings)).unwrap();
         let (found, _, loaded) = load(&mut store);
         assert_eq!((loaded.contradiction, found.check()), (leaf, Ok(())), "{kind:?} {changes:?}");
     }

@@ -10,7 +10,7 @@ use agv_core::odometry::{Counted, Counter, CounterRange, MOST_COUNTERS, Vehicle}
 use agv_settings::Settings;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::controller::OrderReceiver;
-use agv_wire::can::encoder::{EncoderSettings, Profile, Reporting};
+use agv_wire::can::encoder::{CodeSequence, EncoderSettings, Profile, Reporting};
 use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup};
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::can::motion_frames::MotionFrames;
@@ -35,6 +35,8 @@ pub struct EncoderNodes {
     pub encoders: [NodeId; MOST_COUNTERS],
     /// What they are.
     pub profiles: [Profile; MOST_COUNTERS],
+    /// Which way they shall count, where that is known.
+    pub code_sequences: [Option<CodeSequence>; MOST_COUNTERS],
     /// The controller, whose orders are heard.
     pub controller: NodeId,
     /// When the encoders report, or the vehicle's own controller does.
@@ -53,6 +55,7 @@ impl EncoderNodes {
         Self {
             encoders,
             profiles: [Profile::Encoder; MOST_COUNTERS],
+            code_sequences: [None; MOST_COUNTERS],
             controller,
             reporting: Reporting::Timer { period: 10 },
             are_managed: true,
@@ -67,6 +70,7 @@ impl EncoderNodes {
         Self {
             encoders: nodes.encoders.map(|encoder| node(encoder.node)),
             profiles: nodes.encoders.map(|encoder| profile(encoder.profile)),
+            code_sequences: nodes.encoders.map(|encoder| encoder.code_sequence),
             controller: node(nodes.controller),
             reporting: Reporting::Timer { period: settings.encoder_period },
             are_managed: nodes.is_master,
@@ -140,6 +144,7 @@ fn channel(
     let mut encoder = EncoderSettings {
         reporting: nodes.reporting,
         range,
+        code_sequence: nodes.code_sequences.get(number).copied().flatten(),
         profile,
         is_managed: nodes.are_managed,
         ..EncoderSettings::new(node)
@@ -243,11 +248,14 @@ impl Encoders {
         if let Some(fix) = self.orders.handle(frame, heard) {
             tell(BusEvent::SetPose(fix));
         }
-        let event = match &mut self.source {
-            Source::Counters(group) => group.handle(frame, heard).map(|counts| counted(&self.vehicle, &counts)),
-            Source::Own(reports) => reports.hear(frame, heard),
-        };
-        event.into_iter().for_each(tell);
+        match &mut self.source {
+            Source::Counters(group) => {
+                if let Some(counts) = group.handle(frame, heard) {
+                    tell(counted(&self.vehicle, &counts));
+                }
+            }
+            Source::Own(reports) => reports.hear(frame, heard, tell),
+        }
     }
 
     /// Both: looks at the bus at `now`, where a frame may have come.

@@ -14,6 +14,12 @@ use super::{BusEvent, EncoderNodes, add};
 const LATE: f64 = 2.5;
 const MISSING: f64 = 4.5;
 
+/// Increments further apart, in periods, are no neighbours: what those between them held is lost. Each may come late by half a period.
+const LOST: f64 = 1.5;
+
+/// Of so many periods the mean is taken.
+const MEMORY: f64 = 16.0;
+
 #[derive(Clone, Copy, Debug)]
 enum Reports {
     Speed(SpeedReports),
@@ -26,6 +32,8 @@ pub(super) struct OwnReports {
     reports: Reports,
     frames: MotionFrames,
     period: f64,
+    /// The mean time between reports of late, s.
+    interval: f64,
     heard: Time,
     told: EncoderFaults,
 }
@@ -39,7 +47,7 @@ impl OwnReports {
             Vehicle::Increments => Reports::Increments(IncrementReports::new(&frames, period)),
             Vehicle::Tricycle(_) | Vehicle::Wheels(_) => return None,
         };
-        Some(Self { reports, frames, period, heard: start, told: EncoderFaults::default() })
+        Some(Self { reports, frames, period, interval: period, heard: start, told: EncoderFaults::default() })
     }
 
     /// Identifiers of their frames.
@@ -52,16 +60,27 @@ impl OwnReports {
         ids
     }
 
-    /// Takes a frame that came at `heard`.
-    pub fn hear(&mut self, frame: &Frame, heard: Time) -> Option<BusEvent> {
-        let event = match &mut self.reports {
-            Reports::Speed(reports) => reports.handle(frame, heard).map(BusEvent::Speed),
-            Reports::Increments(reports) => reports.handle(frame, heard).map(BusEvent::Increment),
-        };
-        if event.is_some() {
-            self.heard = heard;
+    /// Takes a frame that came at `heard`; tells before an increment that others were lost.
+    pub fn hear(&mut self, frame: &Frame, heard: Time, mut tell: impl FnMut(BusEvent)) {
+        match &mut self.reports {
+            Reports::Speed(reports) => {
+                let Some(sample) = reports.handle(frame, heard) else { return };
+                tell(BusEvent::Speed(sample));
+            }
+            Reports::Increments(reports) => {
+                let Some(increment) = reports.handle(frame, heard) else { return };
+                let apart = heard.since(self.heard);
+                let are_lost = apart > LOST * self.interval.max(self.period);
+                if are_lost && !self.told.any() {
+                    self.told =
+                        EncoderFaults { time: increment.time, drive: Some(EncoderFault::Missing), steering: None };
+                    tell(BusEvent::EncoderFaults(self.told));
+                }
+                self.interval += (apart.min(MISSING * self.period) - self.interval) / MEMORY;
+                tell(BusEvent::Increment(increment));
+            }
         }
-        event
+        self.heard = heard;
     }
 
     /// What there is to say of silence: when it begins, changes or ends, and every [`FAULT_PERIOD`] seconds while it lasts.

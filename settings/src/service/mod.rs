@@ -11,4 +11,4 @@ mod server;
 
 pub use frame::{Frames, LONGEST_MESSAGE, MessageError, encode};
 pub use message::{Change, PROTOCOL, Refusal, Request, Response};
-pub use server::{Action, Controller, Kept, Session};
+pub use server::{Action, Answer, Controller, Kept, Session, answer_kept, keep};

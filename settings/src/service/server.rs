@@ -4,7 +4,6 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::PoseFix;
 use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
-use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
 
 use super::authentication::{self, Nonce, TAG};
@@ -12,11 +11,12 @@ use super::frame::{LONGEST_MESSAGE, MessageError, encode};
 use super::message::{Change, PROTOCOL, Refusal, Request, Response};
 use crate::contour_store::{CONTOUR_PIECE, ContourStore};
 use crate::leaf::{Leaf, LeafError};
+use crate::patient_flash::PatientFlash;
 use crate::store::{KEY, MapWriter, PIECE, Store, StoreError};
 use crate::{LEAVES, Settings};
 
 /// What requests are about. All of it belongs to the controller, not to a connection.
-pub struct Controller<F: NorFlash> {
+pub struct Controller<F: PatientFlash> {
     /// Name and version of the software.
     pub software: &'static str,
     /// The settings as they will be after the next start, if they are stored.
@@ -52,6 +52,16 @@ pub enum Action {
     Reboot,
 }
 
+/// What comes of a message.
+#[allow(clippy::large_enum_variant, reason = "there is no allocator, and there is one message at a time")]
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer<'a> {
+    /// A response of so many bytes, and what is left to do.
+    Whole(usize, Action),
+    /// This is to be kept before there is a response.
+    ToKeep(Kept<'a>),
+}
+
 /// One connection.
 pub struct Session {
     nonce: Option<Nonce>,
@@ -71,7 +81,7 @@ impl Session {
     ///
     /// # Errors
     /// If the message means nothing. The connection is of no more use.
-    pub fn answer<F: NorFlash>(
+    pub async fn answer<F: PatientFlash>(
         &mut self,
         message: &[u8],
         controller: &mut Controller<F>,
@@ -79,23 +89,29 @@ impl Session {
         time: Time,
         room: &mut [u8; LONGEST_MESSAGE],
     ) -> Result<(usize, Action), MessageError> {
-        self.answer_with(keep, message, controller, is_standing, time, room)
+        // By reference: whoever waits for the flash holds it once.
+        let answer = self.decide(message, controller, is_standing, time, room)?;
+        let kept = match &answer {
+            Answer::Whole(length, action) => return Ok((*length, *action)),
+            Answer::ToKeep(kept) => kept,
+        };
+        let outcome = keep(kept, controller).await;
+        Ok((answer_kept(outcome, room)?, Action::None))
     }
 
-    /// As [`Self::answer`], but what is to be kept in flash is given to `keep`: without the storage, the rest can be looked
-    /// at on its own.
+    /// As [`Self::answer`], but what is to be kept in flash is left to [`keep`], and its answer to [`answer_kept`]: without the
+    /// storage, the rest can be looked at on its own.
     ///
     /// # Errors
     /// If the message means nothing. The connection is of no more use.
-    pub fn answer_with<F: NorFlash>(
+    pub fn decide<'a, F: PatientFlash>(
         &mut self,
-        keep: impl FnOnce(Kept, &mut Controller<F>) -> Result<(), StoreError>,
-        message: &[u8],
+        message: &'a [u8],
         controller: &mut Controller<F>,
         is_standing: bool,
         time: Time,
         room: &mut [u8; LONGEST_MESSAGE],
-    ) -> Result<(usize, Action), MessageError> {
+    ) -> Result<Answer<'a>, MessageError> {
         let (request, tag) = postcard::take_from_bytes::<Request>(message).map_err(|_| MessageError)?;
         let is_change = matches!(request, Request::Change(_));
         if tag.len() != if is_change { TAG } else { 0 } {
@@ -120,19 +136,20 @@ impl Session {
             Request::Change(change) => {
                 let signed = message.get(..message.len() - TAG).unwrap_or_default();
                 let outcome = self.permit(controller, signed, tag, is_standing);
-                match outcome.and_then(|()| perform(change, controller, time, keep)) {
-                    Ok(left) => {
+                match outcome.and_then(|()| perform(change, controller, time)) {
+                    Ok(Performed::Done(left)) => {
                         action = left;
                         Response::Done
                     }
+                    Ok(Performed::ToKeep(kept)) => return Ok(Answer::ToKeep(kept)),
                     Err(refusal) => Response::Refused(refusal),
                 }
             }
         };
-        Ok((encode(&response, |_| None, room)?, action))
+        Ok(Answer::Whole(encode(&response, |_| None, room)?, action))
     }
 
-    fn begin<F: NorFlash>(&mut self, controller: &mut Controller<F>, time: Time) -> Response<'static> {
+    fn begin<F: PatientFlash>(&mut self, controller: &mut Controller<F>, time: Time) -> Response<'static> {
         let Some(key) = &controller.key else { return Response::Refused(Refusal::NoKey) };
         controller.nonces = controller.nonces.wrapping_add(1);
         let nonce = authentication::nonce(key, controller.starts, controller.nonces, time.micros());
@@ -142,7 +159,7 @@ impl Session {
     }
 
     /// Whether a change may be made. A change with the right tag takes its number, whatever becomes of it.
-    fn permit<F: NorFlash>(
+    fn permit<F: PatientFlash>(
         &mut self,
         controller: &Controller<F>,
         request: &[u8],
@@ -178,7 +195,7 @@ fn map_piece(landmarks: &[Landmark], first: u16) -> Response<'static> {
     Response::Map { count: landmarks.len() as u16, piece: Vec::from_slice(piece).unwrap_or_default() }
 }
 
-fn contour_piece<'a, F: NorFlash>(
+fn contour_piece<'a, F: PatientFlash>(
     store: Option<&mut ContourStore<F>>,
     first: u32,
     room: &'a mut [u8; CONTOUR_PIECE],
@@ -211,12 +228,18 @@ pub enum Kept<'a> {
     ContourEnd,
 }
 
-fn perform<F: NorFlash>(
-    change: Change,
+/// What comes of a change.
+#[allow(clippy::large_enum_variant, reason = "there is no allocator, and there is one message at a time")]
+enum Performed<'a> {
+    Done(Action),
+    ToKeep(Kept<'a>),
+}
+
+fn perform<'a, F: PatientFlash>(
+    change: Change<'a>,
     controller: &mut Controller<F>,
     time: Time,
-    keep: impl FnOnce(Kept, &mut Controller<F>) -> Result<(), StoreError>,
-) -> Result<Action, Refusal> {
+) -> Result<Performed<'a>, Refusal> {
     let kept = match change {
         Change::Store => Kept::Settings,
         Change::BeginMap(count) => Kept::MapBegin(count),
@@ -233,7 +256,7 @@ fn perform<F: NorFlash>(
                 LeafError::BusLoad => Refusal::BusLoad,
                 LeafError::Other(key) => Refusal::Other(key),
             })?;
-            return Ok(Action::None);
+            return Ok(Performed::Done(Action::None));
         }
         Change::SetPose { pose: [x, y, theta], deviations: [position_deviation, heading_deviation] } => {
             let pose = Pose { x, y, theta };
@@ -241,36 +264,54 @@ fn perform<F: NorFlash>(
             if !(pose.is_finite() && is_sensible(position_deviation) && is_sensible(heading_deviation)) {
                 return Err(Refusal::Pose);
             }
-            return Ok(Action::SetPose(PoseFix { time, pose, position_deviation, heading_deviation }));
+            let fix = PoseFix { time, pose, position_deviation, heading_deviation };
+            return Ok(Performed::Done(Action::SetPose(fix)));
         }
         Change::ForgetPanic => {
             controller.panic = "";
-            return Ok(Action::ForgetPanic);
+            return Ok(Performed::Done(Action::ForgetPanic));
         }
-        Change::Reboot => return Ok(Action::Reboot),
+        Change::Reboot => return Ok(Performed::Done(Action::Reboot)),
     };
-    keep(kept, controller).map_err(Refusal::Store)?;
-    Ok(Action::None)
+    Ok(Performed::ToKeep(kept))
 }
 
-fn keep<F: NorFlash>(kept: Kept, controller: &mut Controller<F>) -> Result<(), StoreError> {
+/// Keeps something in flash.
+///
+/// # Errors
+/// If the flash refuses or is full, or it does not go with what was kept before.
+pub async fn keep<F: PatientFlash>(kept: &Kept<'_>, controller: &mut Controller<F>) -> Result<(), StoreError> {
     let Controller { settings, store, map, contours, .. } = controller;
     let store = store.as_mut().ok_or(StoreError::Flash);
     let contours = contours.as_mut().ok_or(StoreError::NoContours);
     match kept {
-        Kept::Settings => store?.store_leaves(settings)?,
-        Kept::MapBegin(count) => *map = Some(store?.begin_map(count)?),
+        Kept::Settings => store?.store_leaves(settings).await,
+        Kept::MapBegin(count) => {
+            *map = Some(store?.begin_map(*count).await?);
+            Ok(())
+        }
         Kept::MapPiece(piece) => {
             let writer = map.as_mut().ok_or(StoreError::Map)?;
-            store?.write_piece(writer, &piece)?;
+            store?.write_piece(writer, piece).await
         }
         Kept::MapEnd => {
             let writer = map.take().ok_or(StoreError::Map)?;
-            store?.finish_map(&writer)?;
+            store?.finish_map(&writer).await
         }
-        Kept::ContourBegin(length, checksum) => contours?.begin(length, checksum)?,
-        Kept::ContourPiece(piece) => contours?.write(piece)?,
-        Kept::ContourEnd => contours?.finish()?,
+        Kept::ContourBegin(length, checksum) => contours?.begin(*length, *checksum).await,
+        Kept::ContourPiece(piece) => contours?.write(piece).await,
+        Kept::ContourEnd => contours?.finish().await,
     }
-    Ok(())
+}
+
+/// The answer to a request to keep something: puts the response into `room`, and says how long it is.
+///
+/// # Errors
+/// If there is no room for it.
+pub fn answer_kept(outcome: Result<(), StoreError>, room: &mut [u8; LONGEST_MESSAGE]) -> Result<usize, MessageError> {
+    let response = match outcome {
+        Ok(()) => Response::Done,
+        Err(error) => Response::Refused(Refusal::Store(error)),
+    };
+    encode(&response, |_| None, room)
 }

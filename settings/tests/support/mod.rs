@@ -3,13 +3,22 @@
 
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_settings::store::{LANDMARKS, Loaded, Store};
-use agv_settings::{LEAVES, Settings, VehicleKind};
+use agv_settings::{LEAVES, Settings, VehicleKind, block_on};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 
 /// Bytes of a word, which can be written once after each erasure, as the STM32H743 has it.
 pub const WORD: usize = 32;
+
+/// What a word reads as in whose middle the power went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Torn {
+    /// As half of it.
+    Half,
+    /// As zeros, as the boards read a word with a double error.
+    Zeros,
+}
 
 /// Two pages of flash.
 #[derive(Clone)]
@@ -18,6 +27,7 @@ pub struct Flash<const PAGE: usize> {
     is_written: Vec<bool>,
     /// Words and erasures until the power goes, in the middle of one.
     pub power: Option<usize>,
+    pub torn: Torn,
     pub work: usize,
     /// How often it was read.
     pub reads: usize,
@@ -40,6 +50,7 @@ impl<const PAGE: usize> Flash<PAGE> {
             bytes: vec![0xFF; 2 * PAGE],
             is_written: vec![false; 2 * PAGE / WORD],
             power: None,
+            torn: Torn::Half,
             work: 0,
             reads: 0,
             was_rubbish: false,
@@ -49,7 +60,7 @@ impl<const PAGE: usize> Flash<PAGE> {
     pub fn filled(bytes: Vec<u8>) -> Self {
         assert_eq!(bytes.len(), 2 * PAGE);
         let is_written = bytes.chunks(WORD).map(|word| word.iter().any(|byte| *byte != 0xFF)).collect();
-        Self { is_written, bytes, power: None, work: 0, reads: 0, was_rubbish: true }
+        Self { is_written, bytes, power: None, torn: Torn::Half, work: 0, reads: 0, was_rubbish: true }
     }
 
     /// Whether the power lasts for a piece of work. The one in which it goes is half done.
@@ -114,7 +125,11 @@ impl<const PAGE: usize> NorFlash for Flash<PAGE> {
                 return Err(Refused(NorFlashErrorKind::Other));
             }
             let count = if whole { WORD } else { WORD / 2 };
-            self.bytes[place * WORD..][..count].copy_from_slice(&word[..count]);
+            let stored = &mut self.bytes[place * WORD..][..WORD];
+            stored[..count].copy_from_slice(&word[..count]);
+            if !whole && self.torn == Torn::Zeros {
+                stored.fill(0);
+            }
             if !whole {
                 return Err(Refused(NorFlashErrorKind::Other));
             }
@@ -153,6 +168,8 @@ pub fn changed(share: f64) -> Settings {
             // There are five bit rates, and on the lower ones there is no room for everything.
             Value::Whole(_) if leaf.name == "can.bit_rate" => Value::Whole(if share < 0.5 { 800 } else { 1000 }),
             Value::Whole(_) if leaf.name.ends_with("_profile") => Value::Whole(402),
+            // Another one than by default, which is the first.
+            Value::Whole(0) if !leaf.choices.is_empty() => Value::Whole(1 + (share * (most - 1.0)) as u64),
             Value::Number(_) => Value::Number(least + share * (most - least)),
             Value::Whole(_) => Value::Whole((least + share * (most - least)) as u64),
             Value::Switch(is_on) => Value::Switch(is_on == (share < 0.5)),
@@ -178,9 +195,9 @@ pub fn write_map<const PAGE: usize>(
     store: &mut Store<Flash<PAGE>>,
     map: &[Landmark],
 ) -> Result<(), agv_settings::store::StoreError> {
-    let mut writer = store.begin_map(map.len() as u16)?;
+    let mut writer = block_on(store.begin_map(map.len() as u16))?;
     for piece in map.chunks(agv_settings::store::PIECE) {
-        store.write_piece(&mut writer, piece)?;
+        block_on(store.write_piece(&mut writer, piece))?;
     }
-    store.finish_map(&writer)
+    block_on(store.finish_map(&writer))
 }

@@ -32,6 +32,8 @@ pub mod object {
     pub const PDO_EVENT_TIMER: Object = Object::new(0x1800, 5);
     /// How many objects the first transmit PDO holds, 8 bits.
     pub const PDO_MAPPING: Object = Object::new(0x1A00, 0);
+    /// How it counts, 16 bits: bit 0 the code sequence, bit 2 whether it is scaled by the two objects that follow.
+    pub const OPERATING_PARAMETERS: Object = Object::new(0x6000, 0);
     /// Steps of a revolution, 32 bits.
     pub const UNITS_PER_REVOLUTION: Object = Object::new(0x6001, 0);
     /// Number of positions, 32 bits.
@@ -44,6 +46,8 @@ pub mod object {
     pub const CYCLIC_TIMER: Object = Object::new(0x6200, 0);
     /// Physical steps of a revolution, 32 bits.
     pub const SINGLE_TURN_RESOLUTION: Object = Object::new(0x6501, 0);
+    /// Physical revolutions that are told apart, 16 bits.
+    pub const REVOLUTIONS: Object = Object::new(0x6502, 0);
 }
 
 /// When the encoder tells its position.
@@ -62,6 +66,24 @@ pub enum Reporting {
         period: u16,
     },
 }
+
+/// Which way the counter goes, seen towards the shaft (CiA 406, 6000h bit 0).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CodeSequence {
+    /// It rises while the shaft turns clockwise.
+    RisingClockwise,
+    /// It falls then.
+    FallingClockwise,
+}
+
+impl CodeSequence {
+    const fn of(operating_parameters: u32) -> Self {
+        if operating_parameters & 1 == 0 { Self::RisingClockwise } else { Self::FallingClockwise }
+    }
+}
+
+/// Bit of 6000h that says that the position is scaled by 6001h and 6002h.
+const IS_SCALED: u32 = 1 << 2;
 
 /// What tells the position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +120,9 @@ pub struct EncoderSettings {
     /// The range that its counter is read with, if it is known. A node that tells another one is set up nevertheless:
     /// see [`Identity::tells_other_range`].
     pub range: Option<CounterRange>,
+    /// Which way it shall count, if that is known. A node that tells another one is set up nevertheless: see
+    /// [`Identity::tells_other_direction`].
+    pub code_sequence: Option<CodeSequence>,
     /// Whether this is the node's master. If another one is, nothing is sent to it, and what it sends is taken as the profile
     /// has it, in the PDO with the predefined identifier: of an encoder the position alone, 32 bits, in the first.
     pub is_managed: bool,
@@ -120,6 +145,7 @@ impl EncoderSettings {
             heartbeat: 100,
             answer_timeout: 0.05,
             range: None,
+            code_sequence: None,
             is_managed: true,
         }
     }
@@ -134,6 +160,8 @@ pub struct Identity {
     pub units_per_revolution: Option<u32>,
     /// Physical steps of a revolution, if it tells.
     pub single_turn_resolution: Option<u32>,
+    /// Physical revolutions that are told apart, if it tells.
+    pub revolutions: Option<u32>,
     /// Identifier of its PDO, if it has one with the position in it.
     pub pdo_id: Option<Id>,
     /// What stands in that PDO.
@@ -144,6 +172,22 @@ pub struct Identity {
     pub keeps_timer: bool,
     /// Whether it tells another range than the one in its settings, so that its counter wraps elsewhere.
     pub tells_other_range: bool,
+    /// What it says of how it counts, if it does.
+    pub operating_parameters: Option<u32>,
+    /// Whether it tells another direction than the one in its settings.
+    pub tells_other_direction: bool,
+}
+
+impl Identity {
+    /// The number of positions, or the largest one if that has 33 bits, of an encoder that says that it is not scaled. What
+    /// 6001h and 6002h hold then has no effect.
+    fn physical_range(&self) -> Option<u32> {
+        if self.operating_parameters? & IS_SCALED != 0 {
+            return None;
+        }
+        let values = u64::from(self.single_turn_resolution?) * u64::from(self.revolutions?);
+        u32::try_from(values.min(u64::from(u32::MAX))).ok().filter(|values| *values > 0)
+    }
 }
 
 /// Why an encoder could not be set up. The master tries again.
@@ -204,9 +248,11 @@ const HEARTBEAT_TOLERANCE: f64 = 2.5;
 /// What is asked or told next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
+    ReadOperation,
     ReadUnits,
-    ReadRange,
     ReadResolution,
+    ReadRevolutions,
+    ReadRange,
     ReadPdoId,
     ReadMappingLength,
     ReadMapping { sub: u8, length: u8 },
@@ -262,11 +308,14 @@ impl Encoder {
             range: settings.range.unwrap_or(CounterRange::BITS_32),
             units_per_revolution: None,
             single_turn_resolution: None,
+            revolutions: None,
             pdo_id: None,
             mapping: PdoMapping::new(),
             refused_settings: 0,
             keeps_timer: !settings.is_managed,
             tells_other_range: false,
+            operating_parameters: None,
+            tells_other_direction: false,
         };
         if !settings.is_managed {
             let (number, mapping) = overheard(settings.profile);
@@ -452,7 +501,7 @@ impl Encoder {
         self.identity.mapping = PdoMapping::new();
         self.identity.refused_settings = 0;
         self.identity.keeps_timer = false;
-        self.phase = Phase::Setup(Step::ReadUnits);
+        self.phase = Phase::Setup(Step::ReadOperation);
     }
 
     fn fail(&mut self, error: SetupError, now: Time) -> Option<EncoderEvent> {
@@ -469,9 +518,11 @@ impl Encoder {
             _ => 0,
         };
         match step {
+            Step::ReadOperation => Request::Read(object::OPERATING_PARAMETERS),
             Step::ReadUnits => Request::Read(object::UNITS_PER_REVOLUTION),
             Step::ReadRange => Request::Read(object::MEASURING_RANGE),
             Step::ReadResolution => Request::Read(object::SINGLE_TURN_RESOLUTION),
+            Step::ReadRevolutions => Request::Read(object::REVOLUTIONS),
             Step::ReadPdoId => Request::Read(object::PDO_ID),
             Step::ReadMappingLength => Request::Read(object::PDO_MAPPING),
             Step::ReadMapping { sub, .. } => Request::Read(Object::new(object::PDO_MAPPING.index, sub)),
@@ -523,19 +574,29 @@ impl Encoder {
         }
         let identity = &mut self.identity;
         Ok(Some(match step {
+            Step::ReadOperation => {
+                identity.operating_parameters = value;
+                let sequence = value.map(CodeSequence::of);
+                identity.tells_other_direction =
+                    sequence.is_some() && self.settings.code_sequence.is_some_and(|set| sequence != Some(set));
+                Step::ReadUnits
+            }
             Step::ReadUnits => {
                 identity.units_per_revolution = value;
-                Step::ReadRange
-            }
-            Step::ReadRange => {
-                let told = value.and_then(range_of);
-                identity.range = self.settings.range.or(told).ok_or(SetupError::NoRange)?;
-                identity.tells_other_range =
-                    told.is_some() && !value.is_some_and(|told| is_range(told, identity.range));
                 Step::ReadResolution
             }
             Step::ReadResolution => {
                 identity.single_turn_resolution = value;
+                Step::ReadRevolutions
+            }
+            Step::ReadRevolutions => {
+                identity.revolutions = value;
+                Step::ReadRange
+            }
+            Step::ReadRange => {
+                let told = identity.physical_range().or(value);
+                identity.range = self.settings.range.or(told.and_then(range_of)).ok_or(SetupError::NoRange)?;
+                identity.tells_other_range = told.is_some_and(|told| told != 0 && !is_range(told, identity.range));
                 if let Reporting::Polled { .. } = self.settings.reporting {
                     return Ok(self.write_heartbeat());
                 }

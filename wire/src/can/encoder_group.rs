@@ -101,6 +101,8 @@ impl Channel {
     fn check(&mut self, now: Time) -> Option<EncoderFault> {
         if self.encoder.identity().is_some_and(|identity| identity.tells_other_range) {
             self.monitor.raise(EncoderFault::WrongRange, now);
+        } else if self.encoder.identity().is_some_and(|identity| identity.tells_other_direction) {
+            self.monitor.raise(EncoderFault::WrongDirection, now);
         } else if self.has_error {
             self.monitor.raise(EncoderFault::Reported, now);
         } else if self.encoder.is_heartbeat_lost(now) {

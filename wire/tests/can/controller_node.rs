@@ -16,11 +16,11 @@ use agv_wire::can::sdo::{AbortCode, Object, ObjectDictionary, ValueBytes};
 
 use super::frames::frame;
 
-fn at(milliseconds: u64) -> Time {
+pub(super) fn at(milliseconds: u64) -> Time {
     Time::from_micros(1_000_000 + milliseconds * 1000)
 }
 
-fn node() -> NodeId {
+pub(super) fn node() -> NodeId {
     NodeId::new(16).unwrap()
 }
 
@@ -31,7 +31,7 @@ fn controller() -> ControllerNode {
     controller
 }
 
-fn process() -> ProcessData {
+pub(super) fn process() -> ProcessData {
     let limit = |position, heading| AlertLimit { position, heading };
     ProcessData {
         pose: PoseOutput {
@@ -61,18 +61,23 @@ fn process() -> ProcessData {
 }
 
 /// A master's end of the bytes.
-struct Master {
-    controller: ControllerNode,
-    now: Time,
+pub(super) struct Master {
+    pub(super) controller: ControllerNode,
+    pub(super) now: Time,
     permission: Permission,
 }
 
 impl Master {
     fn new() -> Self {
-        Self { controller: controller(), now: at(1), permission: Ok(()) }
+        Self::of(controller())
     }
 
-    fn ask(&mut self, bytes: [u8; 8]) -> Option<[u8; 8]> {
+    /// Of a node that has booted.
+    pub(super) fn of(controller: ControllerNode) -> Self {
+        Self { controller, now: at(1), permission: Ok(()) }
+    }
+
+    pub(super) fn ask(&mut self, bytes: [u8; 8]) -> Option<[u8; 8]> {
         let request = Message::SdoRequest { node: node(), bytes }.encode();
         let answer =
             self.controller.handle(&request, self.now, Some(&process()), &mut OneSetting(0.5), self.permission)?;
@@ -91,7 +96,7 @@ impl Master {
     }
 
     /// The bytes of an object, or why not.
-    fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
+    pub(super) fn read(&mut self, index: u16, sub: u8) -> Result<Vec<u8>, u32> {
         let answer = self.begin(0x40, index, sub, [0; 4]);
         let data = [answer[4], answer[5], answer[6], answer[7]];
         match answer[0] {
@@ -114,13 +119,13 @@ impl Master {
         }
     }
 
-    fn number(&mut self, index: u16, sub: u8) -> u64 {
+    pub(super) fn number(&mut self, index: u16, sub: u8) -> u64 {
         let bytes = self.read(index, sub).unwrap();
         bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
     }
 
     /// Writes expedited; 0 or why not.
-    fn write(&mut self, index: u16, sub: u8, value: &[u8]) -> u32 {
+    pub(super) fn write(&mut self, index: u16, sub: u8, value: &[u8]) -> u32 {
         let mut data = [0; 4];
         data[..value.len()].copy_from_slice(value);
         let answer = self.begin(0x23 | (4 - value.len() as u8) << 2, index, sub, data);
@@ -131,11 +136,11 @@ impl Master {
         }
     }
 
-    fn tell(&mut self, text: &str) {
+    pub(super) fn tell(&mut self, text: &str) {
         assert_eq!(self.controller.handle(&frame(text), self.now, None, &mut WithoutSettings, Ok(())), None);
     }
 
-    fn publish(&mut self, now: Time) -> Vec<Frame> {
+    pub(super) fn publish(&mut self, now: Time) -> Vec<Frame> {
         self.controller.publish(now, &process()).into_iter().collect()
     }
 }
@@ -627,18 +632,4 @@ fn every_object_of_the_table_is_served_as_the_table_says() {
         }
     }
     assert!(read > 100, "{read}");
-}
-
-#[test]
-fn settings_are_stored_when_the_word_is_said() {
-    let mut master = Master::new();
-    assert_eq!(master.number(0x1010, 1), 1);
-    assert_eq!(master.write(0x1010, 1, b"load"), 0x0800_0020);
-    assert!(!master.controller.take_save());
-    master.permission = Err(AbortCode::DeviceState);
-    assert_eq!(master.write(0x1010, 1, b"save"), 0x0800_0022);
-    assert!(!master.controller.take_save());
-    master.permission = Ok(());
-    assert_eq!(master.write(0x1010, 1, b"save"), 0);
-    assert!(master.controller.take_save() && !master.controller.take_save());
 }

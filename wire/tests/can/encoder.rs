@@ -71,7 +71,7 @@ fn an_encoder_of_the_profile_is_set_up_and_read() {
     // Inhibit time in 100 us, event timer and heartbeat in ms.
     assert_eq!(bench.node.written, [(0x1800, 2, 254), (0x1800, 3, 100), (0x1800, 5, 10), (0x1017, 0, 100)]);
     assert_eq!(bench.sent[0], frame("000#8201"));
-    assert_eq!(bench.sent[1], frame("601#4001600000000000"));
+    assert_eq!(bench.sent[1], frame("601#4000600000000000"));
     assert_eq!(bench.sent.last(), Some(&frame("000#0101")));
     assert!(bench.node.is_operational);
 
@@ -103,6 +103,40 @@ fn ranges_are_what_the_device_means() {
     bench.run(0..50);
     assert_eq!(bench.events.last(), Some(&EncoderEvent::SetupFailed(SetupError::NoRange)));
     assert_eq!((bench.master.state(), bench.master.identity()), (EncoderState::WaitingForBootUp, None));
+}
+
+#[test]
+fn a_range_that_is_not_scaled_is_the_physical_one() {
+    for (parameters, resolution, revolutions, meant) in [
+        (Some(0), Some(4096), Some(4096), 1 << 24),
+        (Some(1), Some(4096), Some(4096), 1 << 24),
+        (Some(4), Some(4096), Some(4096), 36_000),
+        (None, Some(4096), Some(4096), 36_000),
+        (Some(0), Some(8192), Some(1), 8192),
+        (Some(0), Some(10_000), Some(4096), 40_960_000),
+        (Some(0), Some(131_072), Some(32_768), 1 << 32),
+        (Some(0), Some(4096), None, 36_000),
+        (Some(0), None, Some(4096), 36_000),
+        (Some(0), Some(4096), Some(0), 36_000),
+    ] {
+        let mut node = Node::new(1);
+        let mut put = |index, value: Option<u32>, length| match value {
+            Some(value) => _ = node.objects.insert((index, 0), (value, length)),
+            None => _ = node.objects.remove(&(index, 0)),
+        };
+        put(0x6000, parameters, 2);
+        put(0x6002, Some(36_000), 4);
+        put(0x6501, resolution, 4);
+        put(0x6502, revolutions, 2);
+        for (set, is_other) in [(None, false), (CounterRange::new(meant), false), (CounterRange::new(meant - 3), true)]
+        {
+            let mut bench = Bench::new(EncoderSettings { range: set, ..settings(1) }, node.clone());
+            bench.run(0..50);
+            let identity = bench.master.identity().unwrap();
+            let found = (identity.range, identity.tells_other_range);
+            assert_eq!(found, (set.unwrap_or(CounterRange::new(meant).unwrap()), is_other), "{parameters:?} {meant}");
+        }
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use agv_core::localizer::{CapacitiesOf, Event, Localizer, Mode, Parameters, Pose
 use agv_core::measurement::{EncoderFault, EncoderFaults, EncoderSample, Time};
 use agv_core::odometry::{Counted, CounterRange, Tricycle, Vehicle};
 use agv_wire::can::canopen::NodeId;
-use agv_wire::can::encoder::{EncoderSettings, EncoderState, Reporting};
+use agv_wire::can::encoder::{CodeSequence, EncoderSettings, EncoderState, Reporting};
 use agv_wire::can::encoder_group::{ChannelSettings, Counts, EncoderGroup, FAULT_PERIOD};
 use agv_wire::can::frame::Frame;
 use agv_wire::can::plausibility::PlausibilityLimits;
@@ -217,6 +217,37 @@ fn an_encoder_whose_range_is_not_that_of_the_settings_gives_a_fault_and_no_sampl
             assert_eq!((its, other), (expected, None), "{told:?} {set} {step}");
         }
         assert_eq!(bench.samples.len(), if is_right { 100 } else { 0 }, "{told:?} {set}");
+    }
+}
+
+#[test]
+fn an_encoder_that_counts_the_other_way_than_set_is_told() {
+    use CodeSequence::{FallingClockwise, RisingClockwise};
+    let cases = [
+        (Some(0), None, true),
+        (Some(0), Some(RisingClockwise), true),
+        (Some(0), Some(FallingClockwise), false),
+        (Some(5), Some(FallingClockwise), true),
+        (Some(5), Some(RisingClockwise), false),
+        // It does not tell.
+        (None, Some(FallingClockwise), true),
+    ];
+    for (told, set, is_right) in cases {
+        let given = |number, code_sequence| {
+            let channel = channel(number, Reporting::Timer { period: 10 });
+            ChannelSettings { encoder: EncoderSettings { code_sequence, ..channel.encoder }, ..channel }
+        };
+        let mut bench = Bench::new(Reporting::Timer { period: 10 });
+        bench.group = EncoderGroup::new(&[given(1, set), given(2, None)], 0.010, at(0));
+        bench.nodes[0].objects.extend(told.map(|told| ((0x6000, 0), (told, 2))));
+        (0..30).for_each(|millisecond| bench.poll(at(millisecond)));
+        for step in 0..100 {
+            bench.report(30 + 10 * step, 7 * step as u32, 0, 0);
+            let faults = bench.group.faults(at(30 + 10 * step));
+            let expected = (!is_right).then_some(EncoderFault::WrongDirection);
+            assert_eq!((faults.drive, faults.steering), (expected, None), "{told:?} {set:?} {step}");
+        }
+        assert_eq!(bench.samples.len(), if is_right { 100 } else { 0 }, "{told:?} {set:?}");
     }
 }
 

@@ -16,3 +16,4 @@ mod node;
 mod plausibility;
 mod report_clock;
 mod slcan;
+mod stored_parameters;

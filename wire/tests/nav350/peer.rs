@@ -5,9 +5,10 @@ use std::collections::VecDeque;
 use agv_core::measurement::Time;
 use agv_wire::cola::{Deframed, Deframer, Dialect, Fault, Sequence, Text};
 use agv_wire::nav350::{
-    Answer, Channel, ChannelName, Configuration, Coordinate, DeviceTime, ErrorCode, LostReason, Method, MethodName,
-    MethodResult, Milliangle, NavigationData, OperatingMode, Reflector, ReflectorDetails, ReflectorList, Report,
-    Request, Revolution, Session, Size, SpeedReport, State, Step, Value, Variable,
+    Answer, Channel, ChannelName, Configuration, Coordinate, CoordinateFormat, DeviceTime, ErrorCode, LandmarkData,
+    LandmarkDataFormat, LostReason, Method, MethodName, MethodResult, Milliangle, NavigationData, OperatingMode,
+    PoseDataFormat, Reflector, ReflectorDetails, ReflectorList, Report, Request, Revolution, ScanDataFormat, Session,
+    Setting, Size, SpeedReport, State, Step, Value, Variable,
 };
 
 /// What the sensor does other than usual.
@@ -29,6 +30,8 @@ pub struct Moods {
     pub data_delay: u64,
     /// Data end with this error.
     pub data_error: Option<ErrorCode>,
+    /// It says nothing when it is asked for this variable.
+    pub hides_setting: Option<Variable>,
 }
 
 pub struct Scene {
@@ -45,6 +48,8 @@ pub struct Scene {
     /// The line is cut: nothing passes and no connection opens.
     pub is_cut: bool,
     pub mode: OperatingMode,
+    /// What it has been told, and its orientation if it has one.
+    pub settings: Vec<Setting<'static>>,
     is_open: bool,
     deframer: Deframer,
     to_host: VecDeque<(u64, Vec<u8>)>,
@@ -62,6 +67,18 @@ pub struct Scene {
 
 pub const RANGES: [u32; 4] = [1000, 2000, 0, 70_000];
 
+/// What nobody has set yet.
+fn factory() -> Vec<Setting<'static>> {
+    let coordinates = CoordinateFormat::Cartesian;
+    vec![
+        Setting::CurrentLayer(0),
+        Setting::LandmarkDataFormat(LandmarkDataFormat { coordinates, has_details: false, filter: 0 }),
+        Setting::ScanDataFormat(ScanDataFormat { channels: 1, has_remission: false }),
+        Setting::PoseDataFormat(PoseDataFormat { is_extrapolated: false, has_details: false }),
+        Setting::CoordinateOrientation(0),
+    ]
+}
+
 impl Scene {
     pub fn new(configuration: Configuration) -> Self {
         Self {
@@ -74,6 +91,7 @@ impl Scene {
             delay: 300,
             is_cut: false,
             mode: OperatingMode::PowerDown,
+            settings: factory(),
             is_open: false,
             deframer: Deframer::new(),
             to_host: VecDeque::new(),
@@ -202,15 +220,30 @@ impl Scene {
                 let ident = Value::DeviceIdent(Text(b"NAV350"), Text(b"V1.0"));
                 self.say(dialect, &Answer::Value(ident), 0);
             }
-            Request::Read(Variable::CurrentLayer) => {
-                let layer = Value::Setting(agv_wire::nav350::Setting::CurrentLayer(0));
-                self.say(dialect, &Answer::Value(layer), 0);
+            Request::Read(variable) if self.moods.hides_setting == Some(*variable) => {}
+            Request::Read(variable) => {
+                let known = self.settings.iter().find(|setting| setting.variable() == *variable);
+                let answer =
+                    known.map_or(Answer::Fault(Fault::UNKNOWN_VARIABLE), |known| Answer::Value(Value::Setting(*known)));
+                self.say(dialect, &answer, 0);
             }
-            Request::Read(_) | Request::ReadOther(_) => self.say(dialect, &Answer::Fault(Fault::UNKNOWN_VARIABLE), 0),
+            Request::ReadOther(_) => self.say(dialect, &Answer::Fault(Fault::UNKNOWN_VARIABLE), 0),
             Request::Write(setting) if self.moods.refuses_setting == Some(setting.variable()) => {
                 self.say(dialect, &Answer::Fault(Fault::LOCAL_CONDITION), 0);
             }
-            Request::Write(setting) => self.say(dialect, &Answer::Written(setting.variable()), 0),
+            Request::Write(setting) => {
+                let owned = match *setting {
+                    Setting::CurrentLayer(layer) => Setting::CurrentLayer(layer),
+                    Setting::LandmarkDataFormat(format) => Setting::LandmarkDataFormat(format),
+                    Setting::ScanDataFormat(format) => Setting::ScanDataFormat(format),
+                    Setting::PoseDataFormat(format) => Setting::PoseDataFormat(format),
+                    Setting::CoordinateOrientation(orientation) => Setting::CoordinateOrientation(orientation),
+                    ref other => panic!("the session never writes {other:?}"),
+                };
+                self.settings.retain(|known| known.variable() != owned.variable());
+                self.settings.push(owned);
+                self.say(dialect, &Answer::Written(owned.variable()), 0);
+            }
             Request::Call(method) if self.moods.ignores_method == Some(method.name()) => {}
             Request::Call(method) if self.moods.refuses_method == Some(method.name()) => {
                 self.say(dialect, &Answer::Fault(Fault::LOCAL_CONDITION), 0);
@@ -234,7 +267,7 @@ impl Scene {
                 self.speeds.push(*speed);
                 MethodResult::Plain(MethodName::SetSpeed, Some(ErrorCode::OK))
             }
-            Method::GetData { .. } => return self.data(dialect),
+            Method::GetData { .. } | Method::GetLandmarkData { .. } => return self.data(dialect, method.name()),
             other => panic!("the session never calls {other:?}"),
         };
         if method.name().is_slow() {
@@ -243,9 +276,11 @@ impl Scene {
         self.say(dialect, &Answer::Result(result), 0);
     }
 
-    fn data(&mut self, dialect: Dialect) {
-        self.say(dialect, &Answer::Accepted(MethodName::GetData), 0);
-        let is_right = self.mode == OperatingMode::Navigation;
+    fn data(&mut self, dialect: Dialect, method: MethodName) {
+        self.say(dialect, &Answer::Accepted(method), 0);
+        let is_landmarks = method == MethodName::GetLandmarkData;
+        let needed = if is_landmarks { OperatingMode::LandmarkDetection } else { OperatingMode::Navigation };
+        let is_right = self.mode == needed;
         let error = if is_right { self.moods.data_error.unwrap_or(ErrorCode::OK) } else { ErrorCode::WRONG_MODE };
         // The revolution that ends next.
         let end = (self.now / 125_000 + 1) * 125_000;
@@ -279,21 +314,21 @@ impl Scene {
             samples: Sequence::Values(&RANGES),
         };
         let has_data = matches!(error, ErrorCode::OK | ErrorCode::NO_POSITION);
-        let data = NavigationData {
-            version: 1,
-            error,
-            wait: 1,
-            mask: 2,
-            pose: None,
-            reflectors: has_data.then_some(ReflectorList { filter: 1, reflectors: Sequence::Values(&reflectors) }),
-            channels: if has_data { [distances].into_iter().collect() } else { heapless::Vec::new() },
-            remission: None,
+        let reflectors = has_data.then_some(ReflectorList { filter: 1, reflectors: Sequence::Values(&reflectors) });
+        let channels = if has_data { [distances].into_iter().collect() } else { heapless::Vec::new() };
+        let (version, wait, remission) = (1, 1, None);
+        let result = if is_landmarks {
+            let data = LandmarkData { version, error, wait, dataset: 2, reflectors, channels, remission };
+            MethodResult::LandmarkData(data)
+        } else {
+            let data = NavigationData { version, error, wait, mask: 2, pose: None, reflectors, channels, remission };
+            MethodResult::Data(data)
         };
         if has_data {
             self.beam_starts.push_back(start);
         }
-        let wait = end - self.now + self.moods.data_delay;
-        self.say(dialect, &Answer::Result(MethodResult::Data(data)), wait);
+        let after = end - self.now + self.moods.data_delay;
+        self.say(dialect, &Answer::Result(result), after);
     }
 
     pub fn has(&self, report: Report) -> bool {

@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 
 use agv_core::measurement::Time;
-use agv_wire::cola::{Dialect, Fault};
+use agv_wire::cola::{Deframed, Deframer, Dialect, Fault};
 use agv_wire::nav350::{
-    ClockError, Configuration, ErrorCode, LostReason, MethodName, OperatingMode, Report, RotationSpeed, SensorSpeed,
+    ClockError, Configuration, CoordinateFormat, ErrorCode, LandmarkDataFormat, LostReason, Method, MethodName,
+    OperatingMode, Orientation, PoseDataFormat, Report, Request, RotationSpeed, ScanDataFormat, SensorSpeed, Setting,
     State, Variable, Velocity,
 };
 use proptest::prelude::*;
@@ -62,6 +63,152 @@ fn the_other_dialect_is_found() {
     }
 }
 
+/// The modes that the sensor was put into, since that request.
+fn modes(scene: &Scene, from: usize) -> Vec<OperatingMode> {
+    let decode = |request: &Vec<u8>| {
+        let mut deframer = Deframer::<256>::new();
+        deframer.extend(request);
+        let Some(Deframed::Telegram { dialect, payload, .. }) = deframer.next() else { panic!("{request:?}") };
+        match Request::decode(dialect, payload) {
+            Ok(Request::Call(Method::ChangeState(mode))) => Some(mode),
+            _ => None,
+        }
+    };
+    scene.requests[from..].iter().filter_map(decode).collect()
+}
+
+fn cut_for_a_second(scene: &mut Scene) -> usize {
+    scene.cut();
+    scene.run(1.0);
+    scene.is_cut = false;
+    let before = scene.requests.len();
+    scene.run(4.0);
+    before
+}
+
+const FRESH: [OperatingMode; 2] = [OperatingMode::Standby, OperatingMode::Navigation];
+
+#[test]
+fn behind_a_cut_line_a_sensor_keeps_its_mode_and_its_settings() {
+    for dialect in [Dialect::Ascii, Dialect::Binary] {
+        let mut scene = speaking(dialect);
+        scene.run(3.0);
+        assert_eq!(modes(&scene, 0), FRESH);
+        let before = cut_for_a_second(&mut scene);
+        assert!(scene.is_running());
+        assert_eq!(modes(&scene, before), []);
+        // One that stands by is only brought back.
+        scene.mode = OperatingMode::Standby;
+        let before = cut_for_a_second(&mut scene);
+        assert!(scene.is_running());
+        assert_eq!(modes(&scene, before), [OperatingMode::Navigation]);
+    }
+}
+
+#[test]
+fn a_sensor_with_other_settings_is_told_again() {
+    let others = [
+        Setting::CurrentLayer(2),
+        Setting::ScanDataFormat(ScanDataFormat { channels: 1, has_remission: false }),
+        Setting::PoseDataFormat(PoseDataFormat { is_extrapolated: false, has_details: true }),
+        Setting::LandmarkDataFormat(LandmarkDataFormat {
+            coordinates: CoordinateFormat::Polar,
+            has_details: true,
+            filter: 1,
+        }),
+        Setting::CoordinateOrientation(1),
+    ];
+    let configuration = Configuration { layer: Some(1), ..Configuration::default() };
+    for other in others {
+        let mut scene = Scene::new(configuration);
+        scene.run(3.0);
+        let wanted = scene.settings.clone();
+        scene.settings.retain(|known| known.variable() != other.variable());
+        scene.settings.push(other);
+        let before = cut_for_a_second(&mut scene);
+        assert!(scene.is_running());
+        assert_eq!(modes(&scene, before), FRESH, "{other:?}");
+        assert!(wanted.iter().all(|wanted| scene.settings.contains(wanted)), "{:?}", scene.settings);
+    }
+    // A variable that the sensor does not tell is written.
+    for refuses in [true, false] {
+        let mut scene = Scene::new(configuration);
+        scene.run(3.0);
+        if refuses {
+            scene.settings.retain(|known| known.variable() != Variable::PoseDataFormat);
+        } else {
+            scene.moods.hides_setting = Some(Variable::PoseDataFormat);
+        }
+        let before = cut_for_a_second(&mut scene);
+        assert!(scene.is_running() && modes(&scene, before) == FRESH, "{refuses}");
+    }
+}
+
+#[test]
+fn settings_that_bring_no_revolution_are_written_anew() {
+    let mut scene = speaking(Dialect::Binary);
+    scene.run(3.0);
+    scene.moods.ignores_method = Some(MethodName::GetData);
+    let before = cut_for_a_second(&mut scene);
+    assert!(modes(&scene, before).starts_with(&FRESH), "{:?}", modes(&scene, before));
+}
+
+#[test]
+fn a_layer_is_left_as_it_is_or_set() {
+    for (layer, expected) in [(None, 3), (Some(7), 7)] {
+        let mut scene = Scene::new(Configuration { layer, ..Configuration::default() });
+        scene.settings[0] = Setting::CurrentLayer(3);
+        scene.run(3.0);
+        assert!(
+            scene.is_running() && scene.settings.contains(&Setting::CurrentLayer(expected)),
+            "{:?}",
+            scene.settings
+        );
+    }
+}
+
+#[test]
+fn directions_follow_the_orientation_that_the_sensor_has() {
+    use Orientation::{Clockwise, CounterClockwise};
+    for (has, wanted, is_clockwise) in [
+        (Some(0), None, false),
+        (Some(1), None, true),
+        (Some(0), Some(Clockwise), true),
+        (Some(1), Some(CounterClockwise), false),
+        (Some(1), Some(Clockwise), true),
+        (None, None, false),
+    ] {
+        let mut scene = Scene::new(Configuration { orientation: wanted, ..Configuration::default() });
+        scene.settings.retain(|known| known.variable() != Variable::CoordinateOrientation);
+        scene.settings.extend(has.map(Setting::CoordinateOrientation));
+        scene.run(3.0);
+        let bearing = f64::from(scene.revolution.reflectors().unwrap().observations[0].bearing);
+        let side = if is_clockwise { -1.0 } else { 1.0 };
+        let expected = side * 4_f64.atan2(3.0) - PI;
+        assert!(
+            (bearing - expected).sin().abs() < 1e-6 && (bearing - expected).cos() > 0.0,
+            "{has:?}, {wanted:?}: {bearing}"
+        );
+    }
+    // A sensor that refuses to turn its angles keeps those that it has.
+    let mut scene = Scene::new(Configuration { orientation: Some(CounterClockwise), ..Configuration::default() });
+    scene.settings.retain(|known| known.variable() != Variable::CoordinateOrientation);
+    scene.settings.push(Setting::CoordinateOrientation(1));
+    scene.moods.refuses_setting = Some(Variable::CoordinateOrientation);
+    scene.run(3.0);
+    let bearing = f64::from(scene.revolution.reflectors().unwrap().observations[0].bearing);
+    assert!((bearing + 4_f64.atan2(3.0) + PI).sin().abs() < 1e-6, "{bearing}");
+}
+
+#[test]
+fn a_sensor_without_a_layout_detects_landmarks() {
+    let mode = OperatingMode::LandmarkDetection;
+    let mut scene = Scene::new(Configuration { mode, ..Configuration::default() });
+    scene.run(3.0);
+    assert_eq!(modes(&scene, 0), [OperatingMode::Standby, mode]);
+    assert!(scene.is_running() && scene.revolutions.len() > 10);
+}
+
 #[test]
 fn times_and_directions_are_those_of_the_vehicle() {
     let mut scene = speaking(Dialect::Binary);
@@ -83,9 +230,8 @@ fn times_and_directions_are_those_of_the_vehicle() {
 
 #[test]
 fn a_clockwise_sensor_that_looks_ahead() {
-    let mut configuration = Configuration::default();
+    let mut configuration = Configuration { orientation: Some(Orientation::Clockwise), ..Configuration::default() };
     configuration.frame.zero = 0.0;
-    configuration.frame.is_clockwise = true;
     let mut scene = Scene::new(configuration);
     scene.run(2.0);
     let scan = scene.revolution.scan().unwrap();

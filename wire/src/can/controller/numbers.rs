@@ -39,7 +39,7 @@ pub(super) const REASONS: [(u64, Reason); 15] = [
 ];
 
 /// Numbers of the encoder faults on the bus; 0 is none.
-pub(super) const FAULTS: [(u64, EncoderFault); 8] = [
+pub(super) const FAULTS: [(u64, EncoderFault); 9] = [
     (1, EncoderFault::Late),
     (2, EncoderFault::Missing),
     (3, EncoderFault::Frozen),
@@ -48,6 +48,7 @@ pub(super) const FAULTS: [(u64, EncoderFault); 8] = [
     (6, EncoderFault::Reported),
     (7, EncoderFault::HeartbeatLost),
     (8, EncoderFault::WrongRange),
+    (9, EncoderFault::WrongDirection),
 ];
 
 pub(super) const ALARMS: [(u64, Alarm); 4] =

@@ -41,6 +41,11 @@ impl Consumers {
         self.0.get(usize::from(sub.checked_sub(1)?)).map(|consumer| consumer.entry)
     }
 
+    /// All entries.
+    pub(super) fn entries(&self) -> [u32; CONSUMERS] {
+        self.0.map(|consumer| consumer.entry)
+    }
+
     /// Changes an entry, from 1 on. The same node cannot be watched twice.
     pub(super) fn set(&mut self, sub: u8, entry: u32) -> Result<(), AbortCode> {
         let place = usize::from(sub.wrapping_sub(1));

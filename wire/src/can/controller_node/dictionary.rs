@@ -178,7 +178,7 @@ pub static OBJECTS: [Record; 30] = [
             entry(1, "Vendor-ID", Unsigned32, Read),
             entry(2, "Product code", Unsigned32, Constant),
             entry(3, "Revision number", Unsigned32, Constant),
-            entry(4, "Serial number", Unsigned32, Constant),
+            entry(4, "Serial number", Unsigned32, Read),
         ],
     ),
     record(

@@ -6,6 +6,7 @@
 //! | which objects there are | [`dictionary`] |
 //! | their values | `objects` |
 //! | pose and state as objects | [`ProcessData`] |
+//! | what can be stored of how it speaks | [`CommunicationParameters`] |
 //! | when a PDO goes out, and what is in it | `transmit_pdo` |
 //! | errors, their ends and their history | [`ErrorKind`] |
 //! | heartbeats of others | `consumers` |
@@ -14,6 +15,7 @@ mod consumers;
 pub mod dictionary;
 mod errors;
 mod objects;
+mod parameters;
 mod process;
 mod transmit_pdo;
 
@@ -23,15 +25,16 @@ use heapless::Vec;
 use super::canopen::{Message, NodeId};
 use super::frame::{Frame, standard_id};
 use super::nmt::{NmtCommand, NmtState};
-use super::sdo::{AbortCode, Object, ObjectDictionary, SdoServer, ValueBytes};
+use super::sdo::{self, AbortCode, Object, ObjectDictionary, SdoServer, ValueBytes};
 
 pub use consumers::CONSUMERS;
 pub use errors::{ErrorKind, HISTORY, HOLD};
 pub use objects::{FIRST_SETTING, HEARTBEAT_TIME, Permission};
+pub use parameters::{CommunicationParameters, PARAMETER_BYTES};
 pub use process::ProcessData;
 
 use errors::Errors;
-use objects::{Objects, Served, TRANSMIT_PDOS};
+use objects::{Objects, STORE, Served, TRANSMIT_PDOS};
 
 /// Highest value of the telegrams' counter.
 const LAST_COUNT: u8 = 15;
@@ -56,8 +59,12 @@ pub struct NodeSettings {
     pub hardware: &'static str,
     /// What runs on it (100Ah).
     pub software: &'static str,
+    /// Which of all controllers it is; 0 if nobody knows (1018h, subindex 4).
+    pub serial: u32,
     /// The map that it has.
     pub map: CarriedMap,
+    /// What a master has had stored of how it speaks.
+    pub stored: Option<CommunicationParameters>,
 }
 
 /// What a controller says of its map (2014h).
@@ -81,7 +88,9 @@ impl NodeSettings {
             period: PUBLISHING_PERIOD,
             hardware: "",
             software: concat!("agv ", env!("CARGO_PKG_VERSION")),
+            serial: 0,
             map: CarriedMap { identity: 0, landmarks: 0 },
+            stored: None,
         }
     }
 }
@@ -104,11 +113,20 @@ impl ObjectDictionary for WithoutSettings {
     }
 }
 
+/// Something that is being stored.
+#[derive(Clone, Copy, Debug)]
+struct Saving {
+    parameters: CommunicationParameters,
+    /// What is answered when it is stored, unless the master has given up.
+    answer: Option<[u8; 8]>,
+}
+
 /// The controller as a node.
 #[derive(Clone, Debug)]
 pub struct ControllerNode {
     objects: Objects,
     server: SdoServer,
+    saving: Option<Saving>,
     has_booted: bool,
     next_heartbeat: Time,
 }
@@ -120,6 +138,7 @@ impl ControllerNode {
         Self {
             objects: Objects::new(settings, Errors::new(), now),
             server: SdoServer::new(),
+            saving: None,
             has_booted: false,
             next_heartbeat: now,
         }
@@ -148,9 +167,22 @@ impl ControllerNode {
         self.objects.order.take()
     }
 
-    /// Whether a master has asked since the last call to store the settings (1010h).
-    pub fn take_save(&mut self) -> bool {
-        core::mem::take(&mut self.objects.is_save_asked)
+    /// What is to be stored beside the settings, if a master has asked for it since the last call (1010h). It is told of it by what
+    /// [`Self::saved`] returns, which must be called then.
+    pub fn take_save(&mut self) -> Option<CommunicationParameters> {
+        let is_asked = core::mem::take(&mut self.objects.is_save_asked);
+        self.saving.filter(|_| is_asked).map(|saving| saving.parameters)
+    }
+
+    /// Settings and parameters are stored, or could not be: what the master is told, which has waited for it (CiA 301, 7.5.2.13).
+    pub fn saved(&mut self, is_stored: bool) -> Option<Frame> {
+        let Saving { parameters, answer } = self.saving.take()?;
+        if is_stored {
+            self.objects.settings.stored = Some(parameters);
+        }
+        let answer = answer?;
+        let bytes = if is_stored { answer } else { sdo::abort(STORE, AbortCode::Hardware) };
+        Some(Message::SdoResponse { node: self.objects.settings.node, bytes }.encode())
     }
 
     /// There is something wrong at `now`. What lasts is to be said again at least every [`HOLD`] seconds.
@@ -223,11 +255,18 @@ impl ControllerNode {
                 None
             }
             Message::SdoRequest { node, bytes } if node == own && self.objects.state != NmtState::Stopped => {
+                if let Some(saving) = &mut self.saving {
+                    return answer_meanwhile(saving, bytes).map(|bytes| Message::SdoResponse { node, bytes }.encode());
+                }
                 let Self { objects, server, .. } = self;
                 let before = objects.heartbeat_time;
                 let bytes = server.answer(&mut Served { objects, process, settings, permission, now }, bytes)?;
                 if objects.heartbeat_time != before {
                     self.next_heartbeat = now.offset(f64::from(objects.heartbeat_time) * 1e-3);
+                }
+                if objects.is_save_asked {
+                    self.saving = Some(Saving { parameters: objects.parameters(), answer: Some(bytes) });
+                    return None;
                 }
                 Some(Message::SdoResponse { node, bytes }.encode())
             }
@@ -254,14 +293,22 @@ impl ControllerNode {
             NmtCommand::Start => self.objects.state = NmtState::Operational,
             NmtCommand::Stop => {
                 self.objects.state = NmtState::Stopped;
-                self.server.forget();
+                self.forget_transfers();
             }
             NmtCommand::EnterPreOperational => self.objects.state = NmtState::PreOperational,
             NmtCommand::ResetNode | NmtCommand::ResetCommunication => {
                 self.objects = Objects::new(self.objects.settings, self.objects.errors.clone(), now);
-                self.server.forget();
+                self.forget_transfers();
                 self.has_booted = false;
             }
+        }
+    }
+
+    /// Nobody waits for an answer any more. What is being stored is stored all the same.
+    fn forget_transfers(&mut self) {
+        self.server.forget();
+        if let Some(saving) = &mut self.saving {
+            saving.answer = None;
         }
     }
 
@@ -289,4 +336,14 @@ impl ControllerNode {
         *counter = if *counter >= LAST_COUNT { 0 } else { *counter + 1 };
         frames
     }
+}
+
+/// What is answered while something is being stored: that this is so, unless the master gives up.
+fn answer_meanwhile(saving: &mut Saving, request: [u8; 8]) -> Option<[u8; 8]> {
+    let [first, low, high, sub, ..] = request;
+    if first >> 5 == sdo::GIVE_UP {
+        saving.answer = None;
+        return None;
+    }
+    Some(sdo::abort(Object::new(u16::from_le_bytes([low, high]), sub), AbortCode::DeviceState))
 }

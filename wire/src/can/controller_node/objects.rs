@@ -5,9 +5,10 @@ use agv_core::measurement::Time;
 use super::NodeSettings;
 use super::consumers::{CONSUMERS, Consumers};
 use super::dictionary::{self, Access, DataType};
-use super::errors::Errors;
+use super::errors::{ErrorKind, Errors};
+use super::parameters::{CommunicationParameters, PdoParameters};
 use super::process::{ProcessData, is_process_data};
-use super::transmit_pdo::{BY_EVENT, NO_REQUEST, TransmitPdo, check_id};
+use super::transmit_pdo::{BY_EVENT, NO_REQUEST, TransmitPdo, check_id, restored, to_store};
 use crate::can::frame::{Frame, standard_id};
 use crate::can::nmt::NmtState;
 use crate::can::sdo::{AbortCode, Object, ObjectDictionary, ValueBytes};
@@ -32,7 +33,7 @@ const NO_EMERGENCIES: u32 = 1 << 31;
 const IS_MASTER: u32 = 1;
 const WAITS: u32 = 1 << 2;
 /// Where the settings are stored.
-const STORE: Object = Object::new(0x1010, 1);
+pub(super) const STORE: Object = Object::new(0x1010, 1);
 /// What 1010h must be told to store the settings, and what it says: that it does so when it is told.
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 const SAVES_ON_COMMAND: u32 = 1;
@@ -62,7 +63,22 @@ pub(super) struct Objects {
 }
 
 impl Objects {
+    /// Those of a node that has just started, with what was stored of them before it did; without it, if that cannot be.
     pub(super) fn new(settings: NodeSettings, errors: Errors, start: Time) -> Self {
+        let by_default = Self::with_defaults(settings, errors, start);
+        let Some(stored) = &settings.stored else { return by_default };
+        let mut objects = by_default.clone();
+        match objects.restore(stored, start) {
+            Ok(()) => objects,
+            Err(_) => {
+                let mut objects = by_default;
+                objects.errors.report(ErrorKind::SettingsLost, 0, start);
+                objects
+            }
+        }
+    }
+
+    fn with_defaults(settings: NodeSettings, errors: Errors, start: Time) -> Self {
         let node = u32::from(settings.node.number());
         Self {
             settings,
@@ -76,6 +92,31 @@ impl Objects {
             is_save_asked: false,
             counter: 0,
         }
+    }
+
+    /// What a master may change of how the node speaks, as it is.
+    pub(super) fn parameters(&self) -> CommunicationParameters {
+        let NodeSettings { node, period, .. } = self.settings;
+        let node = u32::from(node.number());
+        let mut pdos = [PdoParameters::OFF; TRANSMIT_PDOS];
+        for ((parameters, pdo), (base, _)) in pdos.iter_mut().zip(&self.pdos).zip(TRANSMITTED) {
+            *parameters = pdo.parameters(base + node, period);
+        }
+        CommunicationParameters {
+            emergency_id: to_store(EMERGENCY_ID + node, self.emergency_id),
+            consumers: self.consumers.entries(),
+            heartbeat_time: self.heartbeat_time,
+            pdos,
+        }
+    }
+
+    fn restore(&mut self, stored: &CommunicationParameters, now: Time) -> Result<(), AbortCode> {
+        self.emergency_id = restored(self.emergency_id, stored.emergency_id)?;
+        for (sub, entry) in (1..).zip(stored.consumers) {
+            self.consumers.set(sub, entry)?;
+        }
+        self.heartbeat_time = stored.heartbeat_time;
+        self.pdos.iter_mut().zip(&stored.pdos).try_for_each(|(pdo, stored)| pdo.set_parameters(stored, now))
     }
 
     /// The identifier of emergencies, if they are sent.
@@ -94,9 +135,10 @@ impl Objects {
 
     fn number(&self, Object { index, sub }: Object) -> Result<u32, AbortCode> {
         let history = self.errors.history();
-        let NodeSettings { node, vendor, is_master, starts_itself, map, .. } = self.settings;
+        let NodeSettings { node, vendor, serial, is_master, starts_itself, map, .. } = self.settings;
         let value = match (index, sub) {
-            (0x1000, 0) | (0x1018, 2 | 4) => Some(0),
+            (0x1000, 0) | (0x1018, 2) => Some(0),
+            (0x1018, 4) => Some(serial),
             (0x1001, 0) => Some(u32::from(self.errors.register())),
             (0x1003, 0) => Some(history.len() as u32),
             (0x1003, sub) => {

@@ -3,11 +3,14 @@
 use agv_core::measurement::Time;
 
 use super::dictionary;
+use super::parameters::PdoParameters;
 use super::process::{ProcessData, Telegrams, is_process_data};
 use crate::can::frame::{Frame, standard_id};
 use crate::can::pdo::{MAX_ENTRIES, MappingEntry};
 use crate::can::sdo::AbortCode;
 
+/// Bits of an identifier that are its number.
+const NUMBER: u32 = 0x7FF;
 /// Bit of an identifier: the PDO is off.
 const OFF: u32 = 1 << 31;
 /// Bit of an identifier: the PDO cannot be asked for by a frame without data.
@@ -110,6 +113,39 @@ impl TransmitPdo {
         Frame::new(standard_id(self.id as u16), bytes.get(..bits.div_ceil(8) as usize)?)
     }
 
+    /// What can be stored of it; `default` is its identifier by default, and `period` its timer.
+    pub(super) fn parameters(&self, default: u32, period: u16) -> PdoParameters {
+        PdoParameters {
+            id: to_store(default, self.id),
+            transmission: self.transmission,
+            inhibit: self.inhibit,
+            timer: (self.timer != period).then_some(self.timer),
+            count: self.count,
+            entries: self.entries,
+        }
+    }
+
+    /// Takes what was stored.
+    ///
+    /// # Errors
+    /// If a master could not have set it so.
+    pub(super) fn set_parameters(&mut self, stored: &PdoParameters, now: Time) -> Result<(), AbortCode> {
+        self.id = restored(self.id, stored.id)?;
+        self.set_parameter(2, u32::from(stored.transmission), now)?;
+        self.set_parameter(3, u32::from(stored.inhibit), now)?;
+        if let Some(timer) = stored.timer {
+            self.set_parameter(5, u32::from(timer), now)?;
+        }
+        self.set_mapping(0, 0)?;
+        for (sub, entry) in (1..).zip(stored.entries) {
+            // Nobody has ever set the others.
+            if entry != 0 {
+                self.set_mapping(sub, entry)?;
+            }
+        }
+        self.set_mapping(0, u32::from(stored.count))
+    }
+
     /// A part of its communication parameter.
     pub(super) fn parameter(&self, sub: u8) -> Option<u32> {
         Some(match sub {
@@ -194,13 +230,32 @@ fn check_entry(entry: u32) -> Result<(), AbortCode> {
     if is_process_data(object) && usize::from(bits) == 8 * length { Ok(()) } else { Err(AbortCode::NotMappable) }
 }
 
+/// An identifier as it is stored: with the number 0 for the one by default.
+pub(super) const fn to_store(default: u32, id: u32) -> u32 {
+    if (id ^ default) & NUMBER == 0 { id & !NUMBER } else { id }
+}
+
+/// The identifier that was stored so.
+///
+/// # Errors
+/// If a master could not have set it.
+pub(super) fn restored(default: u32, stored: u32) -> Result<u32, AbortCode> {
+    if stored & NUMBER == 0 {
+        let id = stored | default & NUMBER;
+        return if (id ^ default) & !OFF == 0 { Ok(id) } else { Err(AbortCode::InvalidValue) };
+    }
+    // It was switched off when its number was changed.
+    check_id(default | OFF, stored)?;
+    Ok(stored)
+}
+
 /// Whether the identifier of what the controller sends may become another one: of eleven bits, not one that CiA 301 (table
 /// 40) keeps for itself, and only while it is off.
 pub(super) fn check_id(before: u32, after: u32) -> Result<(), AbortCode> {
-    let number = after & 0x7FF;
+    let number = after & NUMBER;
     let is_restricted =
         matches!(number, 0..=0x080 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..);
-    let is_changed_while_on = (before | after) & OFF == 0 && number != before & 0x7FF;
+    let is_changed_while_on = (before | after) & OFF == 0 && number != before & NUMBER;
     let has_other_bits = after & !(OFF | NO_REQUEST) != number;
     if is_restricted || is_changed_while_on || has_other_bits || (after ^ before) & NO_REQUEST != 0 {
         return Err(AbortCode::InvalidValue);

@@ -10,4 +10,5 @@ pub use abort_code::AbortCode;
 pub use client::{SdoClient, TransferError, TransferResult};
 pub use exchange::{Request, Response, SdoError};
 pub use object::{Object, Value};
+pub(crate) use server::{GIVE_UP, abort};
 pub use server::{LONGEST_VALUE, ObjectDictionary, SdoServer, ValueBytes};

@@ -55,6 +55,8 @@ const TOGGLE: u8 = 0x10;
 const IS_EXPEDITED: u8 = 2;
 const IS_SIZED: u8 = 1;
 const IS_LAST: u8 = 1;
+/// Command of a master that gives up a transfer.
+pub(crate) const GIVE_UP: u8 = 4;
 
 type Reply = Result<[u8; 8], (Object, AbortCode)>;
 
@@ -85,8 +87,8 @@ impl SdoServer {
             1 => self.download(dictionary, object, first, data),
             2 => self.upload(dictionary, object),
             3 => self.upload_segment(first),
-            // The master gives up, and wants no answer.
-            4 => {
+            // It wants no answer.
+            GIVE_UP => {
                 self.transfer = None;
                 return None;
             }
@@ -94,7 +96,7 @@ impl SdoServer {
         };
         Some(reply.unwrap_or_else(|(object, reason)| {
             self.transfer = None;
-            compose(0x80, object, reason.code().to_le_bytes())
+            abort(object, reason)
         }))
     }
 
@@ -183,6 +185,11 @@ impl SdoServer {
         }
         Ok(answer)
     }
+}
+
+/// The answer to a transfer that is given up.
+pub(crate) fn abort(object: Object, reason: AbortCode) -> [u8; 8] {
+    compose(0x80, object, reason.code().to_le_bytes())
 }
 
 fn compose(first: u8, object: Object, data: [u8; 4]) -> [u8; 8] {

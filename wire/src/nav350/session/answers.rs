@@ -5,7 +5,9 @@ use agv_core::measurement::Time;
 use super::conversation::{Conversation, ENTER_MODE, Question, Subject};
 use super::report::{LostReason, Report, State};
 use crate::cola::{Dialect, Fault};
-use crate::nav350::{Answer, ErrorCode, MethodName, MethodResult, Revolution, RevolutionError, Value, Variable};
+use crate::nav350::{
+    Answer, ErrorCode, MethodName, MethodResult, Orientation, Revolution, RevolutionError, Setting, Value, Variable,
+};
 
 /// What became of a telegram.
 pub(super) enum Taken {
@@ -39,14 +41,22 @@ impl Conversation {
         match answer {
             Answer::Value(value) => {
                 let subject = match value {
-                    Value::Setting(setting) => Subject::Setting(setting.variable()),
+                    Value::Setting(setting) => {
+                        self.compare(&setting);
+                        Subject::Setting(setting.variable())
+                    }
                     Value::DeviceIdent(..) => Subject::Identity,
                     Value::Other(name, _) if name == Variable::DeviceIdent.name() => Subject::Identity,
                     _ => return Taken::Report(Report::Unexpected),
                 };
                 self.take_start_up(subject)
             }
-            Answer::Written(variable) => self.take_start_up(Subject::Setting(variable)),
+            Answer::Written(variable) => {
+                if let Some(written) = self.configuration.wanted(variable) {
+                    self.follow(&written);
+                }
+                self.take_start_up(Subject::Setting(variable))
+            }
             Answer::Accepted(method) => {
                 let subject = Subject::Method(method);
                 match self.questions.iter_mut().find(|question| question.subject == subject) {
@@ -77,8 +87,25 @@ impl Conversation {
         Taken::Nothing
     }
 
+    /// Takes a setting as the sensor has it.
+    fn compare(&mut self, found: &Setting) {
+        self.follow(found);
+        if self.configuration.wanted(found.variable()).is_some_and(|wanted| wanted != *found) {
+            self.is_as_wanted = false;
+        }
+    }
+
+    /// Angles grow as the sensor says.
+    fn follow(&mut self, setting: &Setting) {
+        if let Setting::CoordinateOrientation(number) = setting
+            && let Some(orientation) = Orientation::of_number(*number)
+        {
+            self.configuration.frame.is_clockwise = orientation == Orientation::Clockwise;
+        }
+    }
+
     pub(super) fn advance(&mut self) {
-        self.stage += 1;
+        self.next_stage();
         let state = self.start_up().map_or(State::Running, |(state, _)| state);
         self.enter(state);
     }
@@ -96,6 +123,7 @@ impl Conversation {
                 self.advance();
             }
             Subject::Setting(variable) => {
+                self.is_as_wanted &= self.configuration.wanted(variable).is_none();
                 self.report(Report::SettingRefused(variable, fault));
                 self.advance();
             }
@@ -170,6 +198,7 @@ impl Conversation {
             Some(Err(error)) => Taken::Report(Report::Revolution(error)),
             Some(Ok(())) => {
                 self.pause = self.configuration.first_pause;
+                self.may_stay = true;
                 Taken::Revolution
             }
         }

@@ -2,8 +2,8 @@
 
 use crate::cola::Dialect;
 use crate::nav350::{
-    CoordinateFormat, DataMask, LandmarkDataFormat, OperatingMode, PoseDataFormat, ScanDataFormat, SensorFrame,
-    UserLevel,
+    CoordinateFormat, DataMask, LandmarkDataFormat, OperatingMode, Orientation, PoseDataFormat, ScanDataFormat,
+    SensorFrame, Setting, UserLevel, Variable,
 };
 
 /// What the host wants of the sensor, and how patient it is. All times are in seconds.
@@ -23,6 +23,8 @@ pub struct Configuration {
     pub landmark_format: LandmarkDataFormat,
     /// What a scan holds.
     pub scan_format: ScanDataFormat,
+    /// Which way its angles grow; None leaves it as it is, and [`Self::frame`] follows what it says.
+    pub orientation: Option<Orientation>,
     /// Navigation, or landmark detection for a sensor without a layout.
     pub mode: OperatingMode,
     /// What is asked for in navigation.
@@ -65,6 +67,7 @@ impl Default for Configuration {
                 filter: 1,
             },
             scan_format: ScanDataFormat { channels: 1, has_remission: true },
+            orientation: Some(Orientation::CounterClockwise),
             mode: OperatingMode::Navigation,
             mask: DataMask::All,
             frame: SensorFrame::default(),
@@ -77,6 +80,22 @@ impl Default for Configuration {
             mode_timeout: 20.0,
             first_pause: 0.25,
             longest_pause: 8.0,
+        }
+    }
+}
+
+impl Configuration {
+    /// What a variable is to be; None if it may be as it is.
+    pub(super) fn wanted(&self, variable: Variable) -> Option<Setting<'static>> {
+        match variable {
+            Variable::CurrentLayer => self.layer.map(Setting::CurrentLayer),
+            Variable::LandmarkDataFormat => Some(Setting::LandmarkDataFormat(self.landmark_format)),
+            Variable::ScanDataFormat => Some(Setting::ScanDataFormat(self.scan_format)),
+            Variable::PoseDataFormat => Some(Setting::PoseDataFormat(self.pose_format)),
+            Variable::CoordinateOrientation => {
+                self.orientation.map(|orientation| Setting::CoordinateOrientation(orientation as u8))
+            }
+            _ => None,
         }
     }
 }

@@ -7,7 +7,7 @@ use super::Step;
 use super::configuration::Configuration;
 use super::report::{LostReason, Report, State};
 use crate::cola::Dialect;
-use crate::nav350::{Method, MethodName, OperatingMode, Request, SensorClock, SensorSpeed, Setting, Variable};
+use crate::nav350::{Method, MethodName, OperatingMode, Request, SensorClock, SensorSpeed, Variable};
 
 /// What a question is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +40,10 @@ pub(super) struct Conversation {
     pub(super) dialect: Dialect,
     /// Which telegram of the start-up is next.
     pub(super) stage: usize,
+    /// Whether the sensor's settings, as far as they were read, are those that are wanted.
+    pub(super) is_as_wanted: bool,
+    /// Whether settings that are as wanted may stay: not if a start that left them brought no revolution.
+    pub(super) may_stay: bool,
     pub(super) has_changed_dialect: bool,
     pub(super) questions: Vec<Question, QUESTIONS>,
     pub(super) clock: SensorClock,
@@ -62,6 +66,8 @@ impl Conversation {
             state: State::Waiting,
             dialect: configuration.first_dialect,
             stage: 0,
+            is_as_wanted: true,
+            may_stay: true,
             has_changed_dialect: false,
             questions: Vec::new(),
             clock: SensorClock::new(),
@@ -102,6 +108,8 @@ impl Conversation {
     pub(super) fn begin(&mut self) {
         self.questions.clear();
         self.stage = 0;
+        self.is_as_wanted = self.may_stay;
+        self.may_stay = false;
         self.has_changed_dialect = false;
         self.polled = None;
         self.asked_clock = None;
@@ -110,10 +118,10 @@ impl Conversation {
         self.enter(State::Identifying);
     }
 
-    /// The telegrams of the start-up in their order, and the state in which each is sent.
+    /// The telegrams of the start-up in their order, and the state in which each is sent. A sensor whose settings are as wanted, as
+    /// behind a cut line, keeps its mode.
     pub(super) fn start_up(&self) -> Option<(State, Request<'static>)> {
         let configuration = &self.configuration;
-        let write = |setting| (State::Configuring, Request::Write(setting));
         let call = |state, method| (state, Request::Call(method));
         Some(match self.stage {
             0 => (State::Identifying, Request::Read(Variable::DeviceIdent)),
@@ -121,20 +129,26 @@ impl Conversation {
                 State::LoggingIn,
                 Method::SetAccessMode { level: configuration.user_level.number(), password: configuration.password },
             ),
-            2 => call(State::Configuring, Method::ChangeState(OperatingMode::Standby)),
-            3 => match configuration.layer {
-                Some(layer) => write(Setting::CurrentLayer(layer)),
-                None => (State::Configuring, Request::Read(Variable::CurrentLayer)),
-            },
-            4 => write(Setting::LandmarkDataFormat(configuration.landmark_format)),
-            5 => write(Setting::ScanDataFormat(configuration.scan_format)),
-            6 => write(Setting::PoseDataFormat(configuration.pose_format)),
+            STANDBY => call(State::Configuring, Method::ChangeState(OperatingMode::Standby)),
+            stage if stage < ENTER_MODE => (State::Configuring, of_setting(stage, configuration)?),
             ENTER_MODE => call(State::EnteringMode, Method::ChangeState(configuration.mode)),
             stage if stage <= ENTER_MODE + usize::from(configuration.clock_exchanges) => {
                 call(State::Synchronising, Method::GetTimestamp)
             }
             _ => return None,
         })
+    }
+
+    /// The next stage that has something to ask or to say.
+    pub(super) fn next_stage(&mut self) {
+        self.stage += 1;
+        if self.stage == STANDBY && self.is_as_wanted {
+            self.stage = ENTER_MODE + 1;
+        }
+        let configuration = &self.configuration;
+        while (STANDBY + 1..ENTER_MODE).contains(&self.stage) && of_setting(self.stage, configuration).is_none() {
+            self.stage += 1;
+        }
     }
 
     pub(super) fn data_method(&self) -> Method<'static> {
@@ -160,6 +174,11 @@ impl Conversation {
                 self.dialect = self.dialect.other();
             }
             Subject::Method(MethodName::SetSpeed) => self.report(Report::CallUnanswered(MethodName::SetSpeed)),
+            // What it does not tell is written.
+            Subject::Setting(_) if self.stage < STANDBY => {
+                self.is_as_wanted = false;
+                self.advance();
+            }
             // A late answer about the time would be taken for that to the next question. A new connection has none.
             _ => self.lose(LostReason::NoAnswer(self.state)),
         }
@@ -255,8 +274,29 @@ impl Conversation {
     }
 }
 
-/// Place of the last change of mode among the telegrams of the start-up.
-pub(super) const ENTER_MODE: usize = 7;
+/// What is read and, if it is not as wanted, written, in this order.
+const COMPARED: [Variable; 5] = [
+    Variable::CurrentLayer,
+    Variable::LandmarkDataFormat,
+    Variable::ScanDataFormat,
+    Variable::PoseDataFormat,
+    Variable::CoordinateOrientation,
+];
+
+/// Place of the first variable that is read among the telegrams of the start-up.
+const READ: usize = 2;
+/// Of the change to the mode in which settings can be written.
+pub(super) const STANDBY: usize = READ + COMPARED.len();
+/// Of the last change of mode.
+pub(super) const ENTER_MODE: usize = STANDBY + 1 + COMPARED.len();
+
+/// What is asked or said of a setting at that stage; None if there is nothing.
+fn of_setting(stage: usize, configuration: &Configuration) -> Option<Request<'static>> {
+    match stage.checked_sub(STANDBY + 1) {
+        Some(written) => configuration.wanted(*COMPARED.get(written)?).map(Request::Write),
+        None => COMPARED.get(stage.checked_sub(READ)?).copied().map(Request::Read),
+    }
+}
 
 fn is_due(last: Option<Time>, spacing: f64, now: Time) -> bool {
     last.is_none_or(|last| now >= last.offset(spacing))
