@@ -7,6 +7,8 @@ TEXT = b"injected.rs"
 WAIT, BACK = b"\x30\xbf", b"\xfd\xe7"
 # PUSH of nine registers.
 PUSH = b"\xff\xb5"
+# LDREX r0, [r1]; STREX r2, r0, [r1]; a jump to itself.
+EXCLUSIVES = b"\x51\xe8\x00\x0f\x41\xe8\x00\x02\xfe\xe7"
 MESSAGE = b"index out of bounds: the len is 3 but the index is 7"
 
 
@@ -51,4 +53,15 @@ def hang(chip):
     ram.put(place, WAIT + BACK)
     # Whatever it was about: interrupts come.
     chip.processor.set(arm.UC_ARM_REG_PRIMASK, 0)
+    chip.processor.pc = place
+
+
+def add_atomically(chip, address):
+    """What runs now loads and stores a word exclusively."""
+    ram = chip.rams["AXISRAM"]
+    place = ram.base + ram.size - 32
+    ram.put(place, EXCLUSIVES)
+    chip.processor.exclusives.watch(place, EXCLUSIVES)
+    chip.processor.set(arm.UC_ARM_REG_R1, address)
+    chip.processor.set(arm.UC_ARM_REG_R2, 7)
     chip.processor.pc = place

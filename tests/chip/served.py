@@ -40,8 +40,8 @@ class Served:
     def step(self, said):
         """What the chip says until a time, having been told something now."""
         chip = self.chip
-        for identifier, data in said["frames"]:
-            chip.can_bus.send(self.sensors, CanFrame(identifier, bytes.fromhex(data)))
+        for identifier, is_extended, is_remote, data in said["frames"]:
+            chip.can_bus.send(self.sensors, CanFrame(identifier, bytes.fromhex(data), is_remote, is_extended))
         if self.laser and said["laser"]:
             self.laser.send(bytes.fromhex(said["laser"]))
         if self.log is None or self.log.is_over:

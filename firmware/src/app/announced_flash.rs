@@ -1,13 +1,15 @@
-//! Flash whose erasure is told to the bus before: the processor stands still for as long as it takes, and with it the pose.
+//! Flash that does not stop the vehicle unawares: where the processor stands still while a page is erased, the bus is told before; where it goes
+//! on, the localiser reads no map of the same flash meanwhile.
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use agv_settings::patient_flash::PatientFlash;
+use embedded_storage::nor_flash::{ErrorType, ReadNorFlash};
 
 use super::exchange;
 
 /// How long the bus has for it, us: two of its steps, and what else waits for a bus of 125 kbit/s.
 const NOTICE: u64 = 12_000;
 
-/// A flash. What writes to it runs below the tasks of the bus.
+/// A flash.
 pub struct AnnouncedFlash<F> {
     flash: F,
     is_announced: bool,
@@ -37,18 +39,25 @@ impl<F: ReadNorFlash> ReadNorFlash for AnnouncedFlash<F> {
     }
 }
 
-impl<F: NorFlash> NorFlash for AnnouncedFlash<F> {
+impl<F: PatientFlash> PatientFlash for AnnouncedFlash<F> {
     const WRITE_SIZE: usize = F::WRITE_SIZE;
     const ERASE_SIZE: usize = F::ERASE_SIZE;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), F::Error> {
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), F::Error> {
         if self.is_announced {
-            exchange::announce_pause(NOTICE);
+            exchange::announce_pause(NOTICE).await;
         }
-        self.flash.erase(from, to)
+        exchange::begin_erasing().await;
+        let outcome = self.flash.erase(from, to).await;
+        exchange::end_erasing();
+        outcome
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), F::Error> {
-        self.flash.write(offset, bytes)
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), F::Error> {
+        self.flash.write(offset, bytes).await
+    }
+
+    async fn rest(&mut self) {
+        self.flash.rest().await;
     }
 }

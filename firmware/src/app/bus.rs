@@ -2,12 +2,12 @@
 //!
 //! Deadline: a pose every 10 ms, and each sample predicted at most 200 us after its frame.
 
-use agv_controller::{Bus, BusOutput, Troubles};
+use agv_controller::{Bus, BusOutput, ControllerIdentity, Troubles};
 use agv_settings::Settings;
-use agv_wire::can::controller_node::{CarriedMap, ErrorKind};
+use agv_settings::patient_flash::PatientFlash;
+use agv_wire::can::controller_node::ErrorKind;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
-use embedded_storage::nor_flash::NorFlash;
 
 use super::can_port::{BusChange, CanPort};
 use super::exchange::{self, now};
@@ -17,16 +17,15 @@ use super::supervision::{self, Task};
 /// How often state machines are asked what is due.
 const STEP: Duration = Duration::from_millis(1);
 
-/// Takes part in the bus for ever, with a controller of that name.
-pub async fn run<F: NorFlash>(
-    name: &'static str,
+/// Takes part in the bus for ever.
+pub async fn run<F: PatientFlash>(
+    identity: ControllerIdentity,
     mut port: impl CanPort,
     settings: &Settings,
     controller: &SharedController<F>,
-    map: CarriedMap,
     troubles: Troubles,
 ) -> ! {
-    let mut bus = Bus::new(settings, name, map, troubles, now());
+    let mut bus = Bus::new(settings, identity, troubles, now());
     let mut nodes = bus.nodes();
     port.listen_to(&nodes, &bus.other_frames());
     let mut objects = SharedSettings { controller };
@@ -42,8 +41,13 @@ pub async fn run<F: NorFlash>(
         if core::mem::replace(&mut lost_events, exchange::lost_events()) != lost_events {
             bus.report(ErrorKind::Overload, now());
         }
-        if exchange::has_saving_failed() {
-            bus.report(ErrorKind::SettingsLost, now());
+        if let Some(is_stored) = exchange::saved() {
+            if !is_stored {
+                bus.report(ErrorKind::SettingsLost, now());
+            }
+            if let Some(answer) = bus.saved(is_stored) {
+                port.send(&answer);
+            }
         }
         if exchange::is_pause_announced() {
             bus.report(ErrorKind::Pause, now());
@@ -58,12 +62,15 @@ pub async fn run<F: NorFlash>(
             }
             BusOutput::Event(told) => exchange::pass_on(told),
             BusOutput::Published(published) => exchange::log_published(published),
-            BusOutput::Save => exchange::save_settings(),
+            BusOutput::Save(parameters) => exchange::save(parameters),
         };
         if let Either::First((frame, heard)) = &woken {
             bus.hear(frame, *heard, &mut objects, &mut take);
         }
         bus.poll(now(), exchange::laser_health(), &mut take);
+        if let Some(speed) = bus.laser_speed() {
+            exchange::set_laser_speed(speed);
+        }
         exchange::set_standing(bus.is_standing(now()));
         // A master may have others watched.
         let wanted = bus.nodes();

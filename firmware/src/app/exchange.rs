@@ -5,12 +5,14 @@ use core::cell::Cell;
 use agv_controller::{Estimate, SentPose, Told};
 use agv_core::measurement::Time;
 use agv_core::state::LaserHealth;
-use agv_wire::nav350::{Revolution, SensorWatch};
+use agv_wire::can::controller_node::CommunicationParameters;
+use agv_wire::nav350::{Revolution, SensorSpeed, SensorWatch};
 use critical_section::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_sync::zerocopy_channel;
+use embassy_time::Timer;
 use portable_atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Events that wait for the localiser: more than half a second of samples, or a third of one beside those of a gyro.
@@ -34,10 +36,17 @@ pub type RevolutionReceiver = zerocopy_channel::Receiver<'static, CriticalSectio
 static ESTIMATE: Signal<CriticalSectionRawMutex, Estimate> = Signal::new();
 
 static LASER: Mutex<Cell<SensorWatch>> = Mutex::new(Cell::new(SensorWatch::new()));
-/// Somebody on the bus wants the settings stored.
-static SAVE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-static HAS_SAVING_FAILED: AtomicBool = AtomicBool::new(false);
+/// How fast the laser moves, if it is told so.
+static LASER_SPEED: Signal<CriticalSectionRawMutex, SensorSpeed> = Signal::new();
+/// Somebody on the bus wants the settings stored, and these of how the controller speaks there.
+static SAVE: Signal<CriticalSectionRawMutex, CommunicationParameters> = Signal::new();
+/// Whether that was done.
+static SAVED: Signal<CriticalSectionRawMutex, bool> = Signal::new();
 static IS_PAUSE_ANNOUNCED: AtomicBool = AtomicBool::new(false);
+/// A page of flash is being erased, or is about to be: whoever reads the same bank stands still for as long.
+static IS_ERASING: AtomicBool = AtomicBool::new(false);
+/// The localiser may read a map that lies in flash.
+static READS_FLASH: AtomicBool = AtomicBool::new(false);
 static HAS_BUS_STARTED: AtomicBool = AtomicBool::new(false);
 static IS_STANDING: AtomicBool = AtomicBool::new(true);
 static ARE_SETTINGS_SOUND: AtomicBool = AtomicBool::new(true);
@@ -86,6 +95,17 @@ pub fn set_laser(watch: SensorWatch) {
     critical_section::with(|section| LASER.borrow(section).set(watch));
 }
 
+/// How fast the laser moves.
+pub fn set_laser_speed(speed: SensorSpeed) {
+    LASER_SPEED.signal(speed);
+}
+
+/// How fast the laser moves, by what the bus has said since the last call.
+#[must_use]
+pub fn newest_laser_speed() -> Option<SensorSpeed> {
+    LASER_SPEED.try_take()
+}
+
 /// Whether the laser can be used.
 #[must_use]
 pub fn laser_health() -> LaserHealth {
@@ -114,25 +134,25 @@ pub fn are_settings_sound() -> bool {
     ARE_SETTINGS_SOUND.load(Ordering::Relaxed)
 }
 
-/// Leaves it to the network's executor to store the settings.
-pub fn save_settings() {
-    SAVE.signal(());
+/// Leaves it to the network's executor to store the settings, and how the controller speaks on the bus.
+pub fn save(parameters: CommunicationParameters) {
+    SAVE.signal(parameters);
 }
 
-/// Waits until somebody on the bus wants the settings stored.
-pub async fn save_wanted() {
-    SAVE.wait().await;
+/// Waits until somebody on the bus wants the settings stored, and that.
+pub async fn save_wanted() -> CommunicationParameters {
+    SAVE.wait().await
 }
 
-/// The settings could not be stored.
-pub fn saving_has_failed() {
-    HAS_SAVING_FAILED.store(true, Ordering::Relaxed);
+/// What was wanted is stored, or could not be.
+pub fn tell_saved(is_stored: bool) {
+    SAVED.signal(is_stored);
 }
 
-/// Whether the settings could not be stored, since the last call.
+/// Whether what was wanted is stored, once that is known.
 #[must_use]
-pub fn has_saving_failed() -> bool {
-    HAS_SAVING_FAILED.swap(false, Ordering::Relaxed)
+pub fn saved() -> Option<bool> {
+    SAVED.try_take()
 }
 
 /// The tasks of the bus run: from now on it is told of a pause.
@@ -141,20 +161,46 @@ pub fn bus_has_started() {
 }
 
 /// The processor is about to stand still: waits for so long, us, that the bus is told before, if it has started.
-pub fn announce_pause(time: u64) {
+pub async fn announce_pause(time: u64) {
     if !HAS_BUS_STARTED.load(Ordering::Relaxed) {
         return;
     }
     IS_PAUSE_ANNOUNCED.store(true, Ordering::Relaxed);
-    let end = now().micros() + time;
-    // The bus runs above whoever waits here.
-    while now().micros() < end {}
+    Timer::after_micros(time).await;
 }
 
 /// Whether a pause was announced, since the last call.
 #[must_use]
 pub fn is_pause_announced() -> bool {
     IS_PAUSE_ANNOUNCED.swap(false, Ordering::Relaxed)
+}
+
+/// Waits until the localiser does not read flash, and keeps it from that until [`end_erasing`].
+pub async fn begin_erasing() {
+    IS_ERASING.store(true, Ordering::SeqCst);
+    while READS_FLASH.load(Ordering::SeqCst) {
+        Timer::after_millis(1).await;
+    }
+}
+
+/// The localiser may read flash again.
+pub fn end_erasing() {
+    IS_ERASING.store(false, Ordering::SeqCst);
+}
+
+/// The localiser is about to read flash; false if it has to wait.
+#[must_use]
+pub fn begin_to_read_flash() -> bool {
+    // What erases interrupts this at any place: one of both sees what the other has said.
+    READS_FLASH.store(true, Ordering::SeqCst);
+    let may_read = !IS_ERASING.load(Ordering::SeqCst);
+    READS_FLASH.store(may_read, Ordering::SeqCst);
+    may_read
+}
+
+/// The localiser has read flash.
+pub fn end_to_read_flash() {
+    READS_FLASH.store(false, Ordering::SeqCst);
 }
 
 /// The time of the firmware.

@@ -30,14 +30,8 @@ pub struct LaserMemory {
 impl LaserMemory {
     /// Memory of a connection that has not begun.
     #[must_use]
-    pub fn new() -> Self {
-        Self { laser: Laser::new(Configuration::default()), receive: [0; 8192], transmit: [0; 1024], read: [0; 1024] }
-    }
-}
-
-impl Default for LaserMemory {
-    fn default() -> Self {
-        Self::new()
+    pub fn new(configuration: Configuration) -> Self {
+        Self { laser: Laser::new(configuration), receive: [0; 8192], transmit: [0; 1024], read: [0; 1024] }
     }
 }
 
@@ -72,6 +66,9 @@ async fn next(
 ) {
     loop {
         exchange::set_laser(laser.watch());
+        if let Some(speed) = exchange::newest_laser_speed() {
+            laser.set_speed(speed);
+        }
         match laser.poll(now(), revolution) {
             Step::Revolution => {
                 exchange::set_laser(laser.watch());

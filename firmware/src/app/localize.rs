@@ -12,6 +12,8 @@ pub struct Localization<C: Capacities + 'static> {
     pub localization: agv_controller::Localization<&'static mut Localizer<C>>,
     /// Where events and outputs are written.
     pub log: LogWriter,
+    /// Whether it has a map that lies in the flash that settings are written to.
+    pub reads_flash: bool,
 }
 
 impl<C: Capacities> Localization<C> {
@@ -25,10 +27,21 @@ impl<C: Capacities> Localization<C> {
         if self.take_bus_event() {
             return true;
         }
+        // While a page is erased, revolutions and the search wait, and the pose goes on: the vehicle stands.
+        if self.reads_flash && !exchange::begin_to_read_flash() {
+            return false;
+        }
+        let is_busy = self.look(revolutions);
+        exchange::end_to_read_flash();
+        is_busy
+    }
+
+    /// Handles a revolution, or goes on with the search, and returns whether there was anything.
+    fn look(&mut self, revolutions: &mut RevolutionReceiver) -> bool {
         let Some(revolution) = revolutions.try_receive() else {
             return self.search();
         };
-        let Self { localization, log } = self;
+        let Self { localization, log, .. } = self;
         localization.revolution(revolution, |record| log.write(record));
         exchange::publish(localization.estimate());
         revolutions.receive_done();
@@ -41,7 +54,7 @@ impl<C: Capacities> Localization<C> {
         if let Some(progress) = told.progress {
             self.log_published(progress.told.wrapping_sub(1));
         }
-        let Self { localization, log } = self;
+        let Self { localization, log, .. } = self;
         localization.hear(&told, |record| log.write(record));
         exchange::publish(localization.estimate());
         true
@@ -49,7 +62,7 @@ impl<C: Capacities> Localization<C> {
 
     /// Logs what was published before the bus told more than so many events.
     fn log_published(&mut self, told: u32) {
-        let Self { localization, log } = self;
+        let Self { localization, log, .. } = self;
         while let Some(published) = exchange::published_until(told) {
             localization.published(&published, |record| log.write(record));
         }
@@ -57,14 +70,14 @@ impl<C: Capacities> Localization<C> {
 
     /// Tells the localiser something, publishes what it says, and logs both.
     pub fn handle(&mut self, event: &Event) {
-        let Self { localization, log } = self;
+        let Self { localization, log, .. } = self;
         localization.handle(event, |record| log.write(record));
         exchange::publish(localization.estimate());
     }
 
     /// Goes on with the search for a pose.
     fn search(&mut self) -> bool {
-        let Self { localization, log } = self;
+        let Self { localization, log, .. } = self;
         let before = localization.relocalization();
         let mut has_spoken = false;
         let is_busy = localization.search(|record| {

@@ -19,6 +19,8 @@ const QUEUE: usize = 14 * 1024;
 pub const LONGEST: usize = 6 * 1024;
 /// How long a peer may take to read what it asked for.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a peer may say nothing at all, not even that it has heard: one that begins a connection and goes away holds the port no longer.
+const SILENCE: Duration = Duration::from_secs(5);
 
 /// What waits for the network.
 pub type LogQueue = Pipe<CriticalSectionRawMutex, QUEUE>;
@@ -114,6 +116,7 @@ pub async fn run(
 ) -> ! {
     let LogMemory { receive, transmit, piece } = memory;
     let mut socket = TcpSocket::new(stack, receive, transmit);
+    socket.set_timeout(Some(SILENCE));
     loop {
         socket.abort();
         if socket.accept(port).await.is_err() {

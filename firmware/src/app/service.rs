@@ -5,13 +5,13 @@
 //! single bytes hold it open. Requests are answered no faster than one in two milliseconds: whoever floods the port waits.
 
 use agv_controller::BusEvent;
+use agv_settings::patient_flash::PatientFlash;
 use agv_settings::service::{Action, Controller, Frames, LONGEST_MESSAGE, Session};
 use embassy_net::Stack;
 use embassy_net::tcp::TcpSocket;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Instant, Timer, with_deadline, with_timeout};
-use embedded_storage::nor_flash::NorFlash;
 
 use super::exchange::{self, now};
 
@@ -65,7 +65,7 @@ impl Default for ServiceMemory {
 struct Gone;
 
 /// Serves one connection after the other, for ever.
-pub async fn run<F: NorFlash>(
+pub async fn run<F: PatientFlash>(
     stack: Stack<'static>,
     memory: &'static mut ServiceMemory,
     controller: &SharedController<F>,
@@ -86,7 +86,7 @@ pub async fn run<F: NorFlash>(
     }
 }
 
-async fn converse<F: NorFlash>(
+async fn converse<F: PatientFlash>(
     socket: &mut TcpSocket<'_>,
     read: &mut [u8],
     frames: &mut Frames,
@@ -112,7 +112,7 @@ async fn converse<F: NorFlash>(
             let (length, action) = {
                 let mut controller = controller.lock().await;
                 let is_standing = exchange::is_standing();
-                session.answer(frames.message(), &mut controller, is_standing, now(), room).map_err(|_| Gone)?
+                session.answer(frames.message(), &mut controller, is_standing, now(), room).await.map_err(|_| Gone)?
             };
             frames.clear();
             send(socket, room.get(..length).unwrap_or_default()).await?;

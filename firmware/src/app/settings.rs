@@ -3,9 +3,10 @@
 use agv_core::maps::{Landmark, put_reflectors_first};
 use agv_settings::Settings;
 use agv_settings::contour_store::ContourStore;
+use agv_settings::patient_flash::PatientFlash;
 use agv_settings::service::Controller;
 use agv_settings::store::{LANDMARKS, Store};
-use embedded_storage::nor_flash::NorFlash;
+use agv_wire::can::controller_node::CommunicationParameters;
 use heapless::Vec;
 
 use super::exchange;
@@ -18,7 +19,7 @@ pub type KeptMap = Vec<Landmark, LANDMARKS>;
 /// be read are the default ones. `has_slots` says whether there is room for `maps.slam`.
 #[must_use]
 #[inline(never)]
-pub fn read<F: NorFlash>(
+pub fn read<F: PatientFlash>(
     flash: F,
     contour_flash: Option<F>,
     map: &'static mut KeptMap,
@@ -93,9 +94,20 @@ pub fn read<F: NorFlash>(
     }
 }
 
+/// How the controller shall speak on the bus, if somebody has had that stored. What is wrong is logged.
+#[must_use]
+pub fn communication<F: PatientFlash>(controller: &mut Controller<F>) -> Option<CommunicationParameters> {
+    let stored = controller.store.as_mut()?.communication();
+    if stored.is_err() {
+        exchange::set_settings_sound(false);
+        defmt::error!("settings: how to speak on the bus is damaged and left at its default");
+    }
+    stored.ok().flatten()
+}
+
 /// Counts this start. When the page is full, this takes as long as a page of flash takes to erase.
-pub fn count_start<F: NorFlash>(controller: &mut Controller<F>) {
+pub async fn count_start<F: PatientFlash>(controller: &mut Controller<F>) {
     if let Some(store) = &mut controller.store {
-        controller.starts = store.count_start().unwrap_or(0);
+        controller.starts = store.count_start().await.unwrap_or(0);
     }
 }

@@ -4,7 +4,8 @@
 use embassy_time::{Duration, Instant, Ticker};
 use portable_atomic::{AtomicU32, Ordering};
 
-/// The tasks that have run since the watchdog was fed: after it has bitten, what had stood still is missing here.
+/// The tasks that have run since the watchdog was fed: after it has bitten, what had stood still is missing here. It is loaded and
+/// stored, and changed only in a critical section: atomic operations need memory whose bus, or the processor, watches it.
 #[unsafe(link_section = ".retained")]
 static SEEN: AtomicU32 = AtomicU32::new(0);
 
@@ -27,7 +28,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 
 /// A task has run.
 pub fn check_in(task: Task) {
-    SEEN.fetch_or(task as u32, Ordering::Relaxed);
+    critical_section::with(|_| SEEN.store(SEEN.load(Ordering::Relaxed) | task as u32, Ordering::Relaxed));
 }
 
 /// Says for ever that the executor of the network runs.
@@ -56,13 +57,23 @@ impl Supervisor {
     #[must_use]
     pub fn is_due(&mut self) -> bool {
         let now = Instant::now();
-        let is_due = now - self.last_meal >= PERIOD
-            && SEEN.compare_exchange(ALL, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok();
+        let is_due = now - self.last_meal >= PERIOD && have_all_run();
         if is_due {
             self.last_meal = now;
         }
         is_due
     }
+}
+
+/// Whether all tasks have run; if so, none has from now on.
+fn have_all_run() -> bool {
+    critical_section::with(|_| {
+        let have_run = SEEN.load(Ordering::Relaxed) == ALL;
+        if have_run {
+            SEEN.store(0, Ordering::Relaxed);
+        }
+        have_run
+    })
 }
 
 /// After the watchdog has bitten: what had stood still.

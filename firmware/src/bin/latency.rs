@@ -70,7 +70,7 @@ async fn encoders(parameters: Parameters) {
         let time = Time::from_micros(due.as_micros());
         let sample = EncoderSample { time, drive: number.wrapping_mul(STEP), steering: 0 };
         if let Some(estimate) = exchange::newest_estimate() {
-            predictor.update(&estimate.pose, &estimate.bias);
+            predictor.update(&estimate.pose, &estimate.prediction);
         }
         predictor.encoders(&sample);
         let delay = exchange::now().micros().saturating_sub(time.micros());
@@ -97,7 +97,7 @@ fn main() -> ! {
             let settings = Settings { start_search: false, ..Settings::of(parameters) };
             let localizer = LOCALIZER.init_with(|| Localizer::new(parameters));
             let new = |localizer| agv_controller::Localization::new(localizer, &settings);
-            localization = log.take().map(|log| Localization { localization: new(localizer), log });
+            localization = log.take().map(|log| Localization { localization: new(localizer), log, reads_flash: false });
             BUS_TASKS.start(Interrupt::BusTasks).spawn(encoders(parameters).expect("the task runs once"));
         }
         Record::Landmarks(piece) => {

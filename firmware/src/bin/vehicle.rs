@@ -4,7 +4,7 @@
 
 use core::panic::PanicInfo;
 
-use agv_controller::{Troubles, carried_map};
+use agv_controller::{ControllerIdentity, Troubles, carried_map};
 use agv_core::localizer::{self, Parameters};
 use agv_core::maps::Landmark;
 use agv_firmware::app::announced_flash::AnnouncedFlash;
@@ -18,12 +18,12 @@ use agv_firmware::app::supervision::Supervisor;
 use agv_firmware::app::throttle::Throttle;
 use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, shared_settings, supervision};
 use agv_firmware::board::{self, Board, Current, Parts, RestartCause, Watchdog, retained, stack};
-use agv_settings::Settings;
 use agv_settings::service::Controller;
-use agv_wire::can::controller_node::CarriedMap;
+use agv_settings::{Settings, block_on};
+use agv_wire::can::controller_node::CommunicationParameters;
 use agv_wire::nav350::Revolution;
 use embassy_executor::Spawner;
-use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
+use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::zerocopy_channel::Channel;
 use static_cell::StaticCell;
@@ -47,27 +47,30 @@ type Capacities = <Current as Board>::Capacities;
 type Localizer = localizer::Localizer<Capacities>;
 type Localization = localize::Localization<Capacities>;
 
-static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
-static SETTINGS: StaticCell<Settings> = StaticCell::new();
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 static CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, Revolution>> = StaticCell::new();
-static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
 
-/// Large values apart from the localiser, and what tasks work with, in whichever memory the board has for each. A cell without a value is
+/// Large values apart from the localiser, what tasks work with, and what is used seldom, in whichever memory the board has for each. A cell without a value is
 /// all zero, which is what that memory begins with.
 #[allow(unsafe_code, reason = "the section is that of the boards' memory for such values")]
 mod large {
     use agv_firmware::app::laser::LaserMemory;
     use agv_firmware::app::log_stream::{LONGEST, LogMemory, LogQueue};
-    use agv_firmware::app::service::ServiceMemory;
+    use agv_firmware::app::service::{ServiceMemory, SharedController};
     use agv_firmware::app::settings::KeptMap;
+    use agv_settings::Settings;
     use agv_wire::nav350::Revolution;
+    use embassy_net::StackResources;
     use static_cell::StaticCell;
 
-    use super::{CONNECTIONS, Localization};
+    use super::{CONNECTIONS, Flash, Localization};
 
     #[unsafe(link_section = ".large")]
     pub static MAP: StaticCell<KeptMap> = StaticCell::new();
+    #[unsafe(link_section = ".seldom")]
+    pub static CONTROLLER: StaticCell<SharedController<Flash>> = StaticCell::new();
+    #[unsafe(link_section = ".seldom")]
+    pub static SETTINGS: StaticCell<Settings> = StaticCell::new();
     #[unsafe(link_section = ".large")]
     pub static REVOLUTIONS: StaticCell<[Revolution; 1]> = StaticCell::new();
     #[unsafe(link_section = ".tasks")]
@@ -76,8 +79,10 @@ mod large {
     pub static LOG_QUEUE: StaticCell<LogQueue> = StaticCell::new();
     #[unsafe(link_section = ".tasks")]
     pub static FRAME: StaticCell<[u8; LONGEST]> = StaticCell::new();
-    #[unsafe(link_section = ".tasks")]
+    #[unsafe(link_section = ".seldom")]
     pub static SERVICES: StaticCell<[ServiceMemory; CONNECTIONS]> = StaticCell::new();
+    #[unsafe(link_section = ".tasks")]
+    pub static RESOURCES: StaticCell<StackResources<{ CONNECTIONS + 4 }>> = StaticCell::new();
     #[unsafe(link_section = ".tasks")]
     pub static LASER: StaticCell<LaserMemory> = StaticCell::new();
     #[unsafe(link_section = ".tasks")]
@@ -98,10 +103,10 @@ async fn bus_task(
     can: Can,
     settings: &'static Settings,
     controller: &'static SharedController<Flash>,
-    map: CarriedMap,
+    identity: ControllerIdentity,
     troubles: Troubles,
 ) -> ! {
-    bus::run(Current::NAME, can, settings, controller, map, troubles).await
+    bus::run(identity, can, settings, controller, troubles).await
 }
 
 #[embassy_executor::task]
@@ -121,7 +126,8 @@ async fn watch_task() -> ! {
 
 #[embassy_executor::task]
 async fn laser_task(stack: Stack<'static>, revolutions: exchange::RevolutionSender, settings: &'static Settings) -> ! {
-    laser::run(stack, large::LASER.init_with(LaserMemory::new), revolutions, &settings.network).await
+    let memory = large::LASER.init_with(|| LaserMemory::new(settings.laser.configuration()));
+    laser::run(stack, memory, revolutions, &settings.network).await
 }
 
 #[embassy_executor::task]
@@ -143,13 +149,17 @@ async fn service_task(stack: Stack<'static>, memory: &'static mut ServiceMemory,
 async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSender, shared: Shared) {
     // SAFETY: this task was made by embassy's macro, so its context is embassy's.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
+    // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for. That may
+    // take as long as a page takes to erase: so nothing else waits for it where the processor goes on meanwhile, and where it
+    // does not, it was done before the bus heard anything.
+    let mut counted = shared.controller.try_lock().expect("nobody else knows the controller");
     let network = &shared.settings.network;
     let config = Config::ipv4_static(StaticConfigV4 {
         address: Ipv4Cidr::new(Ipv4Address::from(network.address), network.prefix),
         gateway: Some(Ipv4Address::from(network.gateway)),
         dns_servers: heapless::Vec::new(),
     });
-    let resources = RESOURCES.init_with(StackResources::new);
+    let resources = large::RESOURCES.init_with(embassy_net::StackResources::new);
     let (stack, runner) = embassy_net::new(Throttle::new(ethernet), config, resources, Current::seed());
     spawner.spawn(watch_task().expect("the task runs once"));
     spawner.spawn(save_task(shared.controller).expect("the task runs once"));
@@ -158,6 +168,9 @@ async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSend
     spawner.spawn(log_task(stack, shared).expect("the task runs once"));
     for memory in large::SERVICES.init_with(|| [const { ServiceMemory::new() }; CONNECTIONS]) {
         spawner.spawn(service_task(stack, memory, shared).expect("there are as many tasks as connections"));
+    }
+    if Current::RUNS_WHILE_FLASH_WORKS {
+        settings::count_start(&mut counted).await;
     }
 }
 
@@ -181,15 +194,19 @@ fn build_localization(
     localizer: &'static mut Localizer,
     settings: &Settings,
     log: LogWriter,
+    reads_flash: bool,
 ) -> &'static mut Localization {
-    large::LOCALIZATION
-        .init_with(|| Localization { localization: agv_controller::Localization::new(localizer, settings), log })
+    large::LOCALIZATION.init_with(|| Localization {
+        localization: agv_controller::Localization::new(localizer, settings),
+        log,
+        reads_flash,
+    })
 }
 
 #[inline(never)]
 fn share(controller: Controller<Flash>) -> (&'static Settings, &'static SharedController<Flash>) {
-    let settings = SETTINGS.init_with(|| controller.settings.clone());
-    (settings, CONTROLLER.init_with(|| SharedController::new(controller)))
+    let settings = large::SETTINGS.init_with(|| controller.settings.clone());
+    (settings, large::CONTROLLER.init_with(|| SharedController::new(controller)))
 }
 
 /// The map of contours, where it lies.
@@ -199,12 +216,16 @@ fn contour_bytes(controller: &Controller<Flash>) -> Option<&'static [u8]> {
     Current::contour_bytes(store.offset(found.copy), found.length)
 }
 
-/// What has brought this start about, if it was no good; empty if nothing was wrong.
+/// What has brought this start about, and others before it that nobody has forgotten yet, if it was no good; empty if nothing was
+/// wrong.
 fn failure(cause: RestartCause) -> &'static str {
-    match (retained::read(), cause) {
-        ("", RestartCause::Watchdog) => supervision::stood_still(),
-        (said, _) => said,
+    if cause == RestartCause::Watchdog {
+        match retained::read() {
+            "" => retained::keep(&supervision::stood_still()),
+            before => retained::keep(&format_args!("{}; before: {before}", supervision::stood_still())),
+        }
     }
+    retained::read()
 }
 
 /// What is kept in flash.
@@ -214,6 +235,8 @@ struct Kept {
     landmarks: &'static [Landmark],
     /// The map of contours.
     contours: Option<&'static [u8]>,
+    /// How the controller shall speak on the bus.
+    communication: Option<CommunicationParameters>,
 }
 
 #[inline(never)]
@@ -227,12 +250,13 @@ fn read_flash(
     let (flash, contour_flash) = (announced(flash), contour_flash.map(announced));
     let mut controller = settings::read(flash, contour_flash, map, failure, has_slots::<Capacities>());
     if !Current::RUNS_WHILE_FLASH_WORKS {
-        settings::count_start(&mut controller);
+        block_on(settings::count_start(&mut controller));
     }
+    let communication = settings::communication(&mut controller);
     let landmarks = controller.landmarks;
     let contours = contour_bytes(&controller);
     let (settings, controller) = share(controller);
-    Kept { settings, controller, landmarks, contours }
+    Kept { settings, controller, landmarks, contours, communication }
 }
 
 #[inline(never)]
@@ -241,7 +265,7 @@ fn start() -> Vehicle {
     let Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
     let failure = failure(restart_cause);
     let supervisor = Supervisor::start();
-    let Kept { settings, controller, landmarks, contours } = read_flash(flash, contour_flash, failure);
+    let Kept { settings, controller, landmarks, contours, communication } = read_flash(flash, contour_flash, failure);
     let localizer = build_localizer(&settings.parameters);
     if localizer.lend_landmarks(landmarks).is_err() {
         defmt::error!("the map has more landmarks than the localiser takes, or one that is not finite");
@@ -257,7 +281,7 @@ fn start() -> Vehicle {
     let (sender, revolutions) = channel.split();
     let queue: &LogQueue = large::LOG_QUEUE.init_with(LogQueue::new);
     let log = LogWriter::new(large::FRAME.init_with(|| [0; LONGEST]), queue, landmarks.len());
-    let localization = build_localization(localizer, settings, log);
+    let localization = build_localization(localizer, settings, log, contours.is_some());
     exchange::publish(localization.localization.estimate());
     let troubles = Troubles {
         has_panicked: !failure.is_empty(),
@@ -265,18 +289,15 @@ fn start() -> Vehicle {
         are_settings_lost: !exchange::are_settings_sound(),
     };
     let can = Current::take_part(can, settings.bit_rate);
-    Current::bus_tasks()
-        .spawn(bus_task(can, settings, controller, carried_map(landmarks), troubles).expect("the task runs once"));
+    let identity = ControllerIdentity {
+        hardware: Current::NAME,
+        serial: Current::serial(),
+        map: carried_map(landmarks),
+        stored: communication,
+    };
+    Current::bus_tasks().spawn(bus_task(can, settings, controller, identity, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks, log: queue };
-    // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for. That may
-    // take as long as a page takes to erase: so nothing else waits for it where the processor goes on meanwhile, and where it
-    // does not, it is done before the bus hears anything.
-    let mut counted = controller.try_lock().expect("nobody else knows the controller");
     Current::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
-    if Current::RUNS_WHILE_FLASH_WORKS {
-        settings::count_start(&mut counted);
-    }
-    drop(counted);
     Vehicle { localization, revolutions, watchdog, supervisor }
 }
 

@@ -1,4 +1,4 @@
-//! Memory for large values, and for those of the tasks, beside that of all other statics, which would not hold them.
+//! Memory for large values, for those of the tasks, and for what is used seldom, beside that of all other statics, which would not hold them.
 //!
 //! It is no `.bss`, as its clock may be off when that is cleared: a board clears it when it starts.
 #![allow(unsafe_code, reason = "the memory is known to the linker")]
@@ -8,6 +8,8 @@ unsafe extern "C" {
     static mut _large_end: u32;
     static mut _tasks_start: u32;
     static mut _tasks_end: u32;
+    static mut _seldom_start: u32;
+    static mut _seldom_end: u32;
 }
 
 /// Makes zeros of all of it.
@@ -18,8 +20,9 @@ unsafe extern "C" {
 pub unsafe fn clear() {
     let large = (&raw mut _large_start, &raw mut _large_end);
     let tasks = (&raw mut _tasks_start, &raw mut _tasks_end);
-    for (start, end) in [large, tasks] {
-        // SAFETY: the linker has put both on whole words, and nobody uses what is between them yet.
+    let seldom = (&raw mut _seldom_start, &raw mut _seldom_end);
+    for (start, end) in [large, tasks, seldom] {
+        // SAFETY: the linker has put all on whole words, and nobody uses what is between them yet.
         unsafe { start.write_bytes(0, end.addr().saturating_sub(start.addr()) / size_of::<u32>()) };
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! A board is a folder with a type that implements [`Board`], and a line here. Its `memory.x`, which `build.rs` gives to
 //! the linker, says where the stack is and how much of its end is out of reach (`_stack_start`, `_stack_end`,
-//! `_stack_guard`), where large values and those of the tasks go (`.large`, `.tasks`), and what outlives a restart (`.retained`).
+//! `_stack_guard`), where large values and those of the tasks go (`.large`, `.tasks`), what is used seldom (`.seldom`), and what
+//! outlives a restart (`.retained`).
 
 #[cfg(feature = "an500")]
 pub mod an500;
@@ -24,9 +25,9 @@ pub use h723::Nucleo as Current;
 pub use h743::Nucleo as Current;
 
 use agv_core::localizer::Capacities;
+use agv_settings::patient_flash::PatientFlash;
 use embassy_executor::SendSpawner;
 use embassy_net_driver::Driver;
-use embedded_storage::nor_flash::NorFlash;
 
 use crate::app::can_port::CanPort;
 
@@ -50,7 +51,7 @@ pub trait Board: Sized + 'static {
     /// The network.
     type Ethernet: Driver + 'static;
     /// Where settings are kept, and maps of contours: at least two pages.
-    type Flash: NorFlash + 'static;
+    type Flash: PatientFlash + 'static;
     /// The watchdog.
     type Watchdog: Watchdog;
 
@@ -63,6 +64,9 @@ pub trait Board: Sized + 'static {
 
     /// Takes part in the bus of that many kbit/s. Call once.
     fn take_part(can: Self::CanParts, bit_rate: u16) -> Self::Can;
+
+    /// Which of all boards it is; 0 if it does not know.
+    fn serial() -> u32;
 
     /// A number for the network that nobody foresees.
     fn seed() -> u64;

@@ -57,7 +57,8 @@ impl Write for Text<'_> {
     }
 }
 
-/// Keeps what a panic says, or a fault is, over the reset that follows.
+/// Keeps what a panic says, or a fault is, over the reset that follows. What is said may be made of what is kept already: it is put
+/// together before anything is overwritten.
 pub fn keep(said: &dyn Display) {
     let mut text = [0; LONGEST];
     let mut writer = Text { text: &mut text, length: 0 };
@@ -65,7 +66,7 @@ pub fn keep(said: &dyn Display) {
     let length = writer.length;
     let checksum = checksum(text.get(..length).unwrap_or_default());
     let place = message();
-    // SAFETY: after a panic or fault nothing else runs; any words are a message.
+    // SAFETY: nothing else runs after a panic or fault, nor before tasks do; any words are a message.
     unsafe {
         for (bytes, number) in text.as_chunks().0.iter().zip(0..) {
             (&raw mut (*place).text).cast::<u32>().add(number).write_volatile(u32::from_le_bytes(*bytes));
@@ -78,11 +79,11 @@ pub fn keep(said: &dyn Display) {
     cortex_m::asm::dsb();
 }
 
-/// What was said before this start; empty if nothing was. Call once, before tasks run.
+/// What was said before this start, or is kept by now; empty if nothing was. Only before tasks run, and not to be held over [`keep`].
 #[must_use]
 pub fn read() -> &'static str {
-    // SAFETY: any bytes are a message, and nobody writes to it but `keep`, after which nothing is read, and `forget`,
-    // which leaves the text.
+    // SAFETY: any bytes are a message, and nobody writes to it but `keep`, over which no text is held, and `forget`, which
+    // leaves the text.
     let (message, text) = unsafe {
         let message = &*message();
         (message, core::slice::from_raw_parts((&raw const message.text).cast::<u8>(), LONGEST))

@@ -2,13 +2,19 @@
 
 from bench import check_sound, describe, note_depths, poses, stack_of
 from emulated_chip.clock import MILLISECOND
-from emulated_chip.system_control import DATA_CACHE_ON, INSTRUCTION_CACHE_ON, CCR
+from emulated_chip.exceptions import BUS_FAULT, HARD_FAULT
+from emulated_chip.system_control import BFAR, CCR, DATA_CACHE_ON, INSTRUCTION_CACHE_ON
+from injected_panic import add_atomically
+from unicorn import arm_const as arm
 
 # The whole start with an empty flash: memory at 64 MHz, oscillators, PHY.
 LONGEST_START = 200 * MILLISECOND
 # AXI_TARG7_FN_MOD in the network of buses (2.2.4).
 TARGET_7 = 0x8108
-
+# External memory, of which the boards have none (2.3, table 8).
+FIRST_OUTSIDE, LAST_OUTSIDE = 0x6000_0000, 0xDFFF_FFFC
+# What of a region makes it shareable: S of MPU_RASR (ARMv7-M ARM, B3.5.9).
+SHAREABLE = 1 << 18
 
 # Share of the stack that the start may take.
 MOST_OF_STACK = 0.9
@@ -70,9 +76,17 @@ def has_the_clocks_of_the_manual(bench):
         *((f"CAN on {pin}", gpio(pin), 9) for pin in ("PD0", "PD1")),
         ("data cache", bool(chip.system.words[CCR] & DATA_CACHE_ON), True),
         ("instruction cache", bool(chip.system.words[CCR] & INSTRUCTION_CACHE_ON), True),
+        # Chapter 60: a debugger that holds the processor is no reason to restart it.
+        ("watchdog stands at breakpoints", chip.peripherals["DBGMCU"].get("APB4FZR1", "IWDG1"), 1),
+        # 8.5.3: who watches the debugger's clock.
+        ("clock security system", rcc.get("CR", "HSECSSON"), 1),
         # The DMA of the Ethernet goes past the cache (58.10); settings are read as they are.
         ("RAM of the Ethernet is cached", chip.system.is_cached(0x3000_0000), False),
         ("settings are cached", chip.system.is_cached(chip.description.variant.settings), False),
+        # Nobody watches exclusive accesses on the bus (DDI0489, 5.6.2): no RAM that may be written is shareable.
+        *((f"{name} is shareable", is_shared(chip, ram), False) for name, ram in chip.rams.items()),
+        # Arm's erratum 1013783: the default map alone does not keep preloads from where there is no memory.
+        *((f"{place:#x} can be read", not chip.system.forbids(place, False), False) for place in (FIRST_OUTSIDE, LAST_OUTSIDE)),
     ]
     wrong = [f"{name} is {found}, not {wanted}" for name, found, wanted in expected if found != wanted]
     order = ["FDCAN1_IT0", "TIM2", "UART7", "ETH", "UART8"]
@@ -81,6 +95,12 @@ def has_the_clocks_of_the_manual(bench):
         wrong.append(f"priorities of {order} are {priorities}")
     assert not wrong, "; ".join(wrong)
     bench.note("registers", len(expected))
+
+
+def is_shared(chip, ram):
+    """Whether the beginning or the end of a RAM is shareable, and may be written."""
+    ends = (ram.base, ram.base + ram.size - 4)
+    return any(chip.system.is_shared(place) and not chip.system.forbids(place, True) for place in ends)
 
 
 def runs_on_older_silicon(bench):
@@ -106,6 +126,23 @@ def runs_on_older_silicon(bench):
     assert poses(chip), "no pose on the bus"
     newer = boot(bench)
     assert TARGET_7 not in newer.peripherals["AXI"].words, "the workaround is for older silicon"
+
+
+def takes_exclusive_accesses_where_they_work(bench):
+    """An atomic operation in the memory that outlives a restart is made; the chip answers one with a bus fault once that memory
+    is shareable, as the processor does."""
+    chip = boot(bench)
+    kept = chip.rams["SRAM4"].base
+    stop = lambda: chip.processor.get(arm.UC_ARM_REG_R2) == 0 or chip.exceptions.taken
+    add_atomically(chip, kept)
+    chip.run_for(MILLISECOND, stop)
+    assert not chip.exceptions.taken and chip.processor.get(arm.UC_ARM_REG_R2) == 0, describe(chip)
+    for region in chip.system.regions.values():
+        region.attributes |= SHAREABLE
+    add_atomically(chip, kept)
+    chip.run_for(MILLISECOND, stop)
+    assert [number for _, number, _ in chip.exceptions.taken[:1]] in ([BUS_FAULT], [HARD_FAULT]), "it was made"
+    assert chip.system.words.get(BFAR) == kept, describe(chip)
 
 
 def asks_for_random_numbers(bench):
@@ -150,6 +187,7 @@ CHECKS = [
     boots,
     has_the_clocks_of_the_manual,
     runs_on_older_silicon,
+    takes_exclusive_accesses_where_they_work,
     asks_for_random_numbers,
     every_clock_is_needed,
 ]

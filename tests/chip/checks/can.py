@@ -1,5 +1,7 @@
 """The bus when it is not as it should be."""
 
+from collections import Counter
+
 from bench import check_sound, emergencies, longest_gap, poses, start
 from emulated_chip.can_bus import CanFrame
 from emulated_chip.clock import MILLISECOND, SECOND
@@ -10,12 +12,14 @@ OLDEST = 30 * MILLISECOND
 BACK_FROM_OFF = 0x8140
 HEARTBEAT_LOST = 0x8130
 COUNTS = 16
+# What is said of each pose: its position, heading, covariance, status and integrity (TPDO 1 to 5).
+SETS = (0x190, 0x290, 0x390, 0x490, 0x690)
 PERIOD = 10 * MILLISECOND
 
 
-def counts(chip, since=0):
+def counts(chip, since=0, identifier=0x190):
     """The counter of each pose, of four bits, with the time at which it was heard."""
-    return [(time, frame.data[7] >> 4) for time, frame in chip.listener.of(0x190, since)]
+    return [(time, frame.data[7] >> 4) for time, frame in chip.listener.of(identifier, since)]
 
 
 def age(first, later):
@@ -50,6 +54,58 @@ def sends_nothing_stale(bench):
     assert gap <= 40 * MILLISECOND, f"no pose for {gap / 1e6:.1f} ms"
 
 
+# Transmit errors of 31 frames, each of which costs eight; error passive ends below 128 (ISO 11898-1).
+MANY_ERRORS, PASSIVE = 247, 128
+
+
+def says_all_of_it_while_error_passive(bench):
+    """The bus was disturbed and is sound again: as long as the controller is error passive, everything is said as often as before."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    said = lambda since: Counter(frame.identifier for time, frame in chip.listener.heard if time >= since)
+    before = chip.clock.now()
+    chip.run_for(200 * MILLISECOND)
+    usual = said(before)
+    fdcan = chip.peripherals["FDCAN1"]
+    fdcan._errors = MANY_ERRORS
+    begin = chip.clock.now()
+    chip.run_for(200 * MILLISECOND)
+    check_sound(chip)
+    assert fdcan._errors >= PASSIVE, "error passive is over too soon to tell"
+    found = said(begin)
+    bench.note("frames_in_200_ms", {f"{identifier:x}h": count for identifier, count in sorted(found.items())})
+    rare = {f"{identifier:x}h": (found[identifier], count) for identifier, count in usual.items() if found[identifier] + 1 < count}
+    assert not rare, f"frames while error passive, and before: {rare}"
+
+
+# Time of a burst of others' frames, which all go first, and from the start of one to the next.
+BURST, BURSTS = 15 * MILLISECOND, 41 * MILLISECOND
+
+
+def keeps_the_order_of_its_frames(bench):
+    """Others keep the bus busy again and again: of each identifier the frames come in the order of their counts, and of all that
+    belong to one pose all come or none."""
+    chip = bench.started()
+    chip.run_for(200 * MILLISECOND)
+    begin = chip.clock.now()
+    frame = CanFrame(0x001, b"12345678")
+    count = BURST * chip.can_bus.bit_rate // SECOND // frame.bits()
+    for _ in range(50 if bench.is_long else 15):
+        for _ in range(count):
+            chip.can_bus.send(chip.listener, frame)
+        chip.run_for(BURSTS)
+    chip.run_for(50 * MILLISECOND)
+    check_sound(chip)
+    sets = {}
+    for identifier in SETS:
+        found = [number for _, number in counts(chip, begin, identifier)]
+        wrong = [(earlier, later) for earlier, later in zip(found, found[1:]) if (later - earlier) % COUNTS > COUNTS // 2]
+        assert not wrong, f"counts of {identifier:x}h that follow each other on the bus: {wrong[:5]}"
+        sets[identifier] = len(found)
+    bench.note("poses", sets[SETS[0]])
+    assert max(sets.values()) - min(sets.values()) <= 1, f"frames of each kind: {sets}"
+
+
 def comes_back_from_bus_off(bench):
     """A short circuit for two seconds: the controller goes off, waits longer each time, comes back and says so."""
     chip = bench.started()
@@ -59,6 +115,7 @@ def comes_back_from_bus_off(bench):
     go_off = fdcan._go_off
     fdcan._go_off = lambda: (offs.append(chip.clock.now()), go_off())
     chip.can_bus.is_shorted = True
+    chip.can_bus.changed()
     chip.run_for(2 * SECOND)
     chip.can_bus.is_shorted = False
     chip.can_bus.changed()
@@ -110,11 +167,12 @@ def tells_of_an_overrun(bench):
     assert 0x8110 in emergencies(chip, begin), f"emergencies: {emergencies(chip, begin)}"
 
 
-def ask(chip, *data):
+def ask(chip, *data, patience=10 * MILLISECOND):
     """The answer to a request for an object (CiA 301, 7.2.4)."""
-    begin = chip.clock.now()
+    # What was heard just now answers something else.
+    begin = chip.clock.now() + 1
     chip.can_bus.send(chip.listener, CanFrame(0x610, bytes(data)))
-    chip.run_for(10 * MILLISECOND)
+    chip.run_for(patience, stop=lambda: chip.listener.of(0x590, begin))
     answers = chip.listener.of(0x590, begin)
     assert len(answers) == 1, f"{len(answers)} answers"
     return answers[0][1].data
@@ -177,6 +235,8 @@ def runs_at_the_bit_rate_that_is_set(bench):
 
 CHECKS = [
     sends_nothing_stale,
+    says_all_of_it_while_error_passive,
+    keeps_the_order_of_its_frames,
     comes_back_from_bus_off,
     hears_only_what_is_meant_for_it,
     tells_of_an_overrun,

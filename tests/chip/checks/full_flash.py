@@ -2,14 +2,20 @@
 
 from bench import LONGEST_START, check_sound, describe, emergencies, longest_gap, poses, start
 from checks.can import ask
+from checks.log_port import host_of, listen
+from emulated_chip.can_bus import CanFrame
 from emulated_chip.clock import MILLISECOND, SECOND
 from emulated_chip.flash import ERASE
-from stored_settings import ACCEPTS_SETTINGS, FIRST_PAGE, NODE_17, PAGE, fill, starts
+from stored_settings import ACCEPTS_SETTINGS, BIT_RATE_250, FIRST_PAGE, NODE_17, PAGE, fill, starts
 
 # From the reset to the first pose on the bus. With one bank of flash the erasure of a page comes before it.
 LONGEST = 1 * SECOND
 LONGEST_ERASE = ERASE[3]
-PAUSE = 0xFF04
+# The bit rate, object 4134h, and `save` to 1010h (CiA 301, 7.5.2.13), which the book says to wait 3 s for.
+BIT_RATE = (0x2B, 0x34, 0x41, 0, 0xFA, 0, 0, 0)
+SAVE = (0x23, 0x10, 0x10, 1, *b"save")
+PATIENCE = 3 * SECOND
+PAUSE, SETTINGS_LOST = 0xFF04, 0x6300
 
 
 def first_pose(chip):
@@ -61,12 +67,14 @@ def says_before_it_stands_still(bench):
     chip.run_for(3 * SECOND)
     erases = chip.settings_flash.erases
     begin = chip.clock.now()
-    # The bit rate, object 4134h, and `save` to 1010h (CiA 301, 7.5.2.13).
-    assert ask(chip, 0x2B, 0x34, 0x41, 0, 0xFA, 0, 0, 0)[0] == 0x60, "the setting is refused"
-    assert ask(chip, 0x23, 0x10, 0x10, 1, *b"save")[0] == 0x60, "to store it is refused"
-    chip.run_for(4 * SECOND)
-    check_sound(chip)
+    assert ask(chip, *BIT_RATE)[0] == 0x60, "the setting is refused"
+    assert ask(chip, *SAVE, patience=PATIENCE)[0] == 0x60, "to store it is refused"
+    bench.note("stored_after_ms", round((chip.clock.now() - begin) / MILLISECOND, 1))
+    # It is told when it is done (CiA 301, 7.5.2.13).
     assert chip.settings_flash.erases > erases, "nothing was erased"
+    assert BIT_RATE_250 in bytes(chip.settings_flash.bytes), "it is confirmed before it is stored"
+    chip.run_for(2 * SECOND)
+    check_sound(chip)
     gap = longest_gap(poses(chip, begin), begin, chip.clock.now())
     bench.note("longest_gap_ms", round(gap / MILLISECOND, 1))
     told = [time for time, frame in chip.listener.of(0x90, begin) if frame.data[:2] == PAUSE.to_bytes(2, "little")]
@@ -80,4 +88,59 @@ def says_before_it_stands_still(bench):
     bench.note("told_before_ms", round((silent_from - told[0]) / MILLISECOND, 1))
 
 
-CHECKS = [reads_what_it_has_written, starts_within_a_second_when_full, says_before_it_stands_still]
+def goes_on_while_it_stores(bench):
+    """A page is erased for a setting that is stored: localiser, bus and network go on, where the program is in another bank."""
+    chip = bench.chip()
+    fill(chip.settings_flash, FIRST_PAGE, ACCEPTS_SETTINGS, room=2, with_pieces=True)
+    start(chip)
+    chip.run_for(3 * SECOND)
+    log = listen(chip, host_of(chip))
+    assert ask(chip, *BIT_RATE)[0] == 0x60, "the setting is refused"
+    begin = chip.clock.now() + 1
+    chip.can_bus.send(chip.listener, CanFrame(0x610, bytes(SAVE)))
+    silent = {"the loop of the localiser": 0, "the network": 0}
+    longest = dict(silent)
+    while not chip.listener.of(0x590, begin) and chip.clock.now() < begin + PATIENCE:
+        before = (chip.sleeps, len(log.received))
+        chip.run_for(STEP)
+        for name, has_run in zip(silent, (chip.sleeps > before[0], len(log.received) > before[1])):
+            silent[name] = 0 if has_run else silent[name] + STEP
+            longest[name] = max(longest[name], silent[name])
+    check_sound(chip)
+    assert chip.settings_flash.erases, "nothing was erased"
+    bench.note("stored_after_ms", round((chip.clock.now() - begin) / MILLISECOND, 1))
+    bench.note("longest_silence_ms", {name: time / MILLISECOND for name, time in longest.items()})
+    late = {name: time / MILLISECOND for name, time in longest.items() if time > LONGEST_SILENCE}
+    assert not late, f"silent for so many ms: {late}"
+
+
+# A revolution of the laser comes every 125 ms.
+STEP, LONGEST_SILENCE = 10 * MILLISECOND, 60 * MILLISECOND
+
+
+def says_what_it_cannot_store(bench):
+    """The flash refuses what is written: who has asked is told that, and so is the bus."""
+    chip = bench.chip()
+    fill(chip.settings_flash, FIRST_PAGE, ACCEPTS_SETTINGS, room=9, with_pieces=True)
+    start(chip)
+    chip.run_for(3 * SECOND)
+    bank = chip.settings_bank()
+    bank.store = lambda *_: bank.fail("WRPERR")
+    begin = chip.clock.now()
+    assert ask(chip, *BIT_RATE)[0] == 0x60, "the setting is refused"
+    answer = ask(chip, *SAVE, patience=PATIENCE)
+    # "Access failed due to an hardware error" (CiA 301, table 22).
+    assert answer == bytes([0x80, 0x10, 0x10, 1, 0, 0, 0x06, 0x06]), f"the answer is {answer.hex()}"
+    chip.run_for(100 * MILLISECOND)
+    assert SETTINGS_LOST in emergencies(chip, begin), f"emergencies: {emergencies(chip, begin)}"
+    check_sound(chip)
+
+
+CHECKS = [
+    goes_on_while_it_stores,
+    says_what_it_cannot_store,
+    reads_what_it_has_written,
+    starts_within_a_second_when_full,
+    says_before_it_stands_still,
+]
+goes_on_while_it_stores.chips = ["STM32H743ZI"]

@@ -1,9 +1,10 @@
 """The watchdog: it bites when something stands still, whichever it is, and never else."""
 
 from bench import check_sound, describe, emergencies, longest_gap, poses
+from checks.retained import retained_text
 from emulated_chip import watchdog
 from emulated_chip.clock import MICROSECOND, MILLISECOND, SECOND
-from injected_panic import hang
+from injected_panic import MESSAGE, hang, panic
 
 # The last meal may have been just before, and the next would have been a second later.
 LONGEST_BITE = 12 * SECOND
@@ -52,6 +53,23 @@ def bites_when_the_localiser_stands_still(bench):
         hang(chip)
 
     stands_still_and_restarts(bench, stop, "localiser")
+
+
+def tells_of_a_bite_behind_a_panic(bench):
+    """The program has panicked, and nobody has asked for its text yet, when the watchdog bites: both are told."""
+    chip = bench.started()
+    chip.run_for(20 * MILLISECOND)
+    panic(chip)
+    chip.run_for(SECOND, stop=lambda: len(chip.resets) > 1)
+    chip.run_for(200 * MILLISECOND)
+    block(BUS)(chip)
+    chip.run_for(LONGEST_BITE, stop=lambda: len(chip.resets) > 2)
+    assert [cause for _, cause in chip.resets] == ["power", "software", "watchdog"], describe(chip)
+    chip.exceptions.blocked = set()
+    chip.run_for(200 * MILLISECOND)
+    text = retained_text(chip)
+    missing = [part.decode() for part in (b"the bus stood still", MESSAGE) if part not in text]
+    assert not missing, f"nothing is told of {missing[0]}"
 
 
 def bites_when_everything_stands_still(bench):
@@ -106,6 +124,7 @@ CHECKS = [
     bites_when_the_network_stands_still,
     bites_when_the_localiser_stands_still,
     bites_when_everything_stands_still,
+    tells_of_a_bite_behind_a_panic,
     stays_calm_without_a_laser,
     stays_calm_on_a_slow_oscillator,
 ]

@@ -36,12 +36,15 @@ class CanBus:
         self._next()
 
     def withdraw(self, node, frame):
+        """Takes back a frame that waits; False if it is under way, or was sent."""
+        before = len(self._waiting)
         self._waiting = [one for one in self._waiting if one[2] is not node or one[3] is not frame]
+        return len(self._waiting) < before
 
     def _next(self):
         if self._is_busy or not self._waiting or self.is_shorted:
             return
-        ready = [one for one in self._waiting if self._is_heard(one[2])]
+        ready = [one for one in self._waiting if self.is_heard(one[2])]
         if not ready:
             return
         best = min(ready, key=lambda one: one[:2])
@@ -62,10 +65,12 @@ class CanBus:
     def _is_plugged(self, node):
         return getattr(node, "is_plugged", True)
 
-    def _is_heard(self, node):
+    def is_heard(self, node):
         """A frame that nobody acknowledges is sent again for ever."""
         return self._is_plugged(node) and any(self._is_plugged(other) for other in self.nodes if other is not node)
 
     def changed(self):
         """Somebody was plugged in or out, or the short circuit has come or gone."""
+        for node in self.nodes:
+            getattr(node, "on_bus_change", lambda: None)()
         self._next()

@@ -102,6 +102,8 @@ class Chip:
         # The program's part of a bank that it shares with the settings ends where those begin.
         first = self.description.variant.settings - base if with_settings == 0 else 0
         self.program = ProgramFlash(self, base, first or size, self.image.segments)
+        for address, data in self.image.segments:
+            self.processor.exclusives.watch(address, data)
         self.data_flash = DataFlash(self, data_base, self.settings_flash, first)
         self.processor.engine.mem_map(SYSTEM_MEMORY, SYSTEM_SIZE)
         unique = random.Random(7).randbytes(12)
@@ -242,12 +244,16 @@ class Chip:
         if not self.system.words.get(system_control.MPU_CTRL, 0) & 1:
             return
         for region in self.system.regions.values():
-            if region.attributes & 1 and region.forbids(True) and region.forbids(False) and self.ram_at(region.base):
-                if region.base % PAGE or region.size % PAGE:
-                    self.end(Finding("emulator", "regions without access are of whole pages of 4 KiB here", region.base))
+            if not (region.attributes & 1 and region.forbids(True) and region.forbids(False)):
+                continue
+            for base, size in region.parts():
+                if not any(ram.base < base + size and base < ram.base + ram.size for ram in self.rams.values()):
+                    continue
+                if base % PAGE or size % PAGE or not self.ram_at(base):
+                    self.end(Finding("emulator", "regions of RAM without access are of whole pages of 4 KiB here", base))
                     return
-                engine.mem_protect(region.base, region.size, UC_PROT_NONE)
-                self._forbidden.append((region.base, region.size))
+                engine.mem_protect(base, size, UC_PROT_NONE)
+                self._forbidden.append((base, size))
 
     def on_flash_change(self, address, size):
         self.data_flash.set_apart()

@@ -139,15 +139,23 @@ class Ethernet(RegisterFile):
             self.chip.dma_write(address + 12, (words[3] & ~OWN).to_bytes(4, "little"))
             self.chip.clock.after(delay, lambda frame=frame: self._transmitted(frame))
 
+    def speed(self):
+        """What the controller is set to (MACCR): Mbit/s, and whether in both directions at once."""
+        return 100 if self.get("ETHERNET_MAC.MACCR", "FES") else 10, bool(self.get("ETHERNET_MAC.MACCR", "DM"))
+
+    def _has_link(self):
+        """Frames pass where controller and PHY go at the same speed."""
+        return self.phy.has_link() and self.phy.speed() == self.speed()
+
     def _transmitted(self, frame):
         self._raise(TRANSMITTED)
-        if self.network and self.phy.has_link():
+        if self.network and self._has_link():
             self.network.hear(bytes(frame))
 
     def hear(self, frame):
         """A frame from the cable, without its checksum."""
         is_on = self._dma("DMACRX_CR", "SR") and self.get("ETHERNET_MAC.MACCR", "RE")
-        if not is_on or not self.phy.has_link() or not self._is_for_me(frame):
+        if not is_on or not self._has_link() or not self._is_for_me(frame):
             return
         address, words = self._descriptor("RX", self._receive_place)
         if not words[3] & OWN:

@@ -2,6 +2,7 @@
 
 from unicorn import arm_const as arm
 
+NON_MASKABLE = 2
 HARD_FAULT, MEMORY_FAULT, BUS_FAULT, USAGE_FAULT = 3, 4, 5, 6
 SVCALL, PENDSV, SYSTICK = 11, 14, 15
 FIRST_INTERRUPT = 16
@@ -110,9 +111,8 @@ class Exceptions:
         if best is None:
             return
         primask, faultmask, base = processor.get_all(MASKS)
-        if primask & 1 or faultmask & 1:
-            return
-        if base and self.priority(best) >= base:
+        is_masked = primask & 1 or faultmask & 1 or base and self.priority(best) >= base
+        if is_masked and best != NON_MASKABLE:
             return
         self.pending.discard(best)
         self._enter(best, processor.pc)

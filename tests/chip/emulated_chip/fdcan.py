@@ -10,6 +10,8 @@ ELEMENT_WORDS = 18
 ELEMENT_LENGTHS = [8, 12, 16, 20, 24, 32, 48, 64]
 # Of ISO 11898-1: an error costs the sender eight, error passive from 128, bus-off from 256.
 PASSIVE, BUS_OFF = 128, 256
+# LEC of PSR: what has become of the last frame. Reading it makes `NO_CHANGE` of it.
+NO_ERROR, ACKNOWLEDGE, BIT_DOMINANT, NO_CHANGE = 0, 3, 5, 7
 RECOVERY_BITS = 128 * 11
 
 
@@ -20,8 +22,13 @@ class Fdcan(RegisterFile):
         self.is_plugged = True
         self.bus = bus
         self._lines = lines
+        # Frames by their buffers, in the order in which they were asked for, and the one that takes part in arbitration.
         self._pending = {}
+        self._offered = None
+        self._offered_at = 0
+        self._put_buffer = 0
         self._errors = 0
+        self._last_error = NO_CHANGE
         self.lost = 0
         self.refused = 0
         self.on_write("CCCR", self._write_control)
@@ -37,14 +44,17 @@ class Fdcan(RegisterFile):
         self.on_read("TXFQS", self._queue_status)
         self.on_read("TXBRP", lambda: sum(1 << number for number in self._pending))
         self.on_read("PSR", self._protocol_status)
-        self.on_read("ECR", lambda: min(self._errors, 255))
+        self.on_read("ECR", self._error_counter)
 
     def reset(self):
         super().reset()
-        for frame in self._pending.values():
-            self.bus.withdraw(self, frame)
+        if self._offered:
+            self.bus.withdraw(self, self._offered)
         self._pending = {}
+        self._offered = None
+        self._put_buffer = 0
         self._errors = 0
+        self._last_error = NO_CHANGE
         self.set("CREL", 0x3214_1218)
         self.set("ENDN", 0x8765_4321)
         self.set("CCCR", 1)
@@ -114,13 +124,25 @@ class Fdcan(RegisterFile):
     def _buffers(self):
         return self.get("TXBC", "TFQS") + self.get("TXBC", "NDTB")
 
+    def _is_fifo(self):
+        """Whether frames are sent in the order in which they were asked for; else the lowest identifier goes first, and of the same
+        one the lowest buffer, whichever is older ("Tx FIFO" and "Tx queue", TFQM of TXBC)."""
+        return not self.get("TXBC", "TFQM")
+
+    def _error_counter(self):
+        self._note_unheard()
+        return min(self._errors, 255)
+
     def _queue_status(self):
         register = self.register("TXFQS")
         count = self._buffers()
         free = [number for number in range(count) if number not in self._pending]
+        if self._is_fifo():
+            behind = [(self._put_buffer + step) % count for step in range(count)] if count else []
+            free = [number for number in behind if number in free] if behind and behind[0] in free else []
         status = register.put(0, "TFQF", int(not free))
         status = register.put(status, "TFFL", len(free))
-        return register.put(status, "TFQPI", free[0] if free else 0)
+        return register.put(status, "TFQPI", free[0] if free else self._put_buffer)
 
     def _add(self, word):
         for number in range(self._buffers()):
@@ -130,8 +152,9 @@ class Fdcan(RegisterFile):
                 self.register("TXBTO")
                 self.set("TXBTO", self.get("TXBTO") & ~(1 << number))
                 self.set("TXBCF", self.get("TXBCF") & ~(1 << number))
-                if self.is_on():
-                    self._offer_one(self._pending[number])
+                self._put_buffer = (number + 1) % self._buffers()
+        if self.is_on():
+            self._offer()
 
     def _frame(self, words):
         is_extended = bool(words[0] >> 30 & 1)
@@ -140,29 +163,59 @@ class Fdcan(RegisterFile):
         data = b"".join(word.to_bytes(4, "little") for word in words[2:4])[:length]
         return CanFrame(identifier, data, bool(words[0] >> 29 & 1), is_extended)
 
-    def _offer(self):
-        for frame in self._pending.values():
-            self._offer_one(frame)
+    def _next_frame(self):
+        if not self._pending:
+            return None
+        if self._is_fifo():
+            return next(iter(self._pending.values()))
+        return min(self._pending.items(), key=lambda one: (one[1].identifier, one[0]))[1]
 
-    def _offer_one(self, frame):
+    def _offer(self):
+        """Has the next frame take part in arbitration, instead of one that waits for it. One that is under way goes on."""
+        best = self._next_frame()
+        if best is None or best is self._offered:
+            return
+        if self._offered and not self.bus.withdraw(self, self._offered) and self._offered in self._pending.values():
+            return
+        self._offered, self._offered_at = best, self.chip.clock.now()
+        self._try(best)
+
+    def _try(self, frame):
         if self.bus.is_shorted:
+            self._last_error = BIT_DOMINANT
             self._errors += 8
             if self._errors >= BUS_OFF:
                 self._go_off()
             else:
-                self.chip.clock.after(40 * SECOND // max(1, self.bit_rate()), lambda: self._offer_again(frame))
+                self.chip.clock.after(40 * SECOND // max(1, self.bit_rate()), lambda: self._try_again(frame))
             return
-        if not self.is_plugged:
-            self._errors = max(self._errors, PASSIVE)
         self.bus.withdraw(self, frame)
         self.bus.send(self, frame)
 
-    def _offer_again(self, frame):
-        if frame in self._pending.values() and self.is_on():
-            self._offer_one(frame)
+    def _try_again(self, frame):
+        if frame is self._offered and self.is_on():
+            self._try(frame)
+
+    def on_bus_change(self):
+        """A short circuit destroys what is offered."""
+        if self._offered and self.is_on() and self.bus.is_shorted:
+            self._try(self._offered)
+
+    def _is_unheard(self):
+        """Whether a frame has been sent to nobody, again and again: each time costs eight, but not beyond error passive
+        (ISO 11898-1, rules of fault confinement: an error passive sender that nobody acknowledges counts no further)."""
+        if not self._offered or not self.is_on() or self.bus.is_shorted or self.bus.is_heard(self):
+            return False
+        return self.chip.clock.now() - self._offered_at >= self._offered.bits() * SECOND // max(1, self.bit_rate())
+
+    def _note_unheard(self):
+        if self._is_unheard():
+            self._errors = max(self._errors, PASSIVE)
+            self._last_error = ACKNOWLEDGE
 
     def _go_off(self):
         self._errors = BUS_OFF
+        self._offered = None
         self.put("CCCR", "INIT", 1)
         self._raise("BO")
 
@@ -177,23 +230,33 @@ class Fdcan(RegisterFile):
     def sent(self, frame):
         numbers = [number for number, pending in self._pending.items() if pending is frame]
         self._errors = max(0, self._errors - 1)
+        self._last_error = NO_ERROR
+        self._offered = None
         for number in numbers:
             del self._pending[number]
             self.set("TXBTO", self.get("TXBTO") | 1 << number)
             if self.get("TXBTIE") >> number & 1:
                 self._raise("TC")
+        if self.is_on():
+            self._offer()
 
     def _cancel(self, word):
         for number in list(self._pending):
             if word >> number & 1:
-                self.bus.withdraw(self, self._pending.pop(number))
+                self._note_unheard()
+                frame = self._pending.pop(number)
+                if frame is self._offered and self.bus.withdraw(self, frame):
+                    self._offered = None
                 self.set("TXBCF", self.get("TXBCF") | 1 << number)
+        if self.is_on():
+            self._offer()
 
     # Receiving (56.3.4)
 
     def hear(self, frame):
         if not self.is_on() or not self.is_plugged or self.bit_rate() != self.bus.bit_rate:
             return
+        self._last_error = NO_ERROR
         fifo = self._filter(frame)
         if fifo is None:
             self.refused += 1
@@ -263,8 +326,11 @@ class Fdcan(RegisterFile):
         return kind == 2 and identifier & second == first & second
 
     def _protocol_status(self):
+        self._note_unheard()
         register = self.register("PSR")
-        status = register.put(0x0000_0707, "BO", int(self._errors >= BUS_OFF))
+        status = register.put(0x0000_0700, "BO", int(self._errors >= BUS_OFF))
+        status = register.put(status, "LEC", self._last_error)
+        self._last_error = NO_CHANGE
         return register.put(status, "EP", int(self._errors >= PASSIVE))
 
 

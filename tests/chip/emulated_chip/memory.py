@@ -72,6 +72,7 @@ class DataFlash:
         self.first = first
         self.size = len(flash.bytes)
         self.reads = 0
+        self._bank = None
         self.open_page = None
         self._apart = {}
         self._cached = {}
@@ -117,6 +118,9 @@ class DataFlash:
 
     def _read(self, engine, offset, size, _):
         self.reads += 1
+        # Who reads a bank that works waits until it has done (RM0468, 4.3.6).
+        if self.bank().is_busy():
+            self.chip.stall_until(self.bank().busy_until)
         if not self._is_cached(offset):
             return int.from_bytes(self.flash.bytes[offset : offset + size], "little")
         return int.from_bytes(self.seen(offset, size), "little")
@@ -125,7 +129,9 @@ class DataFlash:
         self.bank().store(offset, size, value)
 
     def bank(self):
-        return self.chip.peripherals["FLASH"].bank_of(self.base)
+        if self._bank is None:
+            self._bank = self.chip.peripherals["FLASH"].bank_of(self.base)
+        return self._bank
 
     def set_apart(self):
         """Pages with bad words, as they are now."""

@@ -8,6 +8,7 @@ from unicorn import arm_const as arm
 from unicorn import unicorn_const as const
 from unicorn.unicorn_py3 import unicorn as binding
 
+from .exclusives import Exclusives
 from .finding import Finding
 
 # Nothing is there: where Unicorn would stop by itself.
@@ -66,6 +67,7 @@ class Processor:
         self._count_blocks()
         self.engine.hook_add(UC_HOOK_INTR, self._on_interrupt)
         self.engine.hook_add(UC_HOOK_MEM_INVALID, self._on_invalid)
+        self.exclusives = Exclusives(self.engine, lambda address: not chip.system.is_shared(address))
         self._interrupt = None
         self._invalid = None
         self._sets = {}
@@ -142,12 +144,16 @@ class Processor:
     def run(self, cycles):
         """Runs at most about so many halfwords. True if it sleeps."""
         self.progress.limit = min(self.progress.halfwords + cycles, NEVER)
-        self._interrupt = self._invalid = None
+        self._interrupt = self._invalid = self.exclusives.stopped = None
         start = self.pc
         try:
             self.engine.emu_start(start | 1, NOWHERE)
         except UcError as error:
             self._fail(error)
+            return False
+        if self.exclusives.stopped is not None:
+            self.pc, address = self.exclusives.stopped
+            self.chip.exceptions.bus_fault(address)
             return False
         if self._interrupt is not None:
             self._on_stop_by_interrupt(self._interrupt)

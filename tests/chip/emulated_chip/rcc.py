@@ -1,6 +1,7 @@
 """Clocks and resets (chapter 8): oscillators, PLL 1, who is clocked, why the chip has started."""
 
 from .clock import MICROSECOND, MILLISECOND
+from .exceptions import NON_MASKABLE
 from .registers import RegisterFile
 
 HSI, CSI, HSE_ON_BOARD = 64_000_000, 4_000_000, 8_000_000
@@ -8,6 +9,8 @@ HSI, CSI, HSE_ON_BOARD = 64_000_000, 4_000_000, 8_000_000
 # characteristics"); the HSE is the debugger's clock, which is there when the debugger is.
 STARTS = {"HSI": 2 * MICROSECOND, "CSI": 2 * MICROSECOND, "HSI48": 10 * MICROSECOND, "HSE": 2 * MILLISECOND}
 LOCK = 150 * MICROSECOND
+# Lowest frequency of the oscillator of a PLL: to it falls one whose clock has stopped (DS12110, "PLL characteristics").
+LOWEST_VCO = 192_000_000
 # Divisors of D1CPRE and HPRE, by their four bits (8.7.8).
 DIVISORS = {0: 1, 8: 2, 9: 4, 10: 8, 11: 16, 12: 64, 13: 128, 14: 256, 15: 512}
 # Which source is behind the system clock switch and the PLLs (8.7.7, 8.7.11).
@@ -39,6 +42,7 @@ class Rcc(RegisterFile):
         self.on_write("D1CFGR", self._write_divider)
         self.on_write("CSR", self._write_low_speed)
         self.on_write("RSR", self._clear_reset_flags)
+        self.on_write("CICR", lambda word: self.set("CIFR", self.get("CIFR") & ~word))
         for name in ENABLES:
             self.on_write(name, lambda word, name=name: self._enable(name, word))
         for name in RESETS:
@@ -98,6 +102,33 @@ class Rcc(RegisterFile):
             self.put("CR", ready, 1)
             self._timer_clock = None
 
+    def stop_crystal(self):
+        """The debugger's clock stops. If the clock security system watches it, whom it has driven goes on with the HSI, which is switched on, PLLs on it are
+        switched off, and a non-maskable interrupt comes (8.5.3, "Clock security system")."""
+        self.has_hse = False
+        if "HSE" not in self._running:
+            return
+        self._running.discard("HSE")
+        self.put("CR", "HSERDY", 0)
+        if self.get("CR", "HSECSSON"):
+            if self._system_source() == "HSE" or self._drives_plls("HSE"):
+                self.put("CFGR", "SW", 0)
+                self.put("CFGR", "SWS", 0)
+            self.put("CR", "HSEON", 0)
+            self.put("CR", "HSION", 1)
+            self.put("CR", "HSIRDY", 1)
+            self._running.add("HSI")
+            for number in range(3) if self._drives_plls("HSE") else ():
+                self.put("CR", f"PLLON[{number}]", 0)
+                self.put("CR", f"PLLRDY[{number}]", 0)
+                self._running.discard(f"PLL{number + 1}")
+            self.put("CIFR", "HSECSSF", 1)
+            self.chip.exceptions.pend(NON_MASKABLE)
+        self._tell()
+
+    def _drives_plls(self, name):
+        return PLL_SOURCES[self.get("PLLCKSELR", "PLLSRC")] == name
+
     def _write_pll_source(self, word):
         # Protected while a PLL runs (8.7.11).
         if not any(self.get("CR", f"PLLON[{number}]") for number in range(3)):
@@ -138,6 +169,8 @@ class Rcc(RegisterFile):
         divisor = self.get("PLLCKSELR", f"DIVM[{number}]")
         if not divisor or not self.get("CR", f"PLLRDY[{number}]"):
             return 0
+        if source == 0:
+            return LOWEST_VCO
         fraction = 0
         if self.get("PLLCFGR", f"PLLFRACEN[{number}]"):
             fraction = self.get(f"PLLFRACR[{number}]", "FRACN") / 8192

@@ -37,6 +37,21 @@ class Region:
         disabled = self.attributes >> 8 & 0xFF
         return self.size < 256 or not disabled >> (address - self.base) * 8 // self.size & 1
 
+    def parts(self):
+        """What of it counts: all of it, or those of its eight parts that are not disabled, as first addresses and sizes."""
+        if self.size < 256 or not self.attributes >> 8 & 0xFF:
+            return [(self.base, self.size)]
+        part = self.size // 8
+        return [(self.base + number * part, part) for number in range(8) if not self.attributes >> 8 + number & 1]
+
+    def is_shared(self):
+        """Whether other masters are to see accesses in their order: device and strongly-ordered memory always, normal memory
+        by its bit S (table B3-13)."""
+        kind, cached = self.attributes >> 19 & 7, self.attributes >> 17 & 1
+        if (kind, cached) == (0, 0):
+            return True
+        return kind != 2 and bool(self.attributes >> 18 & 1)
+
     def forbids(self, is_write):
         access = self.attributes >> 24 & 7
         return access == 0 or is_write and access in (5, 6, 7)
@@ -101,6 +116,13 @@ class SystemControl:
         if region:
             return region.is_cached()
         return address < 0x4000_0000 or 0x6000_0000 <= address < 0xA000_0000
+
+    def is_shared(self, address):
+        """Whether this address is shareable; without a region, what the default map says (B3.1): the memories are not."""
+        region = self.region(address)
+        if region:
+            return region.is_shared()
+        return 0x4000_0000 <= address < 0x6000_0000 or address >= 0xA000_0000
 
     def forbids(self, address, is_write):
         region = self.region(address)

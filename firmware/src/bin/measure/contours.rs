@@ -9,7 +9,7 @@ use agv_firmware::board::an500::host_file::HostFile;
 use agv_firmware::board::an500::stopwatch::Stopwatch;
 use static_cell::{ConstStaticCell, StaticCell};
 
-use crate::{Count, count_scan};
+use crate::{Count, count_scan, init};
 
 type Finder = ContourStartFinder<Places<'static, 400, 6144>>;
 
@@ -40,12 +40,12 @@ impl Contours {
         let bytes: &'static [u8] = &bytes[..count];
         let mut parameters = *parameters;
         parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: false };
-        let kept = KEPT.init_with(|| Localizer::new(parameters));
+        let kept = init(&KEPT, || Localizer::new(parameters));
         kept.lend_contours(bytes).expect("it is a map of contours");
         Self {
             map: KeptMap::read(bytes).expect("it is a map of contours"),
             kept,
-            finder: FINDER.init_with(|| ContourStartFinder::new(parameters)),
+            finder: init(&FINDER, || ContourStartFinder::new(parameters)),
             room: ROOM.init_with(Submap::new),
             sum: 0,
             scan: Count::new("scan cycle in a kept map of contours"),

@@ -127,12 +127,12 @@ fn main() -> ! {
                 let mut parameters = *header.parameters;
                 // A revolution that is told reflector by reflector would be many for the solutions; they are counted apart.
                 parameters.protection = false;
-                localizer = Some(LOCALIZER.init_with(|| Localizer::new(parameters)));
+                localizer = Some(init(&LOCALIZER, || Localizer::new(parameters)));
                 believed = Some(parameters);
                 parameters.maps = MapUse { reflectors: false, features: false, dynamic: false, slam: true };
-                slam = Some(SLAM.init_with(|| Localizer::new(parameters)));
-                behind = Some(BEHIND.init_with(|| Localizer::new(parameters)));
-                blind = Some(BLIND.init_with(|| {
+                slam = Some(init(&SLAM, || Localizer::new(parameters)));
+                behind = Some(init(&BEHIND, || Localizer::new(parameters)));
+                blind = Some(init(&BLIND, || {
                     let maps = MapUse { reflectors: true, slam: false, ..parameters.maps };
                     Localizer::new(Parameters { maps, protection: true, ..parameters })
                 }));
@@ -171,6 +171,12 @@ fn main() -> ! {
     loop {
         cortex_m::asm::wfi();
     }
+}
+
+/// Values as large as a localiser are built on the stack, which has no room for two of them: each in a frame of its own.
+#[inline(never)]
+fn init<T>(cell: &'static StaticCell<T>, new: impl FnOnce() -> T) -> &'static mut T {
+    cell.init_with(new)
 }
 
 /// Counts what needs no drive, and writes `instructions.csv`.

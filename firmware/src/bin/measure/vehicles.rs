@@ -9,7 +9,7 @@ use agv_settings::{VehicleKind, VehicleSettings};
 use heapless::Vec;
 use static_cell::StaticCell;
 
-use super::Count;
+use super::{Count, init};
 
 static LOCALIZER: StaticCell<Localizer> = StaticCell::new();
 
@@ -23,6 +23,7 @@ const TURN: f64 = 0.4;
 const FREQUENCY: f64 = 1.6;
 
 /// A prediction of each kind with its measures by default, and the other parameters of the log.
+#[inline(never)]
 pub fn count(stopwatch: &Stopwatch, parameters: &Parameters) -> [Count; VehicleKind::ALL.len()] {
     let mut localizer: Option<&mut Localizer> = None;
     VehicleKind::ALL.map(|kind| {
@@ -30,13 +31,19 @@ pub fn count(stopwatch: &Stopwatch, parameters: &Parameters) -> [Count; VehicleK
         let new = || Localizer::new(Parameters { vehicle, ..*parameters });
         let localizer = match &mut localizer {
             Some(localizer) => {
-                **localizer = new();
+                renew(localizer, new);
                 localizer
             }
-            none => none.insert(LOCALIZER.init_with(new)),
+            none => none.insert(init(&LOCALIZER, new)),
         };
         drive(stopwatch, localizer, &vehicle, kind.name())
     })
+}
+
+/// The new one is built on the stack, too: see [`init`].
+#[inline(never)]
+fn renew(localizer: &mut Localizer, new: impl FnOnce() -> Localizer) {
+    *localizer = new();
 }
 
 fn drive(stopwatch: &Stopwatch, localizer: &mut Localizer, vehicle: &Vehicle, name: &'static str) -> Count {

@@ -79,6 +79,10 @@ impl Board for An500 {
         can
     }
 
+    fn serial() -> u32 {
+        0
+    }
+
     /// The same in every run, so that runs can be repeated.
     fn seed() -> u64 {
         0x5eed

@@ -12,7 +12,9 @@ use agv_wire::can::bit_timing::BitTiming;
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::frame::{Frame, Id};
 use embassy_stm32::Peri;
-use embassy_stm32::can::config::{FrameTransmissionConfig, GlobalFilter, NominalBitTiming, NonMatchingFilter};
+use embassy_stm32::can::config::{
+    FrameTransmissionConfig, GlobalFilter, NominalBitTiming, NonMatchingFilter, TxBufferMode,
+};
 use embassy_stm32::can::filter::{
     Action, ExtendedFilter, ExtendedFilterSlot, FilterType, StandardFilter, StandardFilterSlot,
 };
@@ -58,6 +60,11 @@ const OTHERS: [(StandardFilterSlot, ExtendedFilterSlot); 3] = [
     (StandardFilterSlot::_12, ExtendedFilterSlot::_2),
 ];
 
+/// What has become of the last frame, LEC of the controller's PSR (RM0433, "FDCAN protocol status register"): it was sent or heard;
+/// or nobody has acknowledged it. Anything else is a disturbance, or nothing since this was read last.
+const NO_ERROR: u8 = 0;
+const UNACKNOWLEDGED: u8 = 3;
+
 /// While nobody acknowledges, a frame waits for so long at most, us.
 const STALE: u64 = 20_000;
 /// How long the controller stays away from a bus whose errors have driven it off: this at first, us, twice as long each
@@ -90,8 +97,12 @@ pub struct FdCanPort {
     bus: BufferedCan<'static, SENT, RECEIVED>,
     sender: BufferedCanSender,
     listens_only: bool,
+    /// Whether the last frame was acknowledged by nobody, and none was heard since.
+    is_unheard: bool,
     /// Since when something waits that nobody acknowledges, us.
     unheard_since: Option<u64>,
+    /// Whether what is said until the next look at the controller is sent.
+    may_send: bool,
     presence: Presence,
     back_off: u64,
     last_off: u64,
@@ -130,6 +141,8 @@ impl CanParts {
             .set_frame_transmit(FrameTransmissionConfig::AllowFdCan)
             .set_nominal_bit_timing(timing)
             .set_global_filter(filter)
+            // In the order in which they were said: by priority, a later frame of the same identifier may go first.
+            .set_tx_buffer_mode(TxBufferMode::Fifo)
             .set_automatic_bus_off_recovery(false);
         configurator.set_config(config);
         let listens_only = clock_tolerance > found.tolerance();
@@ -140,7 +153,9 @@ impl CanParts {
             bus,
             sender,
             listens_only,
+            is_unheard: false,
             unheard_since: None,
+            may_send: false,
             presence: Presence::There,
             back_off: BACK_OFF.0,
             last_off: 0,
@@ -164,7 +179,7 @@ impl FdCanPort {
     }
 
     /// Goes away from a bus whose errors have driven the controller off, and comes back.
-    fn follow_bus_off(&mut self, now: u64) -> Option<BusChange> {
+    fn follow_bus_off(&mut self, is_bus_off: bool, now: u64) -> Option<BusChange> {
         let is_off = REGISTERS.cccr().read().init();
         match self.presence {
             Presence::There if is_off => {
@@ -180,7 +195,8 @@ impl FdCanPort {
                 self.presence = Presence::Returning;
                 None
             }
-            Presence::Returning if !REGISTERS.psr().read().bo() => {
+            Presence::Returning if !is_bus_off => {
+                self.is_unheard = false;
                 self.presence = Presence::There;
                 Some(BusChange::BackFromOff)
             }
@@ -188,9 +204,32 @@ impl FdCanPort {
         }
     }
 
-    /// Whether nobody acknowledges (ISO 11898-1: error passive).
-    fn is_unheard() -> bool {
-        REGISTERS.psr().read().ep()
+    /// Notes what has become of the last frame.
+    ///
+    /// An error passive controller may well be heard: it is one that was disturbed before. Silence is that nobody acknowledges.
+    const fn note(&mut self, last_error: u8) {
+        match last_error {
+            NO_ERROR => self.is_unheard = false,
+            UNACKNOWLEDGED => self.is_unheard = true,
+            _ => {}
+        }
+    }
+
+    fn is_waiting() -> bool {
+        REGISTERS.txbrp().read().0 & BUFFERS != 0
+    }
+
+    /// Throws away what nobody has acknowledged for too long.
+    fn forget_stale(&mut self, now: u64) {
+        if !self.is_unheard || !Self::is_waiting() {
+            self.unheard_since = None;
+            return;
+        }
+        let since = *self.unheard_since.get_or_insert(now);
+        if now.saturating_sub(since) >= STALE {
+            self.unheard_since = None;
+            self.forget_waiting();
+        }
     }
 }
 
@@ -239,10 +278,7 @@ impl CanPort for FdCanPort {
     }
 
     fn send(&mut self, frame: &Frame) -> bool {
-        let may_send = !self.listens_only && self.presence == Presence::There;
-        // While nobody listens, one frame at a time tries whether somebody does.
-        let may_send = may_send && (!Self::is_unheard() || REGISTERS.txbrp().read().0 & BUFFERS == 0);
-        let is_sent = may_send && same(frame).is_some_and(|frame| self.sender.try_write(frame).is_ok());
+        let is_sent = self.may_send && same(frame).is_some_and(|frame| self.sender.try_write(frame).is_ok());
         if !is_sent {
             LOST.fetch_add(1, Ordering::Relaxed);
         }
@@ -251,22 +287,21 @@ impl CanPort for FdCanPort {
 
     fn supervise(&mut self, now: Time) -> Option<BusChange> {
         let now = now.micros();
-        if REGISTERS.ir().read().rfl(0) {
+        // Reading it forgets what has become of the last frame, so nobody else does.
+        let status = REGISTERS.psr().read();
+        self.note(status.lec());
+        self.forget_stale(now);
+        let change = self.follow_bus_off(status.bo(), now);
+        // While nobody listens, what is said at one time tries whether somebody does, all of it or nothing.
+        let has_place = !self.is_unheard || !Self::is_waiting();
+        self.may_send = !self.listens_only && self.presence == Presence::There && has_place;
+        if change.is_none() && REGISTERS.ir().read().rfl(0) {
             // Frames came while the controller's queue was full; how many, it does not say.
             REGISTERS.ir().write(|flags| flags.set_rfl(0, true));
             LOST.fetch_add(1, Ordering::Relaxed);
             return Some(BusChange::Overrun);
         }
-        if Self::is_unheard() && REGISTERS.txbrp().read().0 & BUFFERS != 0 {
-            let since = *self.unheard_since.get_or_insert(now);
-            if now.saturating_sub(since) >= STALE {
-                self.unheard_since = None;
-                self.forget_waiting();
-            }
-        } else {
-            self.unheard_since = None;
-        }
-        self.follow_bus_off(now)
+        change
     }
 
     fn lost(&self) -> u32 {

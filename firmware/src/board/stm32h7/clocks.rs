@@ -31,6 +31,14 @@ impl Source {
         self.has_crystal
     }
 
+    /// Has the chip watch the debugger's clock from now on, if that drives it: when it stops, the chip goes on with its own oscillator and a
+    /// non-maskable interrupt comes, which starts it again (RM0433, 8.5.3 "Clock security system (CSS)").
+    pub fn watch(self) {
+        if self.has_crystal {
+            RCC.cr().modify(|control| control.set_hsecsson(true));
+        }
+    }
+
     /// By how much the clock may be off, millionths.
     #[must_use]
     pub const fn tolerance(self) -> u32 {

@@ -3,13 +3,14 @@
 use core::task::Context;
 
 use embassy_net_driver::{Capabilities, Driver, HardwareAddress, LinkState};
-use embassy_stm32::eth::{self, GenericPhy, PacketQueue, Sma, StationManagement};
+use embassy_stm32::eth::{self, PacketQueue, Sma, StationManagement};
 use embassy_stm32::pac::syscfg::vals::EthSelPhy;
 use embassy_stm32::pac::{ETH as REGISTERS, GPIOA, RCC, SYSCFG, gpio};
 use embassy_stm32::peripherals::{ETH, ETH_SMA, PA1, PA2, PA7, PB13, PC1, PC4, PC5, PG11, PG13};
 use embassy_stm32::{Peri, uid};
 
 use super::Interrupts;
+use super::phy::FullDuplexPhy;
 
 /// Frames that wait to be sent, and that were received.
 pub type Queue = PacketQueue<3, 6>;
@@ -22,7 +23,7 @@ const NOBODY: [u16; 2] = [0, 0xFFFF];
 /// Pin 1 of port A has the reference clock as its alternate function 11.
 const REFERENCE_CLOCK: (usize, u8) = (1, 11);
 
-type Controller = eth::Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>;
+type Controller = eth::Ethernet<'static, ETH, FullDuplexPhy<Sma<'static, ETH_SMA>>>;
 
 /// What the controller is wired to.
 pub struct Wires {
@@ -61,7 +62,7 @@ impl Ethernet {
         let mut management = Sma::new(management, managed.0, managed.1);
         let phy = (0..32).find(|address| !NOBODY.contains(&management.smi_read(*address, IDENTIFIER)));
         let Some(phy) = phy.filter(|_| has_reference_clock()) else { return Self::Dead };
-        let phy = GenericPhy::new(management, phy);
+        let phy = FullDuplexPhy::new(management, phy);
         let (clock, carrier, in_0, in_1, out_0, out_1, enable) = data;
         Self::Alive(eth::Ethernet::new_with_phy(
             queue,

@@ -66,6 +66,14 @@ unsafe extern "C" fn tell(frame: *const u32) -> ! {
     restart()
 }
 
+/// The debugger's clock has stopped, and with it every clock that was made of it: what runs here has the chip's own oscillator, which is too
+/// far off for the bus. After the restart that is known from the beginning.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    retained::keep(&"the debugger's clock has stopped");
+    restart()
+}
+
 /// An exception that nothing was to raise.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {

@@ -12,13 +12,14 @@ use core::marker::PhantomData;
 use core::ops::Range;
 use core::slice;
 
+use agv_settings::block_on;
+use agv_settings::patient_flash::PatientFlash;
 use embassy_stm32::Peri;
 use embassy_stm32::pac::FLASH as REGISTERS;
 use embassy_stm32::pac::flash::Bank as BankRegisters;
 use embassy_stm32::peripherals::FLASH;
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
-};
+use embassy_time::{Duration, Instant, Timer};
+use embedded_storage::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_read};
 
 use super::Chip;
 
@@ -63,6 +64,12 @@ const PAGE: usize = 128 * 1024;
 const WORD: usize = 32;
 /// 64 bits at once: the shortest times, at 1.8 V or more.
 const PARALLELISM: u8 = 3;
+/// How often is looked whether a word is programmed or a page erased, which take some 0.2 ms and 1 to 2 s (DS12110, "Flash memory
+/// programming"): whoever runs below has the processor meanwhile.
+const LOOK: Duration = Duration::from_micros(250);
+/// Reading for so long keeps whoever runs below waiting; then they have so much time.
+const WORK: Duration = Duration::from_millis(1);
+const REST: Duration = Duration::from_micros(250);
 /// What unlocks the control register (RM0433, 4.5.2).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// CFSR of the processor, whose flags are cleared by ones.
@@ -93,6 +100,8 @@ type FlashWord = [u32; WORD / 4];
 pub struct Pages<C> {
     /// Their addresses.
     at: Range<usize>,
+    /// When others have had the processor the last time.
+    rested: Instant,
     chip: PhantomData<C>,
 }
 
@@ -106,7 +115,7 @@ pub fn open<C: Chip>(_: Peri<'static, FLASH>) -> (Pages<C>, Option<Pages<C>>) {
 
 impl<C: Chip> Pages<C> {
     fn open(at: Range<usize>) -> Self {
-        let mut pages = Self { at, chip: PhantomData };
+        let mut pages = Self { at, rested: Instant::MIN, chip: PhantomData };
         for page in 0..pages.capacity() / PAGE {
             let (mut torn, mut written) = (0_usize, 0_usize);
             for offset in (page * PAGE..(page + 1) * PAGE).step_by(WORD) {
@@ -116,10 +125,22 @@ impl<C: Chip> Pages<C> {
                 }
             }
             if torn > written {
-                let _ = pages.erase((page * PAGE) as u32, ((page + 1) * PAGE) as u32);
+                let _ = block_on(pages.erase((page * PAGE) as u32, ((page + 1) * PAGE) as u32));
             }
         }
         pages
+    }
+
+    /// Whether these are whole words, or pages, of this flash.
+    const fn check(&self, from: u32, to: usize, whole: usize) -> Result<(), FlashError> {
+        let from = from as usize;
+        if from > to || to > self.at.end - self.at.start {
+            Err(FlashError::Place(NorFlashErrorKind::OutOfBounds))
+        } else if !from.is_multiple_of(whole) || !to.is_multiple_of(whole) {
+            Err(FlashError::Place(NorFlashErrorKind::NotAligned))
+        } else {
+            Ok(())
+        }
     }
 
     /// The address of an offset in the pages.
@@ -184,8 +205,8 @@ fn clear_errors(bank: Bank) {
     bank.registers().ccr().write(|flags| flags.0 = 0x1FEF_0000);
 }
 
-/// Does something with the bank unlocked.
-fn unlocked(which: Bank, work: impl FnOnce(BankRegisters)) -> Result<(), FlashError> {
+/// Does something with the bank unlocked, and lets others go on until it is done.
+async fn unlocked(which: Bank, work: impl FnOnce(BankRegisters)) -> Result<(), FlashError> {
     let bank = which.registers();
     if bank.cr().read().lock() {
         for key in KEYS {
@@ -195,8 +216,9 @@ fn unlocked(which: Bank, work: impl FnOnce(BankRegisters)) -> Result<(), FlashEr
     clear_errors(which);
     work(bank);
     cortex_m::asm::dsb();
-    // The watchdog knows how long this may take.
-    while bank.sr().read().bsy() || bank.sr().read().qw() {}
+    while bank.sr().read().bsy() || bank.sr().read().qw() {
+        Timer::after(LOOK).await;
+    }
     let status = bank.sr().read();
     let has_failed =
         status.wrperr() || status.pgserr() || status.strberr() || status.incerr() || status.operr() || status.wbne();
@@ -237,12 +259,12 @@ impl<C: Chip> ReadNorFlash for Pages<C> {
     }
 }
 
-impl<C: Chip> NorFlash for Pages<C> {
+impl<C: Chip> PatientFlash for Pages<C> {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = PAGE;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        check_erase(self, from, to).map_err(FlashError::Place)?;
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        self.check(from, to as usize, PAGE)?;
         for offset in (from as usize..to as usize).step_by(PAGE) {
             let page = (self.address(offset) - C::SETTINGS.start()) / PAGE;
             unlocked(C::SETTINGS, |bank| {
@@ -252,13 +274,14 @@ impl<C: Chip> NorFlash for Pages<C> {
                     control.set_snb(page as u8);
                 });
                 bank.cr().modify(|control| control.set_start(true));
-            })?;
+            })
+            .await?;
         }
         Ok(())
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-        check_write(self, offset, bytes.len()).map_err(FlashError::Place)?;
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        self.check(offset, offset as usize + bytes.len(), WORD)?;
         for (offset, bytes) in (offset as usize..).step_by(WORD).zip(bytes.chunks_exact(WORD)) {
             let mut word: FlashWord = [0; WORD / 4];
             for (part, bytes) in word.iter_mut().zip(bytes.as_chunks().0) {
@@ -275,11 +298,19 @@ impl<C: Chip> NorFlash for Pages<C> {
                     // SAFETY: the address is within a whole word of the pages, which are flash, unlocked to be programmed.
                     unsafe { (address as *mut u32).add(number).write_volatile(*part) };
                 }
-            })?;
+            })
+            .await?;
             if read_word(C::SETTINGS, address) != Some(word) {
                 return Err(FlashError::Refused);
             }
         }
         Ok(())
+    }
+
+    async fn rest(&mut self) {
+        if self.rested.elapsed() >= WORK {
+            Timer::after(REST).await;
+            self.rested = Instant::now();
+        }
     }
 }

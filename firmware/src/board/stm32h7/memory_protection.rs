@@ -1,5 +1,5 @@
-//! What memory is for: not cached where others read and write, no code in the settings, nothing below the stack (PM0253, 4.6
-//! "Memory protection unit").
+//! What memory is for: not cached where others read and write, no code in the settings, nothing below the stack, nothing
+//! where no memory is (PM0253, 4.6 "Memory protection unit").
 #![allow(unsafe_code, reason = "memory attributes have no safe interface")]
 
 use core::ops::Range;
@@ -19,10 +19,16 @@ const ENABLE_WITH_DEFAULT_MAP: u32 = 0b101;
 const NEVER_RUN: u32 = 1 << 28;
 const FULL_ACCESS: u32 = 0b011 << 24;
 const NO_ACCESS: u32 = 0;
-/// Normal memory, shareable and not cached (TEX 001, C 0, B 0, S 1).
-const NOT_CACHED: u32 = 0b001 << 19 | 1 << 18;
+/// Normal memory, not cached and not shareable (TEX 001, C 0, B 0, S 0). The processor leaves exclusive accesses to shareable
+/// memory, of which atomic operations are made, to the bus (DDI0489, 5.6.2), where nobody answers for them: a bus fault.
+const NOT_CACHED: u32 = 0b001 << 19;
 /// Device memory, shareable (TEX 000, C 0, B 1): every access is made, once, in its order.
 const DEVICE: u32 = 1 << 16;
+
+/// Where external memory would be, 6000_0000h to DFFF_FFFFh: four of the eight parts of all addresses. The processor reads ahead
+/// wherever nothing forbids it, also where nobody answers, and a preload does so where only the default map does (Arm's
+/// erratum 1013783 of the Cortex-M7). The first region, as any other one counts above it: nothing is to be had there.
+const NOWHERE: u32 = NEVER_RUN | NO_ACCESS | 0b1000_0111 << 8 | 31 << 1 | ENABLE;
 
 /// A part of memory.
 pub struct Region {
@@ -48,7 +54,10 @@ pub fn enable(mpu: &mut MPU, not_cached: &[Region]) {
     unsafe {
         CCR.write_volatile(CCR.read_volatile() | BFHFNMIGN);
         mpu.ctrl.write(0);
-        for ((region, attributes), number) in regions.zip(0..) {
+        mpu.rnr.write(0);
+        mpu.rbar.write(0);
+        mpu.rasr.write(NOWHERE);
+        for ((region, attributes), number) in regions.zip(1..) {
             mpu.rnr.write(number);
             mpu.rbar.write(region.base);
             mpu.rasr.write(NEVER_RUN | attributes | (region.size.trailing_zeros() - 1) << 1 | ENABLE);

@@ -11,6 +11,7 @@ mod faults;
 mod flash;
 mod memory_protection;
 mod option_bytes;
+mod phy;
 mod random;
 mod restart_cause;
 mod unused_clocks;
@@ -112,6 +113,7 @@ impl<C: Chip> Board for Nucleo<C> {
         C::mend();
         let source = Source::find();
         let peripherals = embassy_stm32::init(C::clock_tree(source.has_crystal()));
+        source.watch();
         unused_clocks::disable();
         // Drivers above the bus, the bus above the network, the network above everything else.
         interrupt::TIM2.set_priority(Priority::P2);
@@ -160,6 +162,10 @@ impl<C: Chip> Board for Nucleo<C> {
 
     fn take_part(can: CanParts, bit_rate: u16) -> FdCanPort {
         can.start(bit_rate)
+    }
+
+    fn serial() -> u32 {
+        random::serial()
     }
 
     fn seed() -> u64 {

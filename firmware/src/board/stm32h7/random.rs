@@ -1,10 +1,17 @@
-//! Random numbers of the chip (RM0433, chapter 33).
+//! Numbers that no other chip has: its own (RM0433, 61.1 "Unique device ID register"), and random ones (chapter 33).
 
 use embassy_stm32::pac::{RCC, RNG};
 use embassy_stm32::uid;
 
 /// How often is looked whether a number is there: some 100 us.
 const PATIENCE: u32 = 1000;
+
+/// The chip's own number of 96 bits in 32 bits: place on the wafer, wafer and lot, which do not come together in another chip of one lot.
+#[must_use]
+pub fn serial() -> u32 {
+    let own = uid::uid();
+    own.as_chunks::<4>().0.iter().fold(0, |sum: u32, word| sum.rotate_left(11) ^ u32::from_le_bytes(*word))
+}
 
 /// A number that nobody can foresee; if the generator gives none, one that is at least the chip's own.
 #[must_use]

@@ -1,7 +1,7 @@
 //! The independent watchdog (RM0433, chapter 49), on an oscillator of its own of 32 kHz that is off by up to 8 per cent.
 
-use embassy_stm32::pac::IWDG1;
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};
+use embassy_stm32::pac::{DBGMCU, IWDG1};
 
 use crate::board::{WATCHDOG_PERIOD, Watchdog};
 
@@ -18,6 +18,8 @@ impl IndependentWatchdog {
     /// Starts it: from now on it must be fed. The first thing that the program does.
     #[must_use]
     pub fn unleash() -> Self {
+        // It stands still while a debugger holds the processor (RM0433, chapter 60, "DBGMCU_APB4FZ1").
+        DBGMCU.apb4fzr1().modify(|frozen| frozen.set_iwdg1(true));
         IWDG1.kr().write(|key| key.set_key(Key::START));
         IWDG1.kr().write(|key| key.set_key(Key::ENABLE));
         IWDG1.pr().write(|prescaler| prescaler.set_pr(Pr::DIVIDE_BY64));

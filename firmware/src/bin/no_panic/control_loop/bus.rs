@@ -2,12 +2,12 @@
 
 use core::hint::black_box;
 
-use agv_controller::{Bus as ControllerBus, ChangeableSettings, Estimate, Troubles};
+use agv_controller::{Bus as ControllerBus, ChangeableSettings, ControllerIdentity, Estimate, Troubles};
+use agv_core::localizer::PredictionState;
 use agv_core::measurement::Time;
-use agv_core::odometry::{GyroErrors, OdometryBias};
 use agv_core::state::{LaserHealth, Relocalization};
 use agv_settings::Settings;
-use agv_wire::can::controller_node::{CarriedMap, ErrorKind};
+use agv_wire::can::controller_node::ErrorKind;
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::slcan;
 
@@ -25,7 +25,7 @@ impl Bus {
         let settings: Settings = any(Settings::default());
         let troubles = Troubles { damaged_parts: any(0), has_panicked: any(false), are_settings_lost: any(false) };
         Self {
-            bus: ControllerBus::new(&settings, "no_panic", any(CarriedMap::default()), troubles, any(Time::default())),
+            bus: ControllerBus::new(&settings, any(ControllerIdentity::default()), troubles, any(Time::default())),
             settings,
             slcan: slcan::Decoder::new(),
         }
@@ -52,13 +52,12 @@ impl Bus {
         self.bus.poll(time, any(LaserHealth::Unknown), |output| {
             black_box(output);
         });
-        black_box(self.bus.is_standing(time));
+        black_box((self.bus.is_standing(time), self.bus.saved(any(true))));
         self.bus.report(any(ErrorKind::Overload), time);
         black_box((self.bus.nodes(), self.bus.other_frames()));
         if let Some(pose) = self.bus.output() {
-            let (bias, relocalization) = (any(OdometryBias::default()), any(Relocalization::Idle));
-            let gyro = any(Some(GyroErrors::default()));
-            self.bus.update(&Estimate { answered: any(0), pose: any(pose), bias, gyro, relocalization });
+            let (prediction, relocalization) = (any(PredictionState::default()), any(Relocalization::Idle));
+            self.bus.update(&Estimate { answered: any(0), pose: any(pose), prediction, relocalization });
         }
     }
 

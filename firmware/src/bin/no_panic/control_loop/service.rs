@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use agv_core::measurement::Time;
 use agv_settings::Settings;
-use agv_settings::service::{Controller, Frames, Kept, LONGEST_MESSAGE, Session};
+use agv_settings::service::{Answer, Controller, Frames, LONGEST_MESSAGE, Session, answer_kept};
 use agv_settings::store::StoreError;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
@@ -75,13 +75,11 @@ impl Service {
         black_box(taken);
         if is_whole {
             let (is_standing, time) = (any(true), any(Time::default()));
-            let _ = black_box(session.answer_with(keep, frames.message(), controller, is_standing, time, room));
+            let answer = session.decide(frames.message(), controller, is_standing, time, room);
+            if black_box(matches!(answer, Ok(Answer::ToKeep(_)))) {
+                let _ = black_box(answer_kept(any(Err(StoreError::Flash)), room));
+            }
             frames.clear();
         }
     }
-}
-
-fn keep(kept: Kept, _: &mut Controller<NoFlash>) -> Result<(), StoreError> {
-    black_box(kept);
-    any(Err(StoreError::Flash))
 }
