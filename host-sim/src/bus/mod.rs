@@ -6,9 +6,10 @@ mod slcan;
 #[cfg(target_os = "linux")]
 mod socket_can;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use agv_wire::can::frame::AnyFrame;
+use agv_wire::can::canopen::NodeId;
+use agv_wire::can::frame::{AnyFrame, Id};
 
 pub use in_process::{InProcessBus, InProcessNode};
 #[cfg(target_os = "linux")]
@@ -43,6 +44,26 @@ pub enum BusError {
     },
 }
 
+/// A frame that was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HeardFrame {
+    /// What it says.
+    pub frame: AnyFrame,
+    /// How long ago its end was heard; zero where nobody has noted it.
+    pub age: Duration,
+}
+
+/// What has become of a bus, by the word of what drives it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BusChange {
+    /// Frames of others came faster than they were taken.
+    Overrun,
+    /// Errors have driven this node off the bus.
+    Off,
+    /// It takes part again.
+    BackFromOff,
+}
+
 /// A bus that this program takes part in. Nothing here waits by asking again and again.
 pub trait Bus: Send {
     /// Sends a frame.
@@ -56,6 +77,36 @@ pub trait Bus: Send {
     /// # Errors
     /// If the bus is gone.
     fn receive(&mut self, deadline: Instant) -> Result<Option<AnyFrame>, BusError>;
+
+    /// The same, with the time at which it was heard.
+    ///
+    /// # Errors
+    /// If the bus is gone.
+    fn hear(&mut self, deadline: Instant) -> Result<Option<HeardFrame>, BusError> {
+        Ok(self.receive(deadline)?.map(|frame| HeardFrame { frame, age: Duration::ZERO }))
+    }
+
+    /// Sends a frame if there is room for it; false if there is none. Never waits for room where the system says that there is none.
+    ///
+    /// # Errors
+    /// If the bus is gone.
+    fn offer(&mut self, frame: &AnyFrame) -> Result<bool, BusError> {
+        self.send(frame).map(|()| true)
+    }
+
+    /// Takes only the frames of these nodes and for them, those for all nodes, and those of the `other` identifiers. Everything, if it
+    /// cannot choose.
+    ///
+    /// # Errors
+    /// If the bus is gone.
+    fn listen_to(&mut self, _nodes: &[NodeId], _others: &[Id]) -> Result<(), BusError> {
+        Ok(())
+    }
+
+    /// What has become of the bus since the last call.
+    fn take_change(&mut self) -> Option<BusChange> {
+        None
+    }
 }
 
 /// Opens the bus with that name: `slcan:DEVICE[@BITRATE]`, `slcan-tcp:HOST:PORT[@BITRATE]` (500 kbit/s if no bit rate is

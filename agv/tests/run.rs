@@ -1,0 +1,216 @@
+//! `agv run`: the demonstration as people run it, a controller with a configuration, and what is refused.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::support::{Files, agv, json_keys, refusal, text};
+
+/// How long anything may take on a machine that is busy.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A controller in a program of its own, which ends with this value.
+struct Running {
+    child: Child,
+    /// What it says, line by line.
+    said: BufReader<std::process::ChildStderr>,
+}
+
+impl Running {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_agv"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let said = BufReader::new(child.stderr.take().unwrap());
+        Self { child, said }
+    }
+
+    /// The next line that has a word in it.
+    fn hear(&mut self, word: &str) -> String {
+        let mut line = String::new();
+        loop {
+            line.clear();
+            assert!(self.said.read_line(&mut line).unwrap() > 0, "it ended without a word of {word}");
+            if line.contains(word) {
+                return line;
+            }
+        }
+    }
+
+    /// Addresses of log stream and service port, once it is there.
+    fn ports(&mut self) -> [String; 2] {
+        let line = self.hear("agv view --live");
+        let behind = |word: &str| {
+            let rest = line.split_once(word).unwrap().1;
+            rest.split([' ', ';', '\n']).find(|part| !part.is_empty()).unwrap().to_owned()
+        };
+        [behind("--live "), behind("agv ctl ")]
+    }
+
+    /// Ends it as a service manager does; whether it was content.
+    fn terminate(mut self) -> (bool, String) {
+        let killed = Command::new("kill").args(["-TERM", &self.child.id().to_string()]).status().unwrap();
+        assert!(killed.success());
+        let mut printed = String::new();
+        self.child.stdout.take().unwrap().read_to_string(&mut printed).unwrap();
+        (self.child.wait().unwrap().success(), printed)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn the_demonstration_ends_by_itself_and_tells_its_figures() {
+    let run = agv(&["run", "--demo", "--seconds", "6", "--json", "--quiet"]);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+    let told: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let keys = ["level_mm", "missed", "mode", "period_ms", "poses", "restarts"];
+    let mut found: Vec<&str> = told.as_object().unwrap().keys().map(String::as_str).collect();
+    found.sort_unstable();
+    assert_eq!(found, keys, "{told}");
+    assert!(["p50", "p999", "max"].iter().all(|key| json_keys(&told["period_ms"]).contains(&(*key).to_owned())));
+    assert!(told["poses"].as_u64().unwrap() > 100 && told["restarts"] == 0, "{told}");
+    assert!(told["level_mm"].as_f64().is_some() && told["period_ms"]["p50"].as_f64().unwrap() > 0.0, "{told}");
+}
+
+#[test]
+fn other_commands_meet_it_as_they_meet_a_board() {
+    let files = Files::new();
+    let store = files.path("store");
+    let own = files.path("own.agvlog");
+    let mut running = Running::start(&["run", "--demo", "--no-page", "--store", &store, "--output", &own]);
+    let [log, service] = running.ports();
+    let version = agv(&["ctl", &service, "version"]);
+    assert!(text(&version.stdout).contains("agv-run "), "{}", text(&version.stderr));
+    let list = agv(&["ctl", &service, "list", "--json"]);
+    let settings: Value = serde_json::from_slice(&list.stdout).unwrap();
+    assert_eq!(settings["nav350.address"], "127.0.0.1");
+    // The page of another program shows it.
+    let drive = files.path("drive.agvlog");
+    let mut view = Running::start(&["view", "--live", &log, "--port", "0", "--json", "--output", &drive]);
+    let mut url = String::new();
+    BufReader::new(view.child.stdout.as_mut().unwrap()).read_line(&mut url).unwrap();
+    let url: Value = serde_json::from_str(&url).unwrap();
+    let host = url["url"].as_str().unwrap().trim_start_matches("http://").trim_end_matches('/').to_owned();
+    let start = Instant::now();
+    loop {
+        let status: Value = serde_json::from_str(&get(&host, "/api/status")).unwrap();
+        if status["poses"].as_u64().is_some_and(|poses| poses > 100) {
+            break;
+        }
+        assert!(start.elapsed() < PATIENCE, "{status}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(view.terminate().0);
+    let (is_content, printed) = running.terminate();
+    assert!(is_content && printed.contains("missed deadlines"), "{printed}");
+    // What was heard has poses; the log from the first event on replays to the same bits.
+    assert!(agv(&["replay", &drive, "--json", "--quiet"]).status.success());
+    let replayed = agv(&["replay", &own, "--json", "--quiet"]);
+    let told: Value = serde_json::from_slice(&replayed.stdout).unwrap();
+    for kind in ["outputs", "published"] {
+        assert!(told[kind]["compared"].as_u64().unwrap() > 50, "{}", told[kind]);
+        assert!(told[kind]["first_difference"].is_null(), "{}", told[kind]);
+    }
+}
+
+/// What a page of this machine says.
+fn get(host: &str, path: &str) -> String {
+    let mut stream = TcpStream::connect(host).unwrap();
+    write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer.split_once("\r\n\r\n").unwrap().1.to_owned()
+}
+
+/// A port of this machine that nobody listens to just now.
+fn free_port() -> u16 {
+    TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port()
+}
+
+#[test]
+fn a_controller_tells_its_state_and_keeps_its_settings() {
+    let files = Files::new();
+    let key = files.write("agv.key", crate::ctl::KEY.as_bytes());
+    let [log, service, laser, status, adapter] = std::array::from_fn(|_| free_port());
+    let store = files.path("store");
+    std::fs::create_dir(&store).unwrap();
+    let (image, set) = (format!("{store}/flash.bin"), |name: &str, value: u16| format!("{name}={value}"));
+    let [log, service, laser] = [set("log.port", log), set("service.port", service), set("nav350.port", laser)];
+    let provision = ["provision", "--key", &key, "--set", &log, "--set", &service, "--set", &laser, "--output", &image];
+    let made = agv(&[&provision[..], &["--set", "nav350.address=127.0.0.1"]].concat());
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let configuration = format!(
+        "store = \"{store}\"\nbus = \"slcan-tcp:127.0.0.1:{adapter}\"\nlisten = \"127.0.0.1\"\n[real_time]\n\
+         [status]\nlisten = \"127.0.0.1:{status}\"\n"
+    );
+    let configuration = files.write("vehicle.toml", configuration.as_bytes());
+    let mut running = Running::start(&["run", "--config", &configuration]);
+    let [_, service] = running.ports();
+    // There is no adapter yet: it is tried again.
+    running.hear("can: ");
+    let bus = TcpListener::bind((Ipv4Addr::LOCALHOST, adapter)).unwrap();
+    let (mut adapter, _) = bus.accept().unwrap();
+    let mut commands = [0; 16];
+    adapter.read_exact(&mut commands[..8]).unwrap();
+    let change = |arguments: &[&str]| {
+        let run = agv(&[&["ctl", &service, "--key", &key], arguments].concat());
+        assert!(run.status.success(), "{}", text(&run.stderr));
+    };
+    change(&["set", "vehicle.wheelbase", "1.234"]);
+    change(&["store"]);
+    change(&["reboot"]);
+    running.hear("starts again");
+    running.ports();
+    let get_setting = agv(&["ctl", &service, "get", "vehicle.wheelbase", "--json"]);
+    assert!(text(&get_setting.stdout).contains("1.234"), "{}", text(&get_setting.stderr));
+    let host = format!("127.0.0.1:{status}");
+    let start = Instant::now();
+    let told = loop {
+        let told: Value = serde_json::from_str(&get(&host, "/status")).unwrap();
+        if told["starts"] == 2 {
+            break told;
+        }
+        assert!(start.elapsed() < PATIENCE, "{told}");
+    };
+    assert!(told["laser"] != "sound" && told["is_localised"] == false, "{told}");
+    let metrics = get(&host, "/metrics");
+    assert!(metrics.contains("\nagv_localised 0\n") && metrics.contains("# TYPE agv_poses_total counter"), "{metrics}");
+    assert!(get(&host, "/").contains("<title>agv run</title>"));
+    let (is_content, printed) = running.terminate();
+    assert!(is_content && printed.contains("started again            1"), "{printed}");
+}
+
+#[test]
+fn what_cannot_be_run_is_refused_in_one_line() {
+    let files = Files::new();
+    let refused = |text: &str| refusal(&["run", "--config", &files.write("vehicle.toml", text.as_bytes())]);
+    assert!(refusal(&["run", "--config", &files.path("none.toml")]).contains("none.toml"));
+    let wrong = refused("store = \"s\"\nbuss = \"can0\"\n");
+    assert!(wrong.contains("vehicle.toml, line 2") && wrong.contains("buss"), "{wrong}");
+    let wrong = refused("store = \"s\"\nbus = \"can:0\"\n");
+    assert!(wrong.contains("slcan:/dev/ttyACM0"), "{wrong}");
+    let wrong = refused("store = \"s\"\nbus = \"can0\"\n[real_time]\nbus_priority = 100\n");
+    assert!(wrong.contains("line 4") && wrong.contains("from 1 to 99"), "{wrong}");
+    let wrong = refused("store = \"/dev/null/s\"\nbus = \"can0\"\n[status]\nlisten = \"127.0.0.1:0\"\n");
+    assert!(wrong.contains("/dev/null/s"), "{wrong}");
+    let taken = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let text = format!("store = \"s\"\nbus = \"can0\"\n[status]\nlisten = \"{}\"\n", taken.local_addr().unwrap());
+    assert!(refused(&text).contains("another address is set with listen in [status]"));
+    assert!(refusal(&["run", "--demo", "--seconds", "0"]).contains("greater than zero"));
+    for wrong in [&["run"][..], &["run", "--demo", "--config", "vehicle.toml"]] {
+        assert_eq!(agv(wrong).status.code(), Some(2));
+    }
+}

@@ -1,0 +1,5 @@
+//! The controller on this machine.
+#![cfg(unix)]
+
+mod flash_file;
+mod vehicle;
