@@ -32,9 +32,10 @@ Examples:
   agv simulate block_storage_p2 --output drive.agvlog
   agv replay drive.agvlog --report report
   agv view drive.agvlog
+  agv run --demo
 
 Exit codes: 0 done (agv accept says more); 1 it could not be done, and one line on standard error says why; 2 the command line is wrong;
-130 ended by a second Ctrl-C.";
+3 an import ended with a warning, and --strict was asked for; 130 ended by a second Ctrl-C.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -57,6 +58,8 @@ enum Command {
     Can(command::can::Can),
     Nav350(command::nav350::Nav350),
     Record(command::record::Record),
+    #[cfg(unix)]
+    Run(command::run::Run),
     Emulate(command::emulate::Emulate),
     Ctl(command::ctl::Ctl),
     Settings(command::settings::Settings),
@@ -84,7 +87,10 @@ fn main() -> ExitCode {
     }
     let outcome = match arguments.command {
         None => arguments.demonstration.run(),
-        Some(Command::Import(command)) => command.run(),
+        Some(Command::Import(command)) => match command.run() {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
         Some(Command::Export(command)) => command.run(),
         Some(Command::Simulate(command)) => command.run(),
         Some(Command::Replay(command)) => command.run(),
@@ -99,13 +105,21 @@ fn main() -> ExitCode {
         Some(Command::Calibrate(command)) => command.run(),
         Some(Command::Evaluate(command)) => command.run(),
         Some(Command::Features(command)) => command.run(),
-        Some(Command::Layout(command)) => command.run(),
-        Some(Command::Lidar3d(command)) => command.run(),
+        Some(Command::Layout(command)) => match command.run() {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
+        Some(Command::Lidar3d(command)) => match command.run() {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
         Some(Command::Places(command)) => command.run(),
         Some(Command::Campaign(command)) => command.run(),
         Some(Command::Can(command)) => command.run(),
         Some(Command::Nav350(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
+        #[cfg(unix)]
+        Some(Command::Run(command)) => command.run(),
         Some(Command::Emulate(command)) => command.run(),
         Some(Command::Ctl(command)) => command.run(),
         Some(Command::Settings(command)) => command.run(),

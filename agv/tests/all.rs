@@ -11,10 +11,12 @@ mod ctl;
 mod exchange;
 mod import;
 mod import_scans;
+mod imports;
 mod lidar3d;
 mod nav350;
 mod output;
 mod replay;
+mod run;
 mod support;
 mod trust;
 

@@ -12,11 +12,11 @@ use std::sync::{Arc, Mutex};
 use agv_core::measurement::Time;
 use agv_host_sim::layout_file;
 use agv_host_sim::mapping::contour_file;
-use agv_settings::Settings;
 use agv_settings::contour_store::ContourStore;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::{Action, Controller, Frames, LONGEST_MESSAGE, Response, Session, encode};
 use agv_settings::store::Store;
+use agv_settings::{Settings, block_on};
 use flash::{Flash, load};
 
 use crate::support::{Files, agv, refusal, text};
@@ -95,7 +95,7 @@ fn converse(mut stream: TcpStream, controller: &Mutex<Controller<Memory>>, is_mo
             let mut controller = controller.lock().unwrap();
             let is_standing = !is_moving.load(Ordering::Relaxed);
             let now = Time::from_micros(5_000_000);
-            let answer = session.answer(frames.message(), &mut controller, is_standing, now, &mut room);
+            let answer = block_on(session.answer(frames.message(), &mut controller, is_standing, now, &mut room));
             let Ok((length, action)) = answer else { return };
             frames.clear();
             stream.write_all(&room[..length]).unwrap();

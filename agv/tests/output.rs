@@ -337,7 +337,7 @@ fn values_that_no_vehicle_has_are_named_with_their_bounds() {
         assert!(complaint.contains(expected), "{complaint}");
     }
     let complaint = refusal(&["replay", &log, "--set", "features.nearest=40"]);
-    assert!(complaint.contains("features.nearest is out of its bounds"), "{complaint}");
+    assert!(complaint.contains("features.nearest (40) does not go with features.farthest (30)"), "{complaint}");
     let key = files.write("agv.key", "0".repeat(64).as_bytes());
     let flash = files.path("flash.bin");
     let complaint = refusal(&["provision", "--key", &key, "--set", "vehicle.wheelbase=", "-o", &flash]);

@@ -451,7 +451,7 @@ fn a_map_is_refused_with_the_line_that_is_wrong() {
     let map = files.write("map.csv", format!("{good}3,reflector,5.0,2.0,0.001\n").as_bytes());
     assert_eq!(map_file::read(Path::new(&map)).unwrap().len(), 2);
     for (content, expected) in
-        [(&b""[..], "no data"), (b"\x1f\x8b\x08\0\0", "gzip"), (b"id;kind\n", "text"), (b"\xff\xfe,\0", "binary")]
+        [(&b""[..], "no data"), (b"\x1f\x8b\x08\0\0", "gzip"), (b"id;kind\n", "text"), (b"\xff\xfb,\0", "binary")]
     {
         let map = files.write("map.csv", content);
         assert!(refusal(&["replay", &log, "--map", &map]).contains(expected));

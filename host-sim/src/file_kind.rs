@@ -1,7 +1,7 @@
 //! What a file looks like, for people who gave the wrong one.
 
 /// First bytes of common files and what those files are.
-const SIGNATURES: [(&[u8], &str); 19] = [
+const SIGNATURES: [(&[u8], &str); 23] = [
     (b"\x1f\x8b", "gzip-compressed data"),
     (b"\x28\xb5\x2f\xfd", "zstd-compressed data"),
     (b"\xfd7zXZ\0", "xz-compressed data"),
@@ -16,12 +16,25 @@ const SIGNATURES: [(&[u8], &str); 19] = [
     (b"\x89MCAP", "an MCAP recording"),
     (b"SQLite format 3", "an SQLite database"),
     (b"\x89HDF", "an HDF5 file"),
+    (
+        b"LOGG",
+        "a binary CAN log of Vector (BLF); `can_logconvert IN.blf OUT.log` of python-can makes a log of candump of it",
+    ),
+    (
+        b"MDF     ",
+        "a measurement file (MDF); `can_logconvert IN.mf4 OUT.log` of python-can makes a log of candump of it",
+    ),
+    (b"LASF", "a point cloud (LAS, LAZ)"),
+    (b"AutoCAD Binary DXF", "a drawing in binary DXF"),
     (b"\x7fELF", "a program"),
     (b"\x89PNG", "a picture"),
     (b"\xff\xd8\xff", "a picture"),
     (b"%PDF", "a PDF document"),
     (b"\xd6AGV", "a log of this program"),
 ];
+
+/// Begins a change of colour on a terminal.
+const ESCAPE: u8 = 0x1B;
 
 /// What a file looks like whose first bytes are these, to be put after "this is".
 #[must_use]
@@ -37,7 +50,9 @@ pub fn describe(beginning: &[u8]) -> &'static str {
         Ok(_) => true,
         Err(error) => error.error_len().is_none() && error.valid_up_to() > 0,
     };
-    let has_controls = beginning.iter().any(|byte| byte.is_ascii_control() && !byte.is_ascii_whitespace());
+    // What a terminal showed may have colours.
+    let is_control = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace() && *byte != ESCAPE;
+    let has_controls = beginning.iter().any(is_control);
     if !is_valid || has_controls {
         return "binary data of an unknown kind";
     }

@@ -1,11 +1,13 @@
 //! The localiser on a desktop: simulation, replay, import, evaluation and reports.
 
 pub mod acceptance;
+pub mod account;
 pub mod accuracy;
 pub mod bus;
 pub mod calibrate;
 pub mod contour_map;
 pub mod data;
+pub mod delimited;
 pub mod drive;
 pub mod drive_check;
 pub mod emulate;
@@ -21,6 +23,7 @@ pub mod link;
 pub mod live;
 pub mod log;
 pub mod mapping;
+mod odometry_steps;
 pub mod output_file;
 pub mod places;
 pub mod provision;
@@ -29,9 +32,12 @@ pub mod replay;
 pub mod report;
 #[cfg(feature = "bags")]
 pub mod ros;
+#[cfg(unix)]
+pub mod run;
 pub mod serve;
 pub mod setting_doubts;
 pub mod setting_meanings;
 pub mod simulate;
 pub mod text_file;
 pub mod view;
+mod wording;

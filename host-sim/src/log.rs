@@ -17,6 +17,7 @@ use agv_core::record::{
 use crate::file_kind;
 use crate::output_file::OutputFile;
 use crate::recording::{Publishing, RecordedOutput, RecordedPose, Recording, keep};
+use crate::wording::count_of;
 
 /// Name and version that this program leaves in its logs.
 pub const SOFTWARE: &str = concat!("agv ", env!("CARGO_PKG_VERSION"));
@@ -122,7 +123,9 @@ fn describe(record: &Record) -> String {
             format!("a scan of {} beams", scan.ranges.len())
         }
         Record::Event(Event::Scan(scan)) => format!("a scan of {} beams with intensities", scan.ranges.len()),
-        Record::Event(Event::Reflectors(seen)) => format!("a set of {} reflectors", seen.observations.len()),
+        Record::Event(Event::Reflectors(seen)) => {
+            format!("a set of {}", count_of(seen.observations.len(), "reflector"))
+        }
         Record::Note(note) => format!("a note of {} bytes", note.len()),
         _ => "what is to be written".to_owned(),
     }

@@ -3,7 +3,7 @@
 use agv_core::maps::Landmark;
 use agv_settings::contour_store::{CONTOUR_PIECE, ContourStore, MOST, checksum};
 use agv_settings::store::{KEY, PIECE, Store, StoreError};
-use agv_settings::{Settings, map_identity};
+use agv_settings::{Settings, block_on, map_identity};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
@@ -11,9 +11,9 @@ use embedded_storage::nor_flash::{
 use crate::contour_map::ContourMap;
 
 /// Bytes of a page of the STM32H743's flash.
-const PAGE: usize = 128 * 1024;
+pub(crate) const PAGE: usize = 128 * 1024;
 /// Bytes of its words.
-const WORD: usize = 32;
+pub(crate) const WORD: usize = 32;
 
 /// Why there is no image.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
@@ -102,15 +102,15 @@ pub fn flash_image(
     }
     let mut store = Store::new(Image(vec![0xFF; 2 * PAGE])).ok_or(ProvisionError::Full)?;
     if let Some(key) = key {
-        store.provision_key(key)?;
+        block_on(store.provision_key(key))?;
     }
-    store.store_leaves(settings)?;
+    block_on(store.store_leaves(settings))?;
     let count = u16::try_from(landmarks.len()).map_err(|_| too_many())?;
-    let mut writer = store.begin_map(count).map_err(|_| too_many())?;
+    let mut writer = block_on(store.begin_map(count)).map_err(|_| too_many())?;
     for piece in landmarks.chunks(PIECE) {
-        store.write_piece(&mut writer, piece)?;
+        block_on(store.write_piece(&mut writer, piece))?;
     }
-    store.finish_map(&writer)?;
+    block_on(store.finish_map(&writer))?;
     Ok(store.into_flash().0)
 }
 
@@ -122,8 +122,8 @@ pub fn contour_image(map: &ContourMap) -> Result<Vec<u8>, ProvisionError> {
     let bytes = map.bytes();
     let too_many = |_| ProvisionError::Contours { bytes: bytes.len() };
     let mut store = ContourStore::open(Image(vec![0xFF; 2 * PAGE])).ok_or(ProvisionError::Full)?;
-    store.begin(u32::try_from(bytes.len()).unwrap_or(u32::MAX), checksum(bytes)).map_err(too_many)?;
-    bytes.chunks(CONTOUR_PIECE).try_for_each(|piece| store.write(piece))?;
-    store.finish()?;
+    block_on(store.begin(u32::try_from(bytes.len()).unwrap_or(u32::MAX), checksum(bytes))).map_err(too_many)?;
+    bytes.chunks(CONTOUR_PIECE).try_for_each(|piece| block_on(store.write(piece)))?;
+    block_on(store.finish())?;
     Ok(store.into_flash().0)
 }

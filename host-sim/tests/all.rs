@@ -1,5 +1,6 @@
 //! All tests of this crate from outside, in one program: it is linked once.
 
+mod drive_check;
 mod eds;
 mod fitted_vehicle;
 mod gyro;
@@ -11,6 +12,8 @@ mod motion;
 mod output_file;
 mod published;
 mod report;
+mod ros_import;
+mod run;
 mod run_delay;
 mod simulate;
 mod truth;

@@ -8,7 +8,7 @@ use agv_core::geometry::Pose;
 use agv_core::odometry::VehicleOdometer;
 use agv_host_sim::calibrate::wheeled::clock::Clock;
 use agv_host_sim::calibrate::wheeled::path::LinearisedPath;
-use agv_host_sim::import::wheel_table::{TableColumns, read};
+use agv_host_sim::import::wheel_table::{TableColumns, read, read_all};
 use agv_host_sim::import::{optiodom, wheel_recording};
 use agv_host_sim::recording::RecordedEvent;
 
@@ -64,10 +64,13 @@ fn what_is_wrong_is_said_in_one_line() {
     let heading = "t,left,right,angle,seen,x,y,h\n";
     let fault = |text: &str| read(&table(&folder, text), &columns()).unwrap_err().to_string();
     let bad = [
-        ("t,left,right,angle,seen,x,y\n", ":1: there is no column \"h\""),
+        ("t,left,right,angle,seen,x,y\n", ":1: there is no column \"h\" among t, left, right, angle, seen, x, y"),
         (&format!("{heading}0,a,1,0,0,0,0,0\n"), ":2: column left is no number: \"a\""),
-        (&format!("{heading}0,1,1,0,0,0,0,0\n0,1,1,0,1,0,0,0\n"), ":3: time runs backward"),
-        (&format!("{heading}0,1,1,0,0,0,0,0\n1,1,1,0,0,0,0,0\n"), ":3: the time of the reference runs backward"),
+        (
+            &format!("{heading}1,1,1,0,0,0,0,0\n0,1,1,0,1,0,0,0\n"),
+            ":3: time runs backward, from 0.001 s to 0 s: where a second run begins, begin a second file",
+        ),
+        (&format!("{heading}0,1,1,0,1,0,0,0\n1,1,1,0,0,0,0,0\n"), ":3: the time of the reference runs backward"),
         (&format!("{heading}0,1\n"), ":2: there are 2 columns, and right is the 3th"),
         (heading, ": there are no data in the file"),
         ("", ": there are no data in the file"),
@@ -127,7 +130,7 @@ fn a_table_becomes_a_drive_of_its_vehicle() {
     }
     let (path, columns) = (table(&folder, &text), folder.path().join("columns.toml"));
     std::fs::write(&columns, DESCRIPTION).unwrap();
-    let recording = wheel_recording::read(&path, &columns).unwrap();
+    let recording = wheel_recording::read(&path, &columns).unwrap().recording;
     assert_eq!((recording.events.len(), recording.references.len()), (steps as usize + 1, steps as usize + 1));
     let parameters = &recording.parameters;
     let mut odometer = VehicleOdometer::new(&parameters.vehicle, &parameters.odometer());
@@ -187,4 +190,41 @@ fn a_run_of_every_robot_is_dead_reckoned_from_its_log_as_from_its_table() {
         assert!(off < 2e-3 && turned.abs() < 2e-3, "{session}: {pose:?} is not {end:?}");
         assert!(end.x.hypot(end.y) > 0.02 || end.z.abs() > 0.5, "{session} goes nowhere");
     }
+}
+
+#[test]
+fn tables_of_other_countries_and_encodings_say_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..20).map(|row| format!("{},{},0.5,0,{}.5,500,1,179\n", 100 * row, 50 * row, row)).collect();
+    let text = format!("t,left,right,angle,seen,x,y,h\n{rows}");
+    let right = read(&table(&folder, &text), &columns()).unwrap();
+    let semicolons = text.replace(',', ";").replace('.', ",");
+    let wide = |order: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        std::iter::once(0xFEFF).chain(semicolons.encode_utf16()).flat_map(order).collect()
+    };
+    for (case, bytes) in [
+        ("semicolons and decimal commas", semicolons.clone().into_bytes()),
+        ("tabulators", text.replace(',', "\t").into_bytes()),
+        ("a stated separator", format!("sep=;\r\n{}", semicolons.replace('\n', "\r\n")).into_bytes()),
+        ("a byte order mark", [b"\xEF\xBB\xBF", text.as_bytes()].concat()),
+        ("UTF-16, low byte first", wide(u16::to_le_bytes)),
+        ("UTF-16, high byte first", wide(u16::to_be_bytes)),
+        ("remarks", format!("# made \"by hand\n{text}").into_bytes()),
+    ] {
+        let path = folder.path().join("drive.csv");
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(read(&path, &columns()).unwrap_or_else(|error| panic!("{case}: {error}")), right, "{case}");
+    }
+    // Rows of one time are told once, and a cut row not at all.
+    let doubled: String = text
+        .lines()
+        .flat_map(|line| [line, "\n", if line.starts_with("100,") { "100,50,0.5,0,,,,\n" } else { "" }])
+        .collect();
+    let (drive, account) = read_all(&table(&folder, &doubled), &columns()).unwrap();
+    assert_eq!(
+        (drive.steps.len(), account.left_out()[0].to_string().as_str()),
+        (19, "1 rows of the time of the row before, first at line 4")
+    );
+    let (drive, account) = read_all(&table(&folder, &text[..text.len() - 12]), &columns()).unwrap();
+    assert_eq!((drive.steps.len() >= 18, account.warnings().len()), (true, 1));
 }

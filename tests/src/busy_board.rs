@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use agv_controller::{Bus, BusOutput, EncoderNodes, Localization, SentPose, Told, Troubles};
+use agv_controller::{Bus, BusOutput, ControllerIdentity, EncoderNodes, Localization, SentPose, Told, Troubles};
 use agv_core::localizer::{Event, Localizer, PoseFix};
 use agv_core::measurement::Time;
 use agv_core::record::Record;
@@ -15,7 +15,7 @@ use agv_host_sim::log::Writer;
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::simulate::START;
 use agv_settings::Settings;
-use agv_wire::can::controller_node::{CarriedMap, WithoutSettings};
+use agv_wire::can::controller_node::WithoutSettings;
 use agv_wire::can::frame::Frame;
 
 /// When the vehicle drives off, ms.
@@ -43,7 +43,7 @@ impl Board {
         let mut localizer = <Localizer>::new(settings.parameters);
         localizer.add_landmarks(&recording.landmarks).unwrap();
         Self {
-            bus: Bus::new(&settings, "test", CarriedMap::default(), Troubles::default(), Time::default()),
+            bus: Bus::new(&settings, ControllerIdentity::default(), Troubles::default(), Time::default()),
             localization: Localization::new(localizer, &settings),
             told: VecDeque::new(),
             published: VecDeque::new(),
@@ -64,7 +64,7 @@ impl Board {
             BusOutput::Send(frame) => answers.push(frame),
             BusOutput::Event(event) => told.push_back(event),
             BusOutput::Published(pose) => published.push_back(pose),
-            BusOutput::Save => panic!("nobody wants that"),
+            BusOutput::Save(_) => panic!("nobody wants that"),
         };
         frames.extend(motion.poll(now));
         frames.extend(gyro.iter_mut().flat_map(|gyro| gyro.poll(now)));

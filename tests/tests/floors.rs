@@ -54,7 +54,7 @@ const HOUSES: [House; 8] = [
     House {
         folder: "settings",
         floors: &[
-            &["checksum", "vehicle"],
+            &["checksum", "laser", "patient_flash", "vehicle"],
             &["map_identity"],
             &["settings"],
             &["bus_load"],
@@ -83,8 +83,10 @@ const HOUSES: [House; 8] = [
         floors: &[
             &["contour_map"],
             &[
+                "account",
                 "bus",
                 "data",
+                "delimited",
                 "file_kind",
                 "hdl64e_packets",
                 "left_out",
@@ -94,9 +96,10 @@ const HOUSES: [House; 8] = [
                 "recording",
                 "setting_doubts",
                 "setting_meanings",
+                "wording",
             ],
             &["report"],
-            &["accuracy", "log", "replay", "ros", "text_file"],
+            &["accuracy", "log", "odometry_steps", "replay", "ros", "text_file"],
             &["drive", "simulate"],
             &["acceptance", "calibrate", "layout_check"],
             &["drive_check", "import"],
@@ -105,6 +108,7 @@ const HOUSES: [House; 8] = [
             &["layout_file"],
             &["serve"],
             &["emulate"],
+            &["run"],
         ],
     },
     House { folder: "firmware", floors: &[&["app"], &["board"]] },

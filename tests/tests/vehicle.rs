@@ -15,7 +15,7 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::Event;
 use agv_core::measurement::{EncoderFault, Time};
 use agv_core::state::{LaserHealth, Mode, Relocalization};
-use agv_host_sim::acceptance::{self, Verdict};
+use agv_host_sim::acceptance::{self, Halts, Verdict};
 use agv_host_sim::drive::{Figures, Track};
 use agv_host_sim::emulate::vehicle::{self, Driven, VehicleOptions, Watch};
 use agv_host_sim::link::service::{Client, ServiceError};
@@ -71,8 +71,9 @@ fn assert_replayed(drive: &Drive, least: usize) {
     assert_eq!(published.first_difference, None);
     assert!(published.compared >= least / 2, "{} poses were published", published.compared);
     let said = Comparisons { outputs: Some(comparison), published: Some(published) };
-    let figures = Figures::new(&contents.recording, &again, &Track::new(&contents.recording, &again));
-    let lines = acceptance::test(&figures, &contents.recording.landmarks, &said, &[]);
+    let track = Track::new(&contents.recording, &again);
+    let figures = Figures::new(&contents.recording, &again, &track);
+    let lines = acceptance::test(&figures, &track, &contents.recording.landmarks, &said, &Halts::default());
     assert_eq!((&*lines[0].what, lines[0].verdict), ("the same bits", Verdict::Pass), "{lines:?}");
 }
 

@@ -14,6 +14,8 @@ use agv_host_sim::emulate::vehicle::{self, VehicleOptions};
 use agv_host_sim::log;
 use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording, truth_at};
 use agv_host_sim::replay::{Replay, replay};
+#[cfg(target_os = "linux")]
+use agv_host_sim::run::{Demonstration, RealTime};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::view::{Shared, Timeline, follow, load, serve};
@@ -209,7 +211,7 @@ fn a_drive_in_emulation_is_looked_at() {
         let host = format!("127.0.0.1:{}", watch.stream_port);
         let pictures = pictures();
         found = browse(Timeline::of_controller(&host), "live", pictures.to_str().unwrap(), |shared, is_stopped| {
-            follow(&host, Some(&copy), shared, is_stopped).unwrap();
+            follow(&host, Some(&copy), shared, is_stopped, |_| ()).unwrap();
         });
     })
     .unwrap();
@@ -235,4 +237,37 @@ fn a_drive_in_emulation_is_looked_at() {
     }
     assert_eq!(found["found"]["again"]["live"], true);
     assert!(log::read_contents(&copy, |_| ()).unwrap().outputs.len() > 100);
+}
+
+/// The demonstration of `agv run`: the page shows a vehicle that moves.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_demonstration_is_looked_at() {
+    if !has_browser("a_demonstration_is_looked_at") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let is_stopped = Arc::new(AtomicBool::new(false));
+    let pictures = pictures().join("run");
+    std::fs::create_dir_all(&pictures).unwrap();
+    let mut found = Value::Null;
+    let demonstration = Demonstration::new().unwrap();
+    let remark = |text: &str| println!("{text}");
+    let summary = demonstration.run(folder.path(), RealTime::default(), None, &is_stopped, &remark, |running| {
+        let host = running.log.to_string();
+        let look = || {
+            browse(Timeline::of_controller(&host), "live", pictures.to_str().unwrap(), |shared, is_over| {
+                follow(&host, None, shared, is_over, |_| ()).unwrap();
+            })
+        };
+        // Whatever it shows, the demonstration ends.
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(look));
+        is_stopped.store(true, Ordering::Relaxed);
+        found = outcome.unwrap_or_default();
+    });
+    let summary = summary.unwrap();
+    assert!(summary.was_localised, "{summary:?}");
+    let place = |name: &str| ["x_m", "y_m"].map(|axis| number(&found["found"][name]["pose"][axis]));
+    let ([first_x, first_y], [second_x, second_y]) = (place("first"), place("second"));
+    assert!((first_x - second_x).hypot(first_y - second_y) > 0.05, "{found}");
 }

@@ -18,8 +18,20 @@ pub struct Fuzz {
 }
 
 /// Targets of the folder `fuzz`.
-const TARGETS: [&str; 8] =
-    ["cola_a", "cola_b", "canopen", "slcan", "log_reader", "velodyne_packet", "capture", "localizer"];
+const TARGETS: [&str; 12] = [
+    "cola_a",
+    "cola_b",
+    "canopen",
+    "slcan",
+    "log_reader",
+    "velodyne_packet",
+    "capture",
+    "localizer",
+    "can_log",
+    "scan_log",
+    "layout",
+    "table",
+];
 
 impl Fuzz {
     /// Every target, for so many seconds.

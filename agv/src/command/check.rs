@@ -53,16 +53,15 @@ impl Check {
         self.settings.apply(&mut recording.parameters)?;
         let name = self.log.display().to_string();
         if let Some(path) = &self.put_right {
-            let (right, offset) =
-                moved(&recording).with_context(|| format!("{name}: the laser's times are not off"))?;
+            let (right, late) = moved(&recording).with_context(|| format!("{name}: the laser's times are not off"))?;
             log::write(path, &right)?;
-            println!("{}: the laser's times moved by {:.1} ms", path.display(), -1e3 * offset.late);
+            println!("{}: the laser's times moved by {:.1} ms", path.display(), -1e3 * late);
             return Ok(());
         }
         let replay = replay(&recording, |_| ()).with_context(|| name.clone())?;
         let figures = Figures::new(&recording, &replay, &Track::new(&recording, &replay));
         let bar = progress::bar("looking", TRIES as u64);
-        let findings = check(&recording, &figures, &name, |done| bar.set_position(done as u64));
+        let findings = check(&recording, &replay, &figures, &name, |done| bar.set_position(done as u64));
         bar.finish_and_clear();
         let poor_share = poor_share(&figures);
         let damage: Vec<String> = damages.iter().map(ToString::to_string).collect();

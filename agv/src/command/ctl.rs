@@ -16,13 +16,14 @@ use anyhow::{Context, bail, ensure};
 use serde_json::json;
 
 use super::layout::map_rows;
+use super::layout_input;
 use super::output::{note, print_rows};
 use super::progress;
 use super::setting_text::{named, parse_value, show, show_setting, word};
 
 const HELP: &str = "\
 Reading needs nothing; changing needs the controller's key (64 hexadecimal digits in a file) and a vehicle that stands.
-Settings take effect with the next start, if they were stored.
+A setting that is changed counts from the next start on, once it is stored: set, store, reboot; apply does the first two.
 
 Examples:
   agv ctl 192.168.1.20 version
@@ -63,12 +64,12 @@ enum Action {
         /// Its name.
         name: String,
     },
-    /// Change a setting, until the next start unless it is stored.
+    /// Change a setting; it counts from the next start on, once it is stored.
     #[command(allow_negative_numbers = true)]
     Set {
         /// Its name.
         name: String,
-        /// A number, true or false, an IPv4 address, or a word of a list.
+        /// A number, on or off, an IPv4 address, or a word of a list.
         value: String,
     },
     /// Change the settings that a file of the vehicle's parameters states, show what changes, and keep them in flash.
@@ -240,7 +241,7 @@ fn apply(client: &mut Client, file: &Path, dry_run: bool) -> anyhow::Result<Vec<
     let outcome = match (changes.is_empty(), dry_run) {
         (true, _) => "nothing differs",
         (false, true) => "not changed",
-        (false, false) => "changed and stored; in effect after agv ctl HOST reboot",
+        (false, false) => "changed and stored; they count after agv ctl HOST reboot",
     };
     rows.push(["settings".to_owned(), outcome.to_owned()]);
     Ok(rows)
@@ -273,11 +274,12 @@ impl Ctl {
                     note(&format!("agv: {doubt}"));
                 }
                 client.set(name, value)?;
+                note("agv: changed; it counts after agv ctl HOST store and agv ctl HOST reboot");
             }
             Action::Apply { file, dry_run } => self.print(&apply(&mut client, file, *dry_run)?)?,
             Action::Store => client.store()?,
             Action::Map { action: MapAction::Upload { file } } => {
-                let landmarks = layout_file::landmarks(&layout_file::load(file)?);
+                let landmarks = layout_file::landmarks(&layout_input::load(file)?);
                 let progress = progress::bar("uploading", landmarks.len() as u64);
                 client.upload_map(&landmarks, |count| progress.inc(count as u64))?;
                 progress.finish_and_clear();

@@ -1,7 +1,7 @@
 //! What there is to say about a replayed log, as JSON.
 
 use agv_core::record::Damage;
-use agv_host_sim::drive::Figures;
+use agv_host_sim::drive::{Figures, Grade};
 use agv_host_sim::replay::Comparisons;
 use serde::Serialize;
 
@@ -10,6 +10,8 @@ use serde::Serialize;
 pub struct DriveSummary<'a> {
     /// Program that wrote the log.
     software: &'a str,
+    /// How the drive is to be seen at a glance.
+    grade: Grade,
     #[serde(flatten)]
     figures: &'a Figures,
     #[serde(flatten)]
@@ -37,6 +39,12 @@ impl<'a> DriveSummary<'a> {
             skipped: damage.skipped,
             reason: damage.reason.to_string(),
         };
-        Self { software, figures, comparisons, damage: damages.iter().map(entry).collect() }
+        Self {
+            software,
+            grade: figures.fitness.grade(),
+            figures,
+            comparisons,
+            damage: damages.iter().map(entry).collect(),
+        }
     }
 }

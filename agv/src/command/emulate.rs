@@ -137,7 +137,7 @@ impl Emulate {
             let [program, arguments @ ..] = &self.chip[..] else { bail!("which program emulates the chip?") };
             let mut command = Command::new(program);
             command.args(arguments);
-            let options = InChipOptions { contours, is_not_told: self.untold };
+            let options = InChipOptions { contours, is_not_told: self.untold, ..InChipOptions::default() };
             let InChip { driven, stack } = vehicle::drive_in_chip(recording, command, folder, seconds, options)?;
             return Ok((driven, Some(stack)));
         };

@@ -2,35 +2,35 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Duration;
 
 use agv_core::geometry::Pose;
+use agv_host_sim::account::Account;
 use agv_host_sim::import::raw::{self, RawBytes};
 #[cfg(feature = "bags")]
 use agv_host_sim::import::ros;
 use agv_host_sim::import::{
-    self, ScanLog, candump, capture, carmen, carmen::TimeDefects, carpark, graph_log, optiodom, sapienza,
-    wheel_recording,
+    self, ImportSummary, Imported, ScanLog, can_log, capture, carmen, carmen::TimeDefects, carpark, graph_log,
+    optiodom, overheard, sapienza, wheel_recording,
 };
-use agv_host_sim::recording::Recording;
-use agv_host_sim::{file_kind, log};
-use anyhow::{Context, bail, ensure};
+use agv_host_sim::{file_kind, log, text_file};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::ValueEnum;
-use flate2::read::MultiGzDecoder;
 use indicatif::ProgressBar;
 
 use super::encoder_arguments::EncoderArguments;
+use super::import_summary;
 use super::like;
-use super::output::note;
 use super::pose_argument;
 use super::progress;
-use super::summary::Summary;
 
 const HELP: &str = "\
 Examples:
   agv import auto fr079.log --output fr079.agvlog
   agv import carpark shared/data/carpark --output carpark.agvlog
   agv import candump candump-2026-05-04.log --like hall.agvlog --output encoders.agvlog
+  agv import candump two_buses.asc --interface 2 --like hall.agvlog --output encoders.agvlog
   agv import capture nav350.pcapng --like hall.agvlog --output laser.agvlog
   agv import mcap drive.mcap --output drive.agvlog
   agv import rosbag2 rosbag2_2026_05_04 --scan-topic /front/scan --laser 1.2,0,0 --output drive.agvlog
@@ -80,9 +80,19 @@ pub struct Import {
     /// Where the laser is on the vehicle, m, m and deg, for recordings of ROS 2; as their transforms say if absent.
     #[arg(long, value_name = "X,Y,HEADING", value_parser = pose_argument::pose, allow_hyphen_values = true)]
     laser: Option<Pose>,
+    /// Field of view of the FLASER and RLASER lines of a CARMEN log, deg; as its PARAM lines say if absent, or else half a turn.
+    #[arg(long, value_name = "DEG", value_parser = field_of_view)]
+    field_of_view: Option<f64>,
+    /// Interface or channel of the encoders in a log of several buses.
+    #[arg(long, value_name = "NAME")]
+    interface: Option<String>,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
+    /// End with exit code 3 if there is a warning: more than 2 % was left out, a sensor was silent for over a second, the times of two
+    /// sensors do not overlap, or something was cut or doubtful.
+    #[arg(long)]
+    strict: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -99,7 +109,8 @@ enum Format {
     Optiodom,
     /// CARMEN log, plain or compressed (.gz): FLASER or ROBOTLASER1, and ODOM.
     Carmen,
-    /// Log of candump -l: what two encoders said on a CAN bus.
+    /// Log of a CAN bus: of candump, of Vector (.asc) or of PEAK (.trc); what encoders said there.
+    #[value(alias = "asc", alias = "trc", alias = "can")]
     Candump,
     /// Network capture, pcap or pcapng: what a NAV350 and its host said over TCP.
     Capture,
@@ -115,7 +126,7 @@ enum Format {
 
 impl Import {
     /// Runs the command.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(self) -> anyhow::Result<ExitCode> {
         // Before a reader looks for files in a folder that is not there.
         let is_missing = self.input.try_exists().is_ok_and(|exists| !exists);
         ensure!(!is_missing, "{}: there is no such file or folder", self.input.display());
@@ -126,47 +137,95 @@ impl Import {
         // Shown on a terminal only, and gone when an error is reported.
         let progress = progress::spinner().with_message(format!("reading {}", self.input.display()));
         progress.enable_steady_tick(Duration::from_millis(100));
-        let recording = match format {
-            Format::Candump => return self.import_raw(&progress, candump_bytes(&self.input)?),
-            Format::Capture => return self.import_raw(&progress, self.capture()?),
+        let whole = |recording| Imported { recording, account: Account::default() };
+        let found = match format {
+            Format::Candump => self.can_drive(&progress)?,
+            Format::Capture => self.captured_drive(&progress)?,
             Format::Raw => self.raw_drive()?,
             Format::Mcap | Format::Rosbag2 => self.ros_drive()?,
-            Format::Carpark => carpark::read(&self.input, &carpark::WINDOW)?,
-            Format::Sapienza => sapienza::read(&self.input)?,
+            Format::Carpark => whole(carpark::read(&self.input, &carpark::WINDOW)?),
+            Format::Sapienza => whole(sapienza::read(&self.input)?),
             Format::Csv => self.table()?,
-            Format::Optiodom => optiodom::read_run(&self.input)?,
+            Format::Optiodom => whole(optiodom::read_run(&self.input)?),
             Format::Carmen => self.carmen_drive()?,
             Format::Graph => self.graph_drive()?,
             Format::Auto => unreachable!("the format has been found above"),
         };
-        progress.set_message(format!("writing {}", self.output.display()));
-        log::write(&self.output, &recording)?;
+        // What came over a link is written with its bytes.
+        if !matches!(format, Format::Candump | Format::Capture) {
+            progress.set_message(format!("writing {}", self.output.display()));
+            log::write(&self.output, &found.recording)?;
+        }
         progress.finish_and_clear();
-        Summary::of(&recording).print(self.json)
+        let summary = ImportSummary::of(&found.recording, &found.account);
+        import_summary::print(&self.input, &summary, self.json)?;
+        Ok(import_summary::exit_code(&summary.warnings, self.strict))
     }
 }
 
 impl Import {
+    /// The frames of a log of a bus, and what they mean.
+    fn can_drive(&self, progress: &ProgressBar) -> anyhow::Result<Imported> {
+        let like = like::drive_like(self.like.as_deref())?;
+        let nodes = self.encoders.nodes(&like.parameters.vehicle);
+        let encoders = overheard::encoders(&nodes, &like.parameters.vehicle);
+        let mut log = can_log::read(&self.input)?;
+        let ids: Vec<_> = encoders.iter().map(|encoder| encoder.id).collect();
+        can_log::choose_interface(&mut log, self.interface.as_deref(), &ids).map_err(|found| {
+            let (input, found) = (self.input.display(), found.join(", "));
+            match &self.interface {
+                Some(wanted) => {
+                    anyhow!("{input}: there are no frames of interface {wanted}; --interface can be {found}")
+                }
+                None => anyhow!(
+                    "{input}: the encoders are heard on several interfaces: choose one of {found} with --interface"
+                ),
+            }
+        })?;
+        let can_log::CanLog { frames, account } = log;
+        let bytes: Vec<_> = frames.iter().filter_map(|seen| Some(RawBytes::of_can(seen.time?, &seen.frame))).collect();
+        let mut found = self.import_raw(progress, &bytes, account)?;
+        overheard::account(&found.recording, &bytes, &encoders, &mut found.account);
+        Ok(found)
+    }
+
+    fn captured_drive(&self, progress: &ProgressBar) -> anyhow::Result<Imported> {
+        let ports = self.port.map_or(capture::PORTS.to_vec(), |port| vec![port]);
+        let captured = capture::read(&self.input, &ports)?;
+        let mut account = Account::default();
+        if captured.lost > 0 {
+            account.warn(format!("{} bytes of the connection were not captured", captured.lost));
+        }
+        account.set_aside("connections beside the main one", captured.left_out);
+        captured.seen.tell(&mut account);
+        self.import_raw(progress, &captured.raw, account)
+    }
+
     /// Writes raw bytes and what they mean.
-    fn import_raw(&self, progress: &ProgressBar, bytes: Vec<RawBytes>) -> anyhow::Result<()> {
+    fn import_raw(&self, progress: &ProgressBar, bytes: &[RawBytes], account: Account) -> anyhow::Result<Imported> {
         progress.set_message(format!("writing {}", self.output.display()));
-        let mut drive = like::drive_like(self.like.as_deref())?;
-        let nodes = self.encoders.nodes(&drive.parameters.vehicle);
-        if !raw::means_something(&drive, &bytes, &nodes) {
+        let mut recording = like::drive_like(self.like.as_deref())?;
+        let nodes = self.encoders.nodes(&recording.parameters.vehicle);
+        if !raw::means_something(&recording, bytes, &nodes) {
             let like = if self.like.is_none() { "state the vehicle with --like LOG, and " } else { "" };
+            let talking = overheard::talking_nodes(bytes);
+            let talking = if talking.is_empty() {
+                "no node tells anything where encoders do".to_owned()
+            } else {
+                format!("what may be positions comes from node {}", listed(&talking))
+            };
             bail!(
-                "{}: no position of two encoders and no revolution of a laser is in it; {like}the nodes with --drive and \
+                "{}: no position of two encoders and no revolution of a laser is in it; {talking}; {like}the nodes with --drive and \
                  --steering",
                 self.input.display()
             );
         }
-        raw::write(&self.output, &mut drive, &bytes, &nodes)?;
-        progress.finish_and_clear();
-        Summary::of(&drive).print(self.json)
+        raw::write(&self.output, &mut recording, bytes, &nodes)?;
+        Ok(Imported { recording, account })
     }
 
     #[cfg(feature = "bags")]
-    fn ros_drive(&self) -> anyhow::Result<Recording> {
+    fn ros_drive(&self) -> anyhow::Result<Imported> {
         let Self { scan_topic, odometry_topic, imu_topic, laser, .. } = self;
         let (scan, odometry, imu) = (scan_topic.clone(), odometry_topic.clone(), imu_topic.clone());
         let choice = ros::Choice { scan, odometry, imu, laser: *laser };
@@ -174,71 +233,53 @@ impl Import {
     }
 
     #[cfg(not(feature = "bags"))]
-    fn ros_drive(&self) -> anyhow::Result<Recording> {
+    fn ros_drive(&self) -> anyhow::Result<Imported> {
         bail!(agv_host_sim::left_out::BAGS)
     }
 
-    fn capture(&self) -> anyhow::Result<Vec<RawBytes>> {
-        let ports = self.port.map_or(capture::PORTS.to_vec(), |port| vec![port]);
-        let found = capture::read(&self.input, &ports)?;
-        let input = self.input.display();
-        if found.lost > 0 {
-            note(&format!("agv: {input}: {} bytes of the connection were not captured", found.lost));
-        }
-        if found.left_out > 0 {
-            note(&format!("agv: {input}: {} connections beside the main one are left out", found.left_out));
-        }
-        if found.is_cut {
-            note(&format!("agv: {input}: the capture is cut off or damaged behind packet {}", found.packets));
-        }
-        Ok(found.raw)
+    fn carmen_drive(&self) -> anyhow::Result<Imported> {
+        let field_of_view = self.field_of_view.map(f64::to_radians);
+        let log = carmen::read_with(&self.input, field_of_view)?;
+        let mut found = scan_drive(&self.input, "CARMEN", &log.front, &log.defects)?;
+        found.account.merge(log.account);
+        found.account.set_aside("scans of the rear laser", log.rear.len());
+        Ok(found)
     }
 
-    fn carmen_drive(&self) -> anyhow::Result<Recording> {
-        let log = carmen::read(&self.input)?;
-        self.note_times(&log.defects);
-        drive(&self.input, "CARMEN", &log.front)
-    }
-
-    fn graph_drive(&self) -> anyhow::Result<Recording> {
+    fn graph_drive(&self) -> anyhow::Result<Imported> {
         let graph = graph_log::read(&self.input)?;
-        self.note_times(&graph.defects);
-        drive(&self.input, "pose-graph", &graph.log)
+        let mut found = scan_drive(&self.input, "pose-graph", &graph.log, &graph.defects)?;
+        found.account.merge(graph.account);
+        found.account.note("the differences of the corrected poses serve as odometry");
+        Ok(found)
     }
 
-    fn note_times(&self, defects: &TimeDefects) {
-        if !defects.is_none() {
-            note(&format!("agv: {}: {defects}", self.input.display()));
-        }
-    }
-
-    fn table(&self) -> anyhow::Result<Recording> {
+    fn table(&self) -> anyhow::Result<Imported> {
         let columns = self.columns.as_deref().context("--columns: a file that says what the columns are is needed")?;
         Ok(wheel_recording::read(&self.input, columns)?)
     }
 
-    fn raw_drive(&self) -> anyhow::Result<Recording> {
+    fn raw_drive(&self) -> anyhow::Result<Imported> {
         let (like, _) = log::read(&self.input)?;
         let nodes = self.encoders.nodes(&like.parameters.vehicle);
         let (recording, damages) = raw::read_drive(&self.input, &nodes)?;
-        for damage in &damages {
-            note(&format!("agv: {}: {damage}", self.input.display()));
-        }
+        let mut account = Account::default();
+        damages.iter().for_each(|damage| account.warn(damage.to_string()));
         if recording.events.is_empty() {
             bail!("{}: there are no raw bytes in the log that mean anything", self.input.display());
         }
-        Ok(recording)
+        Ok(Imported { recording, account })
     }
 }
 
-/// The frames of a log of candump.
-fn candump_bytes(input: &Path) -> anyhow::Result<Vec<RawBytes>> {
-    let frames = candump::read(input)?;
-    let bytes: Vec<_> = frames.iter().filter_map(|seen| Some(RawBytes::of_can(seen.time?, &seen.frame))).collect();
-    if bytes.is_empty() {
-        bail!("{}: no frame in it has a time", input.display());
-    }
-    Ok(bytes)
+/// An angle that a laser can see, deg.
+fn field_of_view(text: &str) -> Result<f64, String> {
+    let stated = text.parse::<f64>().ok().filter(|angle| *angle > 0.0 && *angle <= 360.0);
+    stated.ok_or_else(|| "a field of view is an angle over 0 and up to 360 deg".to_owned())
+}
+
+fn listed(nodes: &[u8]) -> String {
+    nodes.iter().map(u8::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// What the input looks like.
@@ -248,10 +289,13 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
         if input.join("laser_ranges_m.csv").exists() {
             return Ok(Format::Carpark);
         }
-        if input.join("metadata.yaml").exists() {
+        if is_bag(input) {
             return Ok(Format::Rosbag2);
         }
-        bail!("{}: this folder holds neither the car park tables nor a recording of rosbag2", input.display());
+        bail!(
+            "{}: this folder holds neither the car park tables (laser_ranges_m.csv) nor a recording of rosbag2 (metadata.yaml, .mcap, .db3)",
+            input.display()
+        );
     }
     let beginning = beginning(input).with_context(|| input.display().to_string())?;
     if beginning.is_empty() {
@@ -266,32 +310,40 @@ fn detect(input: &Path) -> anyhow::Result<Format> {
     if beginning.starts_with(b"SQLite format 3") {
         return Ok(Format::Rosbag2);
     }
-    let mut unpacked = Vec::new();
-    // What is not compressed, or cut, is looked at as far as it goes.
-    let _ = MultiGzDecoder::new(&beginning[..]).read_to_end(&mut unpacked);
-    let text = if unpacked.is_empty() { &beginning } else { &unpacked };
-    let begins_line = |word: &str| text.split(|byte| *byte == b'\n').any(|line| line.starts_with(word.as_bytes()));
+    let text = text_file::beginning_of(&beginning);
+    let begins_line = |word: &str| text.lines().any(|line| line.starts_with(word));
     if begins_line(sapienza::SIGNATURE) {
         Ok(Format::Sapienza)
     } else if begins_line("VERTEX2 ") {
         Ok(Format::Graph)
-    } else if ["PARAM ", "FLASER ", "ROBOTLASER1 ", "ODOM "].into_iter().any(begins_line) {
+    } else if ["PARAM ", "FLASER ", "ROBOTLASER1 ", "RAWLASER1 ", "ODOM "].into_iter().any(begins_line) {
         Ok(Format::Carmen)
-    } else if first_line(text).is_some_and(|line| candump::parse_line(line).is_some()) {
+    } else if can_log::is_one(&text) {
         Ok(Format::Candump)
     } else {
         bail!("{}: this is no known recording but {}", input.display(), file_kind::describe(&beginning))
     }
 }
 
-fn first_line(text: &[u8]) -> Option<&str> {
-    text.split(|byte| *byte == b'\n')
-        .find_map(|line| std::str::from_utf8(line).ok().filter(|line| !line.trim().is_empty()))
+#[cfg(feature = "bags")]
+fn is_bag(folder: &Path) -> bool {
+    agv_host_sim::ros::is_recording(folder)
+}
+
+#[cfg(not(feature = "bags"))]
+fn is_bag(folder: &Path) -> bool {
+    folder.join("metadata.yaml").exists()
 }
 
 /// The drive in a log of scans.
-fn drive(input: &Path, kind: &str, log: &ScanLog) -> anyhow::Result<Recording> {
-    import::drive(log).with_context(|| format!("{}: there are no scans of a {kind} log in the file", input.display()))
+fn scan_drive(input: &Path, kind: &str, log: &ScanLog, defects: &TimeDefects) -> anyhow::Result<Imported> {
+    let recording = import::drive(log)
+        .with_context(|| format!("{}: there are no scans of a {kind} log in the file", input.display()))?;
+    let mut account = Account::default();
+    if !defects.is_none() {
+        account.warn(defects.to_string());
+    }
+    Ok(Imported { recording, account })
 }
 
 /// The first few kilobytes of a file.

@@ -1,24 +1,27 @@
 //! `agv layout`.
 
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use agv_core::geometry::Point;
 use agv_core::localizer::ReflectorParameters;
 use agv_core::maps::Landmark;
-use agv_host_sim::layout_check::{CheckOptions, Finding, REFLECTORS, check, page};
-use agv_host_sim::layout_file;
+use agv_host_sim::layout_check::{CheckOptions, Finding, check, page};
+use agv_host_sim::layout_file::{self, LoadedLayout, Reading, Unit};
 use agv_host_sim::mapping::map_file;
 use agv_settings::map_identity;
+use agv_wire::nav350::IdentifiedLandmark;
 use anyhow::Context;
 
-use super::output;
+use super::{import_summary, layout_input, output};
 
 const EXAMPLES: &str = "\
 Examples:
   agv layout check hall.imk --report hall
   agv layout identity hall.imk
   agv layout convert hall.imk hall.dxf
-  agv layout convert drawing.dxf hall.csv --map";
+  agv layout convert drawing.dxf hall.csv --map
+  agv layout convert survey.dxf hall.imk --unit m --origin 691600,5334700 --layer REFLECTORS";
 
 /// Look at a layout of reflectors.
 #[derive(clap::Args)]
@@ -47,7 +50,7 @@ struct Identity {
 
 impl Identity {
     fn run(self) -> anyhow::Result<()> {
-        let landmarks = layout_file::landmarks(&layout_file::load(&self.input)?);
+        let landmarks = layout_file::landmarks(&layout_input::load(&self.input)?);
         if self.json {
             println!(
                 "{}",
@@ -78,35 +81,60 @@ struct Convert {
     /// Write a map, as 'agv replay --map' takes it, instead of a layout.
     #[arg(long)]
     map: bool,
+    /// Unit of the coordinates: mm, cm, m, in or ft; as the file says if absent.
+    #[arg(long)]
+    unit: Option<Unit>,
+    /// Point of the file that becomes the origin, m; for coordinates of a whole country.
+    #[arg(long, value_name = "X,Y", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<[f64; 2]>,
+    /// The only layer of a drawing whose points, circles and blocks are reflectors; all that are shown if absent.
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
+    /// End with exit code 3 if there is a warning.
+    #[arg(long)]
+    strict: bool,
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }
 
 impl Convert {
-    fn run(self) -> anyhow::Result<()> {
-        let layout = layout_file::load(&self.input)?;
+    fn run(self) -> anyhow::Result<ExitCode> {
+        let reading = Reading { unit: self.unit, origin: self.origin, layer: self.layer };
+        let LoadedLayout { landmarks: layout, account } = layout_file::load_as(&self.input, &reading)?;
         if self.map {
             map_file::write(&self.output, &layout_file::landmarks(&layout))?;
         } else {
             layout_file::save(&self.output, &layout)?;
         }
-        if self.json {
-            println!("{}", serde_json::json!({ "landmarks": layout.len() }));
-        } else {
-            output::print_rows(&[["landmarks".to_owned(), layout.len().to_string()]]);
-        }
-        Ok(())
+        let rows = [["landmarks".to_owned(), layout.len().to_string()]];
+        import_summary::print_account(
+            &self.input,
+            &rows,
+            serde_json::json!({ "landmarks": layout.len() }),
+            &account,
+            self.json,
+        )?;
+        Ok(import_summary::exit_code(&account.warnings(), self.strict))
+    }
+}
+
+/// Two coordinates, m.
+fn origin(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|word| word.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y] if x.is_finite() && y.is_finite() => Ok([x, y]),
+        _ => Err("an origin is two numbers, X,Y".to_owned()),
     }
 }
 
 impl Layout {
     /// Runs the command.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.action {
-            Action::Check(check) => check.run(),
+            Action::Check(check) => check.run().map(|()| ExitCode::SUCCESS),
             Action::Convert(convert) => convert.run(),
-            Action::Identity(identity) => identity.run(),
+            Action::Identity(identity) => identity.run().map(|()| ExitCode::SUCCESS),
         }
     }
 }
@@ -152,7 +180,7 @@ struct Check {
 
 impl Check {
     fn run(self) -> anyhow::Result<()> {
-        let positions = reflectors(&self.layout)?;
+        let (positions, names): (Vec<_>, Vec<_>) = reflectors(&self.layout)?.into_iter().unzip();
         anyhow::ensure!(!positions.is_empty(), "{} has no reflectors", self.layout.display());
         let options = CheckOptions {
             spacing: self.spacing,
@@ -161,12 +189,11 @@ impl Check {
             closest: self.closest,
             noise: ReflectorParameters::default(),
         };
-        let check = check(&positions, &options)
-            .map_err(|_| anyhow::anyhow!("{} has more than {REFLECTORS} reflectors", self.layout.display()))?;
+        let check = check(&positions, &options).with_context(|| self.layout.display().to_string())?;
         if let Some(folder) = &self.report {
             let name = self.layout.file_name().unwrap_or_default().to_string_lossy();
             let path = folder.join("index.html");
-            let page = page(&name, &positions, &options, &check)?;
+            let page = page(&name, &positions, &names, &options, &check)?;
             page.write(&path).with_context(|| path.display().to_string())?;
         }
         if self.json {
@@ -184,6 +211,7 @@ impl Check {
                 Finding::Resembles { x_m, y_m, heading_deg } => {
                     format!("looks like ({x_m:.1}, {y_m:.1}) m turned by {heading_deg:.0}°")
                 }
+                Finding::TooFew if place.seen == 1 => "sees 1 reflector only".to_owned(),
                 Finding::TooFew => format!("sees {} reflectors only", place.seen),
                 Finding::Unknown | Finding::Unique => "has no clear answer".to_owned(),
             };
@@ -199,9 +227,11 @@ impl Check {
 /// Places and movements that are printed at the most.
 const SHOWN: usize = 10;
 
-fn reflectors(path: &Path) -> anyhow::Result<Vec<Point>> {
-    let layout = layout_file::load(path)?;
-    Ok(layout.iter().map(|entry| Point::new(entry.landmark.x.metres(), entry.landmark.y.metres())).collect())
+/// Where each is, and its name.
+fn reflectors(path: &Path) -> anyhow::Result<Vec<(Point, String)>> {
+    let layout = layout_input::load(path)?;
+    let place = |entry: &IdentifiedLandmark| Point::new(entry.landmark.x.metres(), entry.landmark.y.metres());
+    Ok(layout.iter().map(|entry| (place(entry), entry.id.to_string())).collect())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -19,7 +19,9 @@ pub mod evaluate;
 pub mod export;
 pub mod features;
 pub mod import;
+mod import_summary;
 pub mod layout;
+mod layout_input;
 pub mod lidar3d;
 mod like;
 pub mod manual;
@@ -35,6 +37,8 @@ pub mod provision;
 pub mod record;
 pub mod replay;
 pub mod report;
+#[cfg(unix)]
+pub mod run;
 mod setting_arguments;
 mod setting_text;
 pub mod settings;

@@ -20,6 +20,7 @@ use agv_wire::nav350::{
 use anyhow::{Context, bail, ensure};
 use clap::Subcommand;
 
+use super::layout_input;
 use super::output::{note, print_rows};
 
 const HELP: &str = "\
@@ -140,12 +141,12 @@ impl Nav350 {
                 print(&[row("landmarks", landmarks.len())], self.json)
             }
             Command::Layout { command: LayoutCommand::Upload { host, file } } => {
-                let landmarks = layout_file::load(&file)?;
+                let landmarks = layout_input::load(&file)?;
                 upload(&mut Client::connect(&address(&host))?, &landmarks)?;
                 print(&[row("landmarks", landmarks.len())], self.json)
             }
             Command::Layout { command: LayoutCommand::Convert { input, output } } => {
-                let landmarks = layout_file::load(&input)?;
+                let landmarks = layout_input::load(&input)?;
                 layout_file::save(&output, &landmarks)?;
                 print(&[row("landmarks", landmarks.len())], self.json)
             }

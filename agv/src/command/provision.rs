@@ -12,6 +12,7 @@ use anyhow::Context;
 use serde_json::json;
 
 use super::ctl::read_key;
+use super::layout_input;
 use super::output::{note, print_rows};
 use super::setting_arguments::SettingArguments;
 use super::setting_text::show_setting;
@@ -68,7 +69,7 @@ impl Provision {
             None => (Settings::default(), Vec::new()),
         };
         if let Some(map) = &self.map {
-            landmarks = layout_file::landmarks(&layout_file::load(map)?);
+            landmarks = layout_file::landmarks(&layout_input::load(map)?);
         }
         self.settings.change(&mut settings)?;
         let doubts = doubts(&settings);

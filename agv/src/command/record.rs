@@ -4,9 +4,11 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use agv_controller::EncoderNodes;
 use agv_core::localizer::Parameters;
 use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
+use agv_core::odometry::Vehicle;
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::link::nav350::{Link, address};
 use agv_host_sim::live::{self, CanSummary, Limits, LiveError, Recorder, Summary};
@@ -103,7 +105,7 @@ impl Record {
             let can = scope.spawn(|| {
                 let outcome = self.record_can(&parameters, clock, &limits, &is_stopped, &recorder);
                 // The other sensor is not to be recorded for hours without the bus.
-                if !outcome.as_ref().is_ok_and(|can| self.can.is_none() || can.frames > 0) {
+                if !outcome.as_ref().is_ok_and(|can| self.can.is_none() || can.samples > 0) {
                     is_stopped.store(true, Ordering::Relaxed);
                 }
                 outcome
@@ -127,10 +129,7 @@ impl Record {
         let can = can.ok().context("the recording of the bus broke down")??;
         let nav350 = nav350?;
         let seconds = clock.now().since(start);
-        self.complain(&nav350, &can, seconds, has_data)?;
-        if self.can.is_some() && can.samples == 0 {
-            note("agv: frames came, but no sample of two encoders; --drive and --steering state their nodes");
-        }
+        self.complain(&parameters, &nav350, &can, seconds, has_data)?;
         self.print(&Recorded {
             scans: nav350.scans,
             reflector_sets: nav350.reflectors,
@@ -144,7 +143,14 @@ impl Record {
     }
 
     /// What is wrong if a sensor has measured nothing.
-    fn complain(&self, nav350: &Summary, can: &CanSummary, seconds: f64, has_data: bool) -> anyhow::Result<()> {
+    fn complain(
+        &self,
+        parameters: &Parameters,
+        nav350: &Summary,
+        can: &CanSummary,
+        seconds: f64,
+        has_data: bool,
+    ) -> anyhow::Result<()> {
         let mut silent = Vec::new();
         if let Some(host) = &self.nav350
             && nav350.is_empty()
@@ -157,7 +163,14 @@ impl Record {
         {
             silent.push(format!("{name}: no frame came in {seconds:.0} s"));
         }
-        let kept = if has_data { "what the other said is in" } else { "nothing is written to" };
+        if let Some(name) = &self.can
+            && can.frames > 0
+            && can.samples == 0
+        {
+            let nodes = self.encoders.nodes(&parameters.vehicle);
+            silent.push(format!("{name}: {}", no_sample(can, &nodes, &parameters.vehicle)));
+        }
+        let kept = if has_data { "what came is in" } else { "nothing is written to" };
         ensure!(silent.is_empty(), "{}; {kept} {}", silent.join("; "), self.output.display());
         Ok(())
     }
@@ -215,4 +228,20 @@ impl Record {
         }
         Ok(())
     }
+}
+
+/// What is heard instead of the encoders.
+fn no_sample(can: &CanSummary, nodes: &EncoderNodes, vehicle: &Vehicle) -> String {
+    let list = |numbers: &[u8]| numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let wanted: Vec<u8> =
+        nodes.encoders.iter().take(vehicle.counters().len().max(2)).map(|node| node.number()).collect();
+    let heard = match &can.heard()[..] {
+        [] => "none of them of a node of CANopen".to_owned(),
+        heard => format!("of the nodes {}", list(heard)),
+    };
+    format!(
+        "{} frames came, {heard}, and no sample of the nodes {}: state them with --drive and --steering",
+        can.frames,
+        list(&wanted)
+    )
 }

@@ -42,12 +42,15 @@ Examples:
 
 Keys of --json:
   software, duration_s, way_m, events, poses, realtime_factor,
-  modes [mode, duration_s], mode_changes [time_s, mode, reason],
-  observations [kind, accepted, gated, ambiguous, unknown, out_of_time],
+  fitness {travel_share, docking_share, pose_share, lost, lost_s, level_position_mm, level_heading_deg, corrections,
+    largest_correction_mm, beyond_level [beyond, compared]}, grade (good, partly, poor),
+  modes [mode, duration_s], mode_changes [time_s, since_start_s, mode, reason],
+  observations [kind, accepted, gated, ambiguous, unknown, out_of_time], contours {scans, matched},
   innovations [kind, rms_first_mm, rms_second_mm, rms_bearing_deg, mean_normalised_square],
   accuracy {against, compared, position_mm, position_end_mm, heading_deg, heading_end_deg, nees, ok_share},
   outputs {compared, first_difference}, published {compared, first_difference}, damage [offset, skipped, reason].
-accuracy is null if nobody knows where the vehicle was; outputs, and published for the poses that the vehicle was given, are null
+Shares are of the recorded time; the level is null where the error has no bound. accuracy and beyond_level are null if nobody knows
+where the vehicle was; outputs, and published for the poses that the vehicle was given, are null
 if the log holds none that can be compared.";
 
 /// Run the localiser on a log.
@@ -283,7 +286,10 @@ const STATED_DEVIATIONS: (f64, f64) = (0.3, 5.0 * std::f64::consts::PI / 180.0);
 /// Standard deviations of a start pose that has been measured, m and rad.
 const RECORDED_DEVIATIONS: (f64, f64) = (0.05, 1.0 * std::f64::consts::PI / 180.0);
 
-/// Puts a start pose before all events; other poses that the log gives stay.
+/// A pose that the log gives in the first moment is that of the start, s.
+const FIRST_MOMENT: f64 = 1.0;
+
+/// Puts a start pose before all events, instead of those that the log gives in the first moment; others stay.
 fn set_start(recording: &mut Recording, answers: &[RecordedOutput], start: Start) -> anyhow::Result<()> {
     let answer = || {
         let is_known = |answer: &&RecordedOutput| !matches!(answer.pose.mode, Mode::NotLocalised | Mode::Lost);
@@ -304,6 +310,15 @@ fn set_start(recording: &mut Recording, answers: &[RecordedOutput], start: Start
         }
     };
     let fix = PoseFix { time, pose, position_deviation, heading_deviation };
+    // By their arrival: the time of a pose that is to be replaced may be that of another clock.
+    let end = time.offset(FIRST_MOMENT);
+    let is_past = |event: &RecordedEvent| !event.is_told() && event.time().is_some_and(|other| other > end);
+    let moment = recording.events.iter().position(is_past).unwrap_or(recording.events.len());
+    let mut index = 0;
+    recording.events.retain(|event| {
+        index += 1;
+        !(event.is_told() && index <= moment)
+    });
     // Behind what happened before: a pose from the future is not believed.
     let is_later = |event: &RecordedEvent| event.time().is_some_and(|other| other >= time);
     let place = recording.events.iter().position(is_later).unwrap_or(recording.events.len());

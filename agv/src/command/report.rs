@@ -50,6 +50,7 @@ impl Report {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
         ensure!(self.logs.len() <= MOST, "at most {MOST} logs fit side by side");
+        output::check_files(std::iter::once(&self.output).chain(&self.pdf))?;
         let replayed: Vec<_> = self.logs.iter().map(|path| replayed(path)).collect::<Result<_, _>>()?;
         let (mut drives, about): (Vec<_>, Vec<_>) = replayed.into_iter().unzip();
         name_apart(&mut drives, &self.logs);

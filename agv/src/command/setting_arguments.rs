@@ -8,7 +8,7 @@ use agv_wire::can::bit_timing::BIT_RATES;
 use anyhow::{Context, bail, ensure};
 
 use super::output::note;
-use super::setting_text::{named, parse_value, show_number};
+use super::setting_text::{named, parse_value, show_number, show_setting};
 
 /// Options of the commands that take settings.
 #[derive(clap::Args)]
@@ -51,6 +51,10 @@ impl SettingArguments {
                 settings.vehicle.kind.name()
             );
         }
+        let show = |name| Leaf::named(name).map_or_else(String::new, |leaf| show_setting(name, leaf.value(settings)));
+        if let Some([leaf, other]) = settings.contradicting_pair().filter(|_| !self.is_empty()) {
+            bail!("{leaf} ({}) does not go with {other} ({})", show(leaf), show(other));
+        }
         match settings.check() {
             Err(Contradiction { cause: Cause::BusLoad, .. }) => bail!(
                 "the CAN bus would be loaded by {:.0} % of its bit rate, more than 60 %; it needs a longer \
@@ -60,11 +64,13 @@ impl SettingArguments {
             Err(Contradiction { leaf: leaf @ "can.bit_rate", .. }) => {
                 bail!("{leaf} must be one of {BIT_RATES:?} kbit/s, not {}", settings.bit_rate)
             }
-            Err(Contradiction { leaf, .. }) if leaf.starts_with("can.") || leaf.starts_with("vehicle.wheel_") => {
-                bail!("{leaf} does not go with the other settings")
+            Err(Contradiction { leaf, other: Some(other), .. }) => {
+                bail!("{leaf} ({}) does not go with {other} ({})", show(leaf), show(other))
             }
-            // What the localiser believes is looked at where it is used.
-            _ => Ok(()),
+            Err(Contradiction { leaf, .. }) => {
+                bail!("{leaf} is {}: it is out of its bounds, or does not go with the other settings", show(leaf))
+            }
+            Ok(()) => Ok(()),
         }
     }
 

@@ -7,6 +7,11 @@ use anyhow::Context;
 /// The setting of that name; what comes near it is suggested if there is none.
 pub fn named(name: &str) -> anyhow::Result<&'static Leaf> {
     Leaf::named(name).with_context(|| {
+        // A name without its room is that of the setting first of all.
+        let within = |leaf: &&Leaf| leaf.name.split_once('.').is_some_and(|(_, last)| last == name);
+        if let Some(leaf) = LEAVES.iter().find(within) {
+            return format!("there is no setting of the name {name}; did you mean {}?", leaf.name);
+        }
         let near = LEAVES.iter().map(|leaf| (strsim::jaro_winkler(leaf.name, name), leaf.name));
         let nearest = near.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(likeness, _)| *likeness > 0.7);
         let suggestion = nearest.map_or_else(String::new, |(_, name)| format!("; did you mean {name}?"));
@@ -25,16 +30,25 @@ pub fn parse_value(name: &str, text: &str, like: Value) -> anyhow::Result<Value>
     let value = match like {
         Value::Number(_) => text.parse().ok().map(Value::Number),
         Value::Whole(_) => text.parse().ok().map(Value::Whole),
-        Value::Switch(_) => text.parse().ok().map(Value::Switch),
+        Value::Switch(_) => switch(text).map(Value::Switch),
         Value::Address(_) => text.parse::<std::net::Ipv4Addr>().ok().map(|address| Value::Address(address.octets())),
     };
     let wanted = match like {
         Value::Number(_) => "a number",
         Value::Whole(_) => "a whole number",
-        Value::Switch(_) => "true or false",
+        Value::Switch(_) => "on or off (true or false, yes or no, 1 or 0)",
         Value::Address(_) => "an address such as 192.168.1.10",
     };
     value.with_context(|| format!("{name} must be {wanted}, not '{text}'"))
+}
+
+/// A switch as people write it.
+fn switch(text: &str) -> Option<bool> {
+    match text.to_lowercase().as_str() {
+        "on" | "true" | "yes" | "1" => Some(true),
+        "off" | "false" | "no" | "0" => Some(false),
+        _ => None,
+    }
 }
 
 /// A value of the setting of that name with all its digits, or the word for it.

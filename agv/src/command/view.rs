@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use agv_core::record::{Item, Record};
 use agv_host_sim::link::with_port;
 use agv_host_sim::live::stream;
-use agv_host_sim::log::Reader;
+use agv_host_sim::log::{LogError, Reader};
 use agv_host_sim::view::{FeedError, Shared, Timeline, follow, load, serve};
 use anyhow::{Context, anyhow};
 
+use super::output::note;
 use super::stop;
 
 const HELP: &str = "\
@@ -45,6 +47,24 @@ pub struct View {
     json: bool,
 }
 
+/// Records among which the header of a log is.
+const BEGINNING: usize = 1000;
+
+/// Refuses a file that is no log, and a part of a log that has lost its beginning: without a header nothing can be shown.
+fn check_beginning(path: &Path) -> Result<(), LogError> {
+    let mut reader = Reader::open(path)?;
+    let mut damage = None;
+    for _ in 0..BEGINNING {
+        match reader.next()? {
+            Some(Item::Record { record: Record::Header(_), .. }) => return Ok(()),
+            Some(Item::Record { .. }) => {}
+            Some(Item::Damage(found)) => damage = damage.or(Some(found)),
+            None => break,
+        }
+    }
+    Err(LogError::Header { path: path.to_owned(), damage })
+}
+
 impl View {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
@@ -52,7 +72,7 @@ impl View {
         let timeline = match (&self.log, &host) {
             (Some(path), _) => {
                 // What is no log is refused before anything is served.
-                drop(Reader::open(path)?);
+                check_beginning(path)?;
                 Timeline::of_log(path.clone())
             }
             (None, Some(host)) => Timeline::of_controller(host),
@@ -84,7 +104,11 @@ impl View {
     fn feed(&self, host: Option<&str>, shared: &Shared, is_stopped: &Arc<AtomicBool>) -> Result<(), FeedError> {
         match (&self.log, host) {
             (Some(path), _) => load(path, shared, is_stopped),
-            (None, Some(host)) => follow(host, self.output.as_deref().map(Path::new), shared, is_stopped),
+            (None, Some(host)) => {
+                let wait =
+                    |reason: &str| note(&format!("agv: nothing to see yet: {reason}; asking again until Ctrl-C"));
+                follow(host, self.output.as_deref().map(Path::new), shared, is_stopped, wait)
+            }
             (None, None) => Ok(()),
         }
     }

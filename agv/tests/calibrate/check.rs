@@ -139,7 +139,7 @@ fn drive(files: &Files, scenario: &str, planted: &Planted) -> String {
     name
 }
 
-fn run(files: &Files, command: &[&str]) -> Output {
+pub fn run(files: &Files, command: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_agv")).args(command).current_dir(files.folder()).output().unwrap()
 }
 
@@ -173,7 +173,7 @@ fn follow(files: &Files, next: &str) {
 }
 
 /// 95 per cent of the drive are nearer than this to the truth, mm; infinite if it is ever lost.
-fn replayed(files: &Files, command: &[&str]) -> f64 {
+pub fn replayed(files: &Files, command: &[&str]) -> f64 {
     let result = json(files, &[&["replay"], command, &["--json"]].concat());
     let is_lost = result["modes"].as_array().unwrap().iter().any(|mode| mode["mode"] == "lost");
     if is_lost { f64::INFINITY } else { result["accuracy"]["position_mm"]["p95"].as_f64().unwrap() }

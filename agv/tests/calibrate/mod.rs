@@ -7,4 +7,5 @@ mod command;
 mod counters;
 mod drives;
 mod model;
+mod planted;
 mod truth;

@@ -2,7 +2,8 @@
 
 use agv_core::measurement::Time;
 use agv_core::odometry::Counted;
-use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line, read, screen_line};
+use agv_host_sim::import::can_log::read;
+use agv_host_sim::import::candump::{Line, SeenFrame, log_line, parse_line, screen_line};
 use agv_host_sim::link::encoder_listener::EncoderListener;
 use agv_tests::recordings;
 use agv_wire::can::canopen::{Message, NodeId};
@@ -74,9 +75,14 @@ fn lines_of_a_screen() {
 #[test]
 fn a_recorded_drive_unit_decodes() {
     let Some(path) = recordings("a_recorded_drive_unit_decodes", "can/candump_ros_canopen_380.log") else { return };
-    let frames = read(&path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let frame = |line: &str| match parse_line(line) {
+        Some(Line::Frame(seen)) => seen.frame,
+        other => panic!("{line}: {other:?}"),
+    };
+    let frames: Vec<_> = text.lines().map(frame).collect();
     let messages: Vec<Message> =
-        frames.iter().map(|seen| Message::decode(seen.frame.classic().unwrap()).unwrap()).collect();
+        frames.iter().map(|frame| Message::decode(frame.classic().unwrap()).unwrap()).collect();
     let node = NodeId::new(9).unwrap();
     let answers: Vec<Response> = messages
         .iter()
@@ -112,8 +118,8 @@ fn encoders_are_read_from_a_log_without_their_setup() {
     let path = folder.path().join("candump.log");
     std::fs::write(&path, text.join("\n")).unwrap();
     let channels = [channel(1, Counted::Turn), channel(2, Counted::Steering)];
-    let mut listener = EncoderListener::new(&channels, Time::from_seconds(5.0));
-    let frames = read(&path).unwrap();
+    let mut listener = EncoderListener::new(&channels, Time::from_seconds(5.0), None);
+    let frames = read(&path).unwrap().frames;
     let heard = frames.iter().map(|seen| listener.hear(seen.frame.classic().unwrap(), seen.time.unwrap()));
     let samples: Vec<_> = heard
         .filter_map(|(faults, sample)| {

@@ -80,7 +80,9 @@ fn contents() -> Vec<(Content, BTreeMap<&'static str, f64>)> {
 
 /// Every value that a status can name.
 fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
-    use EncoderFault::{Frozen, HeartbeatLost, Jumped, Late, Missing, OutOfRange, Reported, WrongRange};
+    use EncoderFault::{
+        Frozen, HeartbeatLost, Jumped, Late, Missing, OutOfRange, Reported, WrongDirection, WrongRange,
+    };
     let modes = [
         Mode::NotLocalised,
         Mode::Reflectors,
@@ -118,6 +120,7 @@ fn statuses() -> Vec<(Content, BTreeMap<&'static str, String>)> {
         Some(Reported),
         Some(HeartbeatLost),
         Some(WrongRange),
+        Some(WrongDirection),
     ];
     let lasers = [LaserHealth::Unknown, LaserHealth::Sound, LaserHealth::Silent, LaserHealth::Faulty];
     let searches = [

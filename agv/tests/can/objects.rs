@@ -3,11 +3,11 @@
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 
-use agv_controller::{Bus, BusOutput, Estimate, SettingObjects, Troubles, object_of};
+use agv_controller::{Bus, BusOutput, ControllerIdentity, Estimate, SettingObjects, Troubles, object_of};
 use agv_core::geometry::Pose;
 use agv_core::integrity::ProtectionLevel;
+use agv_core::localizer::PredictionState;
 use agv_core::measurement::Time;
-use agv_core::odometry::OdometryBias;
 use agv_core::state::{LaserHealth, Mode, PoseOutput, Reason, Relocalization};
 use agv_settings::leaf::Value as Setting;
 use agv_settings::{LEAVES, Settings};
@@ -61,7 +61,7 @@ fn estimate() -> Estimate {
         last_reset: 0.0,
         overflows: 0,
     };
-    Estimate { answered: 1, pose, bias: OdometryBias::default(), gyro: None, relocalization: Relocalization::Idle }
+    Estimate { answered: 1, pose, prediction: PredictionState::default(), relocalization: Relocalization::Idle }
 }
 
 /// Settings of which none is the default where it can be another.
@@ -79,8 +79,12 @@ fn converse(mut master: Command) -> Vec<Value> {
     let settings = settings();
     let mut bus = Bus::new(
         &settings,
-        "test bench",
-        CarriedMap { identity: 4_000_000_000, landmarks: 40 },
+        ControllerIdentity {
+            hardware: "test bench",
+            serial: 3_000_000_001,
+            map: CarriedMap { identity: 4_000_000_000, landmarks: 40 },
+            stored: None,
+        },
         Troubles::default(),
         Time::default(),
     );

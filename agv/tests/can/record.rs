@@ -12,7 +12,7 @@ use agv_core::record::{Item, Record};
 use agv_host_sim::bus::{Bus, BusError, InProcessBus, InProcessNode};
 use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::export;
-use agv_host_sim::import::{candump, raw};
+use agv_host_sim::import::{can_log, raw};
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::live::{self, CanSummary, Limits, Recorder};
 use agv_host_sim::log::{self, Reader, Writer};
@@ -195,7 +195,7 @@ fn what_candump_wrote_is_exported_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let (input, log) = (folder.path().join("in.log"), folder.path().join("drive.agvlog"));
     std::fs::write(&input, lines.join("\n") + "\n").unwrap();
-    let frames: Vec<_> = candump::read(&input).unwrap();
+    let frames: Vec<_> = can_log::read(&input).unwrap().frames;
     let bytes: Vec<_> = frames.iter().map(|seen| raw::RawBytes::of_can(seen.time.unwrap(), &seen.frame)).collect();
     let mut drive = recording();
     drive.events.clear();

@@ -114,6 +114,9 @@ fn what_was_exported_is_imported() {
     run(&["export", "rosbag2", &log_path, "-o", &bag, "--json"]);
     for (format, input) in [("mcap", &mcap), ("auto", &mcap), ("rosbag2", &bag), ("auto", &bag)] {
         run(&["import", format, input, "-o", &back, "--json"]);
+        assert_eq!(log::read(Path::new(&back)).unwrap(), (recording.clone(), vec![]));
+        // Who names a topic wants its messages.
+        run(&["import", format, input, "-o", &back, "--json", "--scan-topic", "/scan"]);
         let (imported, _) = log::read(Path::new(&back)).unwrap();
         let (laser, known) = (*imported.parameters.lasers.first(), *recording.parameters.lasers.first());
         assert!((laser.position() - known.position()).norm() < 1e-12 && (laser.theta - known.theta).abs() < 1e-12);
@@ -157,7 +160,7 @@ fn the_rates_of_a_gyro_come_back_as_they_were_told() {
     run(&["export", "mcap", &log_path, "-o", &mcap, "--json"]);
     run(&["export", "rosbag2", &log_path, "-o", &bag, "--json"]);
     for (format, input) in [("mcap", &mcap), ("rosbag2", &bag)] {
-        run(&["import", format, input, "-o", &back, "--json"]);
+        run(&["import", format, input, "-o", &back, "--json", "--scan-topic", "/scan"]);
         let (imported, _) = log::read(Path::new(&back)).unwrap();
         let gyro = imported.parameters.gyro;
         assert!(gyro.is_fitted && (gyro.factor - 1.0).abs() < 1e-15);
@@ -268,8 +271,17 @@ fn what_is_no_recording_of_ros_is_refused() {
     log::write(Path::new(&log_path), &recording).unwrap();
     run(&["export", "mcap", &log_path, "-o", &mcap, "--json"]);
     let bytes = std::fs::read(&mcap).unwrap();
-    let mut damaged = bytes.clone();
-    damaged[bytes.len() / 3] ^= 0x55;
+    // The log behind the messages is not what it was: that is said, and the messages are read.
+    let mut damaged_log = bytes.clone();
+    damaged_log[bytes.len() * 2 / 3] ^= 0x55;
+    let input = files.write("damaged_log.mcap", &damaged_log);
+    let doubtful = agv(&["import", "mcap", &input, "-o", &output, "--strict"]);
+    assert_eq!(doubtful.status.code(), Some(3));
+    assert!(text(&doubtful.stdout).contains("only its messages were read"), "{}", text(&doubtful.stdout));
+    std::fs::remove_file(&output).unwrap();
+    // Neither can be read.
+    let mut damaged = damaged_log;
+    damaged[bytes.len() / 20] ^= 0x55;
     std::fs::create_dir(files.path("folder")).unwrap();
     std::fs::create_dir(files.path("described")).unwrap();
     std::fs::write(files.path("described/metadata.yaml"), "rosbag2_bagfile_information: 7\n").unwrap();
@@ -277,7 +289,7 @@ fn what_is_no_recording_of_ros_is_refused() {
         files.path("missing"),
         files.write("empty.mcap", b""),
         files.write("foreign.mcap", b"t_s,x_m\n1,2\n"),
-        files.write("cut.mcap", &bytes[..bytes.len() / 2]),
+        files.write("cut.mcap", &bytes[..300]),
         files.write("damaged.mcap", &damaged),
         files.write("broken.db3", b"SQLite format 3\0 and then nothing of use"),
         files.path("folder"),

@@ -113,6 +113,9 @@ fn a_packet_that_is_cut_short_is_counted_and_the_others_are_read() {
     let found = results(&["lidar3d", "info", &cut, "--calibration", &calibration(&files, 64), "--json"]);
     assert_eq!((&found["cut"], &found["packets"]), (&Value::Bool(true), &Value::from(89)));
     assert_eq!(found["returns"]["points"], 89 * 384);
+    for (arguments, code) in [(&["lidar3d", "info", &cut][..], 0), (&["lidar3d", "info", &cut, "--strict"], 3)] {
+        assert_eq!(agv(arguments).status.code(), Some(code));
+    }
 }
 
 #[test]

@@ -153,14 +153,14 @@ fn a_cut_or_foreign_file_is_told() {
     ];
     write(&path, &raw);
     let found = capture::read(&path, &capture::PORTS).unwrap();
-    assert_eq!((found.lost, found.is_cut, found.left_out), (0, false, 0));
+    assert_eq!((found.lost, found.seen.is_cut, found.left_out), (0, false, 0));
     for source in [RawSource::FromNav350, RawSource::ToNav350] {
         assert_eq!(joined(&found.raw, source), joined(&raw, source));
     }
     assert_eq!(found.raw[1], raw[1]);
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..whole.len() - 100]).unwrap();
-    assert!(capture::read(&path, &capture::PORTS).unwrap().is_cut);
+    assert!(capture::read(&path, &capture::PORTS).unwrap().seen.is_cut);
     std::fs::write(&path, &whole).unwrap();
     let error = capture::read(&path, &[9]).unwrap_err().to_string();
     assert!(error.contains("is of a connection to port 9"), "{error}");
@@ -178,7 +178,7 @@ fn a_real_capture_is_put_together() {
         return;
     };
     let found = capture::read(&file, &capture::PORTS).unwrap();
-    assert_eq!((found.lost, found.is_cut), (0, false));
+    assert_eq!((found.lost, found.seen.is_cut), (0, false));
     assert!(found.packets > 10);
     let bytes = joined(&found.raw, RawSource::FromNav350);
     // Every telegram follows the one before without a gap.

@@ -68,6 +68,9 @@ impl fmt::Display for Cause {
                 )
             }
             Self::FewReflectors(0) => write!(formatter, "no reflectors are seen"),
+            Self::FewReflectors(1) => {
+                write!(formatter, "1 reflector is seen at once, where {FEWEST_REFLECTORS} are needed")
+            }
             Self::FewReflectors(count) => {
                 write!(formatter, "{count} reflectors are seen at once, where {FEWEST_REFLECTORS} are needed")
             }

@@ -18,6 +18,7 @@ use super::surveyed_map::stop_poses;
 use super::tracking::{TrackedRevolution, track};
 use super::window::Window;
 use super::windows::{LaserPose, windows};
+use crate::wording::count_of;
 
 /// What says how the laser moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -288,7 +289,11 @@ impl Drive {
             match between(&self.counted, &pair[0], &pair[1], shortest) {
                 Ok(way) => {
                     if way.moved > 0 {
-                        self.remarks.push(format!("{} reflectors were moved after {start:.1} s", way.moved));
+                        self.remarks.push(format!(
+                            "{} {} moved after {start:.1} s",
+                            count_of(way.moved, "reflector"),
+                            if way.moved == 1 { "was" } else { "were" }
+                        ));
                     }
                     ways.push(way);
                 }

@@ -13,7 +13,7 @@ use crate::log::{LogError, Reader};
 use crate::recording::{RecordedEvent, Recording};
 
 /// Encoders and whatever says how the laser has moved; scans are not kept.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LogInput {
     /// What the localiser believed of its vehicle.
     pub parameters: Parameters,

@@ -10,6 +10,7 @@ pub mod drive;
 pub mod found;
 pub mod innovation_noise;
 pub mod joint;
+pub mod laser_motion;
 mod least_squares;
 pub mod log_input;
 pub mod mending;

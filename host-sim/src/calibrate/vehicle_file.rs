@@ -59,8 +59,8 @@ pub struct VehicleFile {
     pub settings: BTreeMap<String, f64>,
 }
 
-/// How the names of the settings of a vehicle begin.
-const VEHICLE: &str = "vehicle.";
+/// How the names of the settings of a vehicle and of its first laser begin.
+const OF_VEHICLE: [&str; 2] = ["vehicle.", "laser."];
 
 /// One line of the file.
 struct Entry {
@@ -87,12 +87,14 @@ impl VehicleFile {
         }
     }
 
-    /// The file for a vehicle of any kind, without its laser.
+    /// The file for a vehicle of any kind, and its first laser.
     #[must_use]
     pub fn of_vehicle(parameters: &Parameters) -> Self {
         let settings = Settings::of(*parameters);
         let number = |leaf: &Leaf| match leaf.get(&settings) {
-            Some(Value::Number(value)) if leaf.name.starts_with(VEHICLE) => Some((leaf.name.to_owned(), value)),
+            Some(Value::Number(value)) if OF_VEHICLE.iter().any(|room| leaf.name.starts_with(room)) => {
+                Some((leaf.name.to_owned(), value))
+            }
             _ => None,
         };
         Self { settings: agv_settings::LEAVES.iter().filter_map(number).collect(), ..Self::default() }

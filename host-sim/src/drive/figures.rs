@@ -5,10 +5,12 @@ use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::Time;
 use serde::Serialize;
 
+use super::fitness::{Fitness, Spell};
+use super::names::mode_name;
 use super::track::{Standard, Track, TrackError};
 use crate::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, Spread};
 use crate::recording::Recording;
-use crate::replay::Replay;
+use crate::replay::{ContourCounts, Replay};
 
 /// The figures of one replayed drive.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -23,12 +25,16 @@ pub struct Figures {
     pub poses: usize,
     /// Recorded time by processor time.
     pub realtime_factor: f64,
+    /// What the pose was good for.
+    pub fitness: Fitness,
     /// Time in each mode that occurred.
     pub modes: Vec<ModeTime>,
     /// When mode or reason changed.
     pub mode_changes: Vec<ModeChange>,
     /// What became of the observations, one entry a kind that was seen.
     pub observations: Vec<ObservationCounts>,
+    /// Scans that were laid onto contours.
+    pub contours: ContourCounts,
     /// Innovations of what corrected the pose, one entry a kind that did.
     pub innovations: Vec<Innovations>,
     /// How far the poses are off; None if nobody knows.
@@ -49,6 +55,8 @@ pub struct ModeTime {
 pub struct ModeChange {
     /// When, s of the recording's clock.
     pub time_s: f64,
+    /// When, s since the first event.
+    pub since_start_s: f64,
     /// The mode from then on.
     pub mode: Mode,
     /// The reason from then on.
@@ -124,6 +132,18 @@ pub const MODES: [Mode; 8] = [
 pub const KINDS: [LandmarkKind; 3] = [LandmarkKind::Reflector, LandmarkKind::Corner, LandmarkKind::EndPoint];
 
 impl Figures {
+    /// Name of a mode in this drive: where scans were laid onto contours and no landmark among the features led, the features are contours.
+    #[must_use]
+    pub fn mode_name(&self, mode: Mode) -> &'static str {
+        let is_feature = |counts: &&ObservationCounts| counts.kind != LandmarkKind::Reflector && counts.accepted > 0;
+        let is_by_contours = self.contours.matched > 0 && !self.observations.iter().any(|counts| is_feature(&counts));
+        match mode {
+            Mode::Features if is_by_contours => "contours",
+            Mode::Mixed if is_by_contours => "reflectors and contours",
+            mode => mode_name(mode),
+        }
+    }
+
     /// The figures of a replayed recording and its track.
     #[must_use]
     pub fn new(recording: &Recording, replay: &Replay, track: &Track) -> Self {
@@ -132,7 +152,14 @@ impl Figures {
             (Some(first), Some(last)) => last.since(first),
             _ => 0.0,
         };
-        let (modes, mode_changes) = modes(recording, replay);
+        let spells = spells(recording, replay);
+        let (modes, mode_changes) = modes(&spells);
+        let fitness = Fitness::new(
+            &recording.parameters,
+            &spells.iter().map(|(_, spell)| *spell).collect::<Vec<_>>(),
+            &replay.poses,
+            track,
+        );
         let of_kind = |kind| move |used: &&LandmarkUse| used.kind == kind;
         let gate = recording.parameters.association.gate;
         Self {
@@ -141,12 +168,14 @@ impl Figures {
             events: recording.events.len(),
             poses: replay.poses.iter().filter(|pose| pose.mode != Mode::NotLocalised).count(),
             realtime_factor: duration_s / replay.elapsed.as_secs_f64(),
+            fitness,
             modes,
             mode_changes,
             observations: KINDS
                 .into_iter()
                 .filter_map(|kind| count(kind, replay.uses.iter().filter(of_kind(kind))))
                 .collect(),
+            contours: replay.contours,
             innovations: KINDS
                 .into_iter()
                 .filter_map(|kind| innovations(kind, gate, replay.uses.iter().filter(of_kind(kind))))
@@ -156,10 +185,9 @@ impl Figures {
     }
 }
 
-fn modes(recording: &Recording, replay: &Replay) -> (Vec<ModeTime>, Vec<ModeChange>) {
-    let mut durations = MODES.map(|mode| ModeTime { mode, duration_s: 0.0 });
-    let mut changes: Vec<ModeChange> = Vec::new();
-    let mut last: Option<(Time, Mode)> = None;
+/// Each pose with when it was given and how long it was the last one.
+fn spells<'a>(recording: &Recording, replay: &'a Replay) -> Vec<(Time, Spell<'a>)> {
+    let mut spells: Vec<(Time, Spell)> = Vec::new();
     for (event, pose) in recording.events.iter().zip(&replay.poses) {
         // Before the first pose, only the events know the time.
         let now = match pose.mode {
@@ -170,14 +198,23 @@ fn modes(recording: &Recording, replay: &Replay) -> (Vec<ModeTime>, Vec<ModeChan
             continue;
         };
         // Events of different sensors may overtake each other.
-        let now = last.map_or(now, |(before, _)| before.max(now));
-        if let Some((before, mode)) = last {
-            let spent = now.since(before);
-            durations.iter_mut().filter(|entry| entry.mode == mode).for_each(|entry| entry.duration_s += spent);
+        let now = spells.last().map_or(now, |(before, _)| now.max(*before));
+        if let Some((before, last)) = spells.last_mut() {
+            last.duration = now.since(*before);
         }
-        last = Some((now, pose.mode));
+        spells.push((now, Spell { pose, duration: 0.0 }));
+    }
+    spells
+}
+
+fn modes(spells: &[(Time, Spell)]) -> (Vec<ModeTime>, Vec<ModeChange>) {
+    let mut durations = MODES.map(|mode| ModeTime { mode, duration_s: 0.0 });
+    let mut changes: Vec<ModeChange> = Vec::new();
+    for (now, Spell { pose, duration }) in spells {
+        durations.iter_mut().filter(|entry| entry.mode == pose.mode).for_each(|entry| entry.duration_s += duration);
         if changes.last().is_none_or(|change| (change.mode, change.reason) != (pose.mode, pose.reason)) {
-            changes.push(ModeChange { time_s: now.seconds(), mode: pose.mode, reason: pose.reason });
+            let since_start_s = spells.first().map_or(0.0, |(first, _)| now.since(*first));
+            changes.push(ModeChange { time_s: now.seconds(), since_start_s, mode: pose.mode, reason: pose.reason });
         }
     }
     let occurred = durations.into_iter().filter(|entry| changes.iter().any(|change| change.mode == entry.mode));

@@ -1,6 +1,7 @@
 //! Pictures of a replayed drive.
 
 use agv_core::geometry::Point;
+use agv_core::integrity::Alarm;
 use agv_core::localizer::{LandmarkSource, LandmarkUse, Mode};
 use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::Time;
@@ -12,8 +13,8 @@ use crate::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, Spread, pose_at
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::replay::Replay;
 use crate::report::{
-    Bounds, Figure, FigureError, LandmarkMark, Map, Page, PointSet, Series, StateSpan, landmark_timeline, line_chart,
-    scatter_chart, state_timeline, trajectory_plot,
+    Bounds, FIT_TO_DOCK, FIT_TO_TRAVEL, Figure, FigureError, LandmarkMark, Map, NO_POSE, NOT_FIT, Page, PointSet,
+    Series, StateSpan, landmark_timeline, line_chart, scatter_chart, state_timeline, trajectory_plot,
 };
 
 /// Scans that the outlines of the surroundings are drawn from, and pieces of outline of each, at the most.
@@ -70,6 +71,12 @@ pub fn heading_error_chart(series: &[Series]) -> Result<Figure, FigureError> {
 /// # Errors
 /// If a picture cannot be drawn.
 pub fn add_pictures(page: &mut Page, recording: &Recording, replay: &Replay, track: &Track) -> Result<(), FigureError> {
+    page.section("Where the pose was good for what");
+    page.figure(
+        &level_map(recording, replay, track)?,
+        "The way in the colour of what the protection level allowed there. The limits are the settings alert_limits; a circle marks the start, \
+         and grey is what the laser saw.",
+    );
     page.section("Way");
     page.figure(
         &trajectories(recording, replay, track)?,
@@ -87,6 +94,40 @@ fn line(points: impl Iterator<Item = Point>) -> Vec<(f64, f64)> {
     points.map(|point| (point.x, point.y)).collect()
 }
 
+/// The way, one path for each thing that the level allows; a piece of another kind interrupts it.
+fn level_map(recording: &Recording, replay: &Replay, track: &Track) -> Result<Figure, FigureError> {
+    let limits = &recording.parameters.alert_limits;
+    let classes = [
+        (Alarm::None, FIT_TO_DOCK),
+        (Alarm::Docking, FIT_TO_TRAVEL),
+        (Alarm::Travel, NOT_FIT),
+        (Alarm::NoPose, NO_POSE),
+    ];
+    let nowhere = (f64::NAN, f64::NAN);
+    let mut ways: [Vec<(f64, f64)>; 4] = Default::default();
+    let mut last: Option<(f64, f64)> = None;
+    for point in &track.points {
+        let output = &point.output;
+        let alarm = limits.alarm(output.mode, &output.level);
+        let place = (output.pose.x, output.pose.y);
+        for ((class, _), way) in classes.iter().zip(&mut ways) {
+            if *class == alarm {
+                // A piece begins where the one before it ends.
+                if way.last().is_none_or(|(x, _)| x.is_nan()) {
+                    way.extend(last);
+                }
+                way.push(place);
+            } else if way.last().is_some_and(|(x, _)| x.is_finite()) {
+                way.push(nowhere);
+            }
+        }
+        last = Some(place);
+    }
+    let mut paths: Vec<Series> = classes.iter().zip(&ways).map(|((_, name), points)| Series { name, points }).collect();
+    paths.retain(|path| !path.points.is_empty());
+    on_map(recording, replay, track, &paths)
+}
+
 fn trajectories(recording: &Recording, replay: &Replay, track: &Track) -> Result<Figure, FigureError> {
     let estimated = line(track.points.iter().map(|point| point.output.pose.position()));
     let truth = line(recording.truth.iter().map(|truth| truth.pose.position()));
@@ -98,6 +139,11 @@ fn trajectories(recording: &Recording, replay: &Replay, track: &Track) -> Result
     if !references.is_empty() {
         paths.push(Series { name: "references, of the laser", points: &references });
     }
+    on_map(recording, replay, track, &paths)
+}
+
+/// Paths over the landmarks, and what the laser saw.
+fn on_map(recording: &Recording, replay: &Replay, track: &Track, paths: &[Series]) -> Result<Figure, FigureError> {
     let of_kind = |kind: LandmarkKind| {
         let landmarks = recording.landmarks.iter().filter(|landmark| landmark.kind == kind);
         landmarks.map(|landmark| (landmark.x, landmark.y)).collect::<Vec<_>>()
@@ -109,7 +155,7 @@ fn trajectories(recording: &Recording, replay: &Replay, track: &Track) -> Result
     landmarks.push(PointSet { name: "found while driving", points: &dynamic });
     landmarks.retain(|set| !set.points.is_empty());
     let outlines = outlines(recording, track);
-    trajectory_plot(&Map { outlines: &outlines, landmarks: &landmarks }, &paths)
+    trajectory_plot(&Map { outlines: &outlines, landmarks: &landmarks }, paths)
 }
 
 /// What a few scans along the way saw, from where the localiser believed to be: short lines in W.

@@ -1,13 +1,24 @@
 //! The report of a replayed drive.
 
 use super::figures::Figures;
+use super::fitness::Grade;
 use super::pictures::add_pictures;
-use super::tables::{figure_rows, parameter_rows};
+use super::tables::{figure_rows, parameter_rows, verdict};
 use super::track::Track;
 use crate::log::SOFTWARE;
 use crate::recording::Recording;
 use crate::replay::Replay;
 use crate::report::{FigureError, Page, Table};
+
+/// Adds what a drive was at a glance.
+pub(super) fn add_verdict(page: &mut Page, figures: &Figures) {
+    let class = match figures.fitness.grade() {
+        Grade::Good => "good",
+        Grade::Partly => "partly",
+        Grade::Poor => "poor",
+    };
+    page.verdict(class, &verdict(figures));
+}
 
 /// Adds everything about a replayed drive to a page. `remarks` are rows of the first table that the drive does not know:
 /// where it comes from, and what is wrong with its log.
@@ -26,9 +37,10 @@ pub fn add_drive(
     let mut rows = remarks.to_vec();
     rows.push(["replayed by".to_owned(), SOFTWARE.to_owned()]);
     rows.extend(figure_rows(figures));
+    add_verdict(page, figures);
     page.section("Figures").table(&table(rows));
     add_pictures(page, recording, replay, track)?;
-    page.section("Parameters").paragraph("SI units and radians.");
+    page.section("Parameters").paragraph("Settings by their names, in SI units and radians.");
     page.table(&table(parameter_rows(&recording.parameters)));
     Ok(())
 }

@@ -6,6 +6,7 @@ use super::names::kind_name;
 use super::pictures::{
     add_pictures, heading_error_chart, heading_error_line, position_error_chart, position_error_line,
 };
+use super::report::add_verdict;
 use super::tables::{figure_rows, parameter_rows};
 use super::track::Track;
 use crate::log::SOFTWARE;
@@ -69,6 +70,12 @@ pub fn report_page(drives: &[ReplayedDrive]) -> Result<Page, FigureError> {
     let names: Vec<&str> = drives.iter().map(|drive| drive.name.as_str()).collect();
     let mut page = Page::new(&format!("Report on {}", names.join(", ")));
     page.paragraph(&format!("Replayed by {SOFTWARE}."));
+    for drive in drives {
+        if drives.len() > 1 {
+            page.paragraph(&format!("{}:", drive.name));
+        }
+        add_verdict(&mut page, &drive.figures);
+    }
     page.section("Summary").table(&side_by_side(drives, |drive| {
         drive.remarks.iter().cloned().chain(figure_rows(&drive.figures)).collect()
     }));
@@ -83,7 +90,8 @@ pub fn report_page(drives: &[ReplayedDrive]) -> Result<Page, FigureError> {
         add_pictures(&mut page, &drive.recording, &drive.replay, &drive.track)?;
     }
     let is_one = drives.len() == 1;
-    page.section(if is_one { "Parameters" } else { "Parameters that differ" }).paragraph("SI units and radians.");
+    page.section(if is_one { "Parameters" } else { "Parameters that differ" })
+        .paragraph("Settings by their names, in SI units and radians.");
     page.table(&parameters(drives));
     Ok(page)
 }

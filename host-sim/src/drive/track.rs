@@ -3,11 +3,11 @@
 use agv_core::geometry::difference;
 use agv_core::localizer::{Mode, PoseOutput};
 use agv_core::measurement::Time;
-use agv_core::odometry::VehicleOdometer;
 use serde::Serialize;
 
 use crate::accuracy::{pose_at, pose_error};
-use crate::recording::{RecordedEvent, Recording};
+use crate::odometry_steps::odometry_steps;
+use crate::recording::Recording;
 use crate::replay::Replay;
 
 /// What the poses are compared with.
@@ -113,28 +113,9 @@ fn way_at(points: &[TrackPoint], time: Time) -> f64 {
     points.get(after).map_or(0.0, |point| point.way)
 }
 
-/// How far R moves with each event, by its odometry, m.
-fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> {
-    let parameters = &recording.parameters;
-    let mut odometer = VehicleOdometer::new(&parameters.vehicle, &parameters.odometer());
-    recording.events.iter().map(move |event| {
-        let motion = match event {
-            RecordedEvent::Encoders(sample) => odometer.encoders(sample),
-            RecordedEvent::Speed(sample) => odometer.speed(sample),
-            RecordedEvent::Increment(increment) => odometer.increment(increment),
-            RecordedEvent::Wheels(sample) => odometer.wheels(sample),
-            RecordedEvent::EncoderFaults(_) => {
-                odometer.restart();
-                return 0.0;
-            }
-            RecordedEvent::Gyro(_)
-            | RecordedEvent::Reflectors(_)
-            | RecordedEvent::Scan(_)
-            | RecordedEvent::SetPose(_) => return 0.0,
-        };
-        // The chord: the motion's own distance is that of the driving wheel.
-        motion.map_or(0.0, |motion| motion.displacement.position().norm())
-    })
+/// How far R moves with each event, by its odometry, m: the chord, as the motion's own distance is that of the driving wheel.
+pub fn way_steps(recording: &Recording) -> impl Iterator<Item = f64> + '_ {
+    odometry_steps(recording).map(|step| step.map_or(0.0, |displacement| displacement.position().norm()))
 }
 
 fn errors_of_truth(recording: &Recording, points: &[TrackPoint]) -> Vec<TrackError> {

@@ -1,21 +1,31 @@
 //! What is wrong with a drive that is lost or poor, and what to do next: findings in the order in which they are to be looked at.
 
 mod calibration;
+mod encoder_faults;
+mod given_poses;
+mod readings;
+mod start;
+mod stream;
+mod times;
 mod timing;
+mod turns;
+mod vehicle;
 
 use agv_core::localizer::Mode;
 use agv_core::maps::{Landmark, LandmarkKind};
 use serde::Serialize;
 
-use crate::calibrate::causes::{Explanation, explain};
 use crate::calibrate::innovation_noise::HONEST;
 use crate::calibrate::log_input::LogInput;
-use crate::calibrate::mending::mended;
 use crate::drive::{Figures, kind_name};
 use crate::recording::{RecordedEvent, Recording};
-use crate::replay::{StartSearchError, find_start};
+use crate::replay::{Replay, StartSearchError, find_start};
+
+use stream::{Source, Stream};
+use vehicle::VehicleCheck;
 
 pub use timing::moved;
+pub use vehicle::with_laser_motion;
 
 /// Something that is wrong, or that could not be looked at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -52,37 +62,48 @@ pub fn poor_share(figures: &Figures) -> f64 {
 /// Everything that there is to say of a drive. `log` is how the commands name it; `progress` is called as by [`explain`]. What a
 /// wrong clock or a wrong vehicle spoils is not looked at before that is mended.
 #[must_use]
-pub fn check(recording: &Recording, figures: &Figures, log: &str, progress: impl FnMut(usize)) -> Vec<Finding> {
-    let mut findings = what_is_missing(recording, log);
-    findings.extend(timing::gaps(recording, log));
+pub fn check(
+    recording: &Recording,
+    replay: &Replay,
+    figures: &Figures,
+    log: &str,
+    progress: impl FnMut(usize),
+) -> Vec<Finding> {
+    let mut findings = measurements(recording, log);
     let is_poor = poor_share(figures) > POOR;
     let mut input = LogInput::of(recording);
     let clock = timing::put_right(&mut input);
-    let explanations = explain(&input, progress);
+    let vehicle = VehicleCheck::new(recording, input, progress);
+    let is_late = vehicle.by_wheels.iter().any(|one| one.late().is_some());
     // A clock shows itself only where the encoders tell the motion.
     let clock = clock.or_else(|| {
-        let mut right = explanations.iter().find_map(|explanation| mended(&input, explanation))?;
+        let mut right = vehicle.mended().filter(|_| vehicle.by_wheels.is_empty())?;
         timing::put_right(&mut right)
     });
     findings.extend(clock.map(|offset| timing::finding(&offset, log)));
-    let is_sound = explanations.iter().any(|explanation| explanation.causes.is_empty());
-    if !is_sound && !explanations.is_empty() {
-        findings.push(mistakes(&explanations, log));
+    let is_sound = vehicle.is_sound();
+    let mistakes = vehicle.finding(log);
+    if clock.is_some() || is_late || mistakes.is_some() {
+        findings.extend(mistakes);
+        return findings;
     }
-    if clock.is_some() || (!is_sound && !explanations.is_empty()) {
+    if let Some(finding) = start::finding(recording, replay, log) {
+        findings.push(finding);
         return findings;
     }
     let is_too_sure = figures.innovations.iter().any(|seen| 0.5 * seen.mean_normalised_square > *HONEST.end());
-    if let Some(finding) = calibration::finding(&input, log).filter(|_| is_poor || is_too_sure) {
+    let calibration = calibration::finding(&vehicle.input, log).filter(|_| is_poor || is_too_sure);
+    if let Some(finding) = calibration {
         findings.push(finding);
         return findings;
     }
     if is_poor {
-        if explanations.is_empty() {
+        if vehicle.is_untold() {
             findings.push(untold());
         }
         findings.extend(place(recording, log));
     }
+    findings.extend(turns::finding(recording, is_sound, log));
     findings.extend(map(recording, figures, is_sound, log));
     findings.extend(noise(figures, log));
     if is_poor && findings.is_empty() {
@@ -97,16 +118,45 @@ pub fn check(recording: &Recording, figures: &Figures, log: &str, progress: impl
     findings
 }
 
-fn what_is_missing(recording: &Recording, log: &str) -> Vec<Finding> {
+/// What is wrong with what the sensors measured, each by itself: what is missing, its times and its values. No motion is compared.
+#[must_use]
+pub fn measurements(recording: &Recording, log: &str) -> Vec<Finding> {
+    let streams = Stream::all(recording);
+    let mut findings = what_is_missing(recording, &streams, log);
+    findings.extend(encoder_faults::findings(recording));
+    findings.extend(times::findings(recording, &streams, log));
+    findings.extend(readings::findings(recording, &streams, log));
+    findings.extend(given_poses::findings(recording, &streams, log));
+    findings
+}
+
+fn what_is_missing(recording: &Recording, streams: &[Stream], log: &str) -> Vec<Finding> {
     let has = |is: fn(&RecordedEvent) -> bool| recording.events.iter().any(is);
     let mut findings = Vec::new();
-    let has_odometry = has(|event| {
-        matches!(event, RecordedEvent::Encoders(_) | RecordedEvent::Speed(_) | RecordedEvent::Increment(_))
-    });
-    if !has_odometry {
+    let wanted = Source::of_vehicle(&recording.parameters.vehicle);
+    let others: Vec<String> =
+        streams.iter().map(|stream| stream.source).filter(|source| source.is_odometry()).map(Source::name).collect();
+    if !streams.iter().any(|stream| stream.source == wanted) {
+        findings.push(if others.is_empty() {
+            Finding::new(
+                "the log has no odometry",
+                "look at the encoders on the bus: agv can monitor can0; state their nodes with --drive and --steering",
+            )
+        } else {
+            Finding::new(
+                format!(
+                    "the log holds {}, but of this kind of vehicle {} are wanted",
+                    others.join(" and "),
+                    wanted.name()
+                ),
+                "agv settings vehicle.kind; record or import it again with the right kind",
+            )
+        });
+    }
+    if recording.parameters.gyro.is_fitted && !streams.iter().any(|stream| stream.source == Source::Gyro) {
         findings.push(Finding::new(
-            "the log has no odometry",
-            "look at the encoders on the bus: agv can monitor can0; state their nodes with --drive and --steering",
+            "by the settings the vehicle has a gyro, and it says nothing",
+            "look at its frame on the bus: agv can monitor can0; agv settings can.gyro",
         ));
     }
     if !has(|event| matches!(event, RecordedEvent::Scan(_) | RecordedEvent::Reflectors(_))) {
@@ -147,17 +197,6 @@ fn untold() -> Finding {
         "the drive does not tell whether encoders and laser agree: it has too few arcs or reflectors for that",
         "agv calibrate plan --area 14x11, drive that, and check its log",
     )
-}
-
-fn mistakes(explanations: &[Explanation], log: &str) -> Finding {
-    let what: Vec<String> = explanations.iter().map(ToString::to_string).collect();
-    let mut next: Vec<String> = Vec::new();
-    for remedy in explanations.iter().map(|explanation| explanation.remedy(log)) {
-        if !next.contains(&remedy) {
-            next.push(remedy);
-        }
-    }
-    Finding::new(what.join("; or: "), next.join("; or: "))
 }
 
 /// Whether the vehicle would find itself in the map by its first revolutions.
@@ -210,10 +249,13 @@ fn map(recording: &Recording, figures: &Figures, is_sound: bool, log: &str) -> V
 fn noise(figures: &Figures, log: &str) -> Option<Finding> {
     let off = figures.innovations.iter().filter(|seen| !HONEST.contains(&(0.5 * seen.mean_normalised_square)));
     let words: Vec<String> =
-        off.map(|seen| format!("{} {:.2}", kind_name(seen.kind), 0.5 * seen.mean_normalised_square)).collect();
+        off.map(|seen| format!("{} {:.2}", kind_name(seen.kind), seen.mean_normalised_square)).collect();
     (!words.is_empty()).then(|| {
         Finding::new(
-            format!("innovations are not what the filter expects (1 is expected): {}", words.join(", ")),
+            format!(
+                "innovations are not what the filter expects, mean normalised square where 2 is expected: {}",
+                words.join(", ")
+            ),
             format!("agv calibrate noise {log}"),
         )
     })

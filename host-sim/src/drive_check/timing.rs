@@ -1,31 +1,13 @@
-//! Whether what is measured carries the right times.
-
-use agv_core::measurement::Time;
+//! Whether the laser's times are those of the encoders.
 
 use super::Finding;
+use super::stream::Stream;
+use super::times::{OTHER_CLOCK, late_at_arrival};
+use super::vehicle::VehicleCheck;
 use crate::calibrate::clock_offset::{ClockOffset, clock_offset};
 use crate::calibrate::log_input::LogInput;
+use crate::calibrate::wheeled::mistakes::WheelExplanation;
 use crate::recording::{RecordedEvent, Recording};
-
-/// Longest gap of the encoders that the localiser bridges, s.
-const LONGEST_GAP: f64 = 0.1;
-
-/// Gaps of the encoders, and samples that do not come in their turn.
-pub(super) fn gaps(recording: &Recording, log: &str) -> Option<Finding> {
-    let encoders = recording.events.iter().filter(|event| matches!(event, RecordedEvent::Encoders(_)));
-    let times: Vec<Time> = encoders.filter_map(RecordedEvent::time).collect();
-    let gaps = || times.windows(2).map(|pair| pair[1].since(pair[0]));
-    let back = gaps().filter(|gap| *gap < 0.0).count();
-    let long = gaps().filter(|gap| *gap > LONGEST_GAP).count();
-    if back + long == 0 {
-        return None;
-    }
-    let longest = gaps().fold(0.0, f64::max);
-    Some(Finding::new(
-        format!("the encoders leave {long} gaps, the longest of {longest:.2} s, and go back in time {back} times"),
-        format!("look at the bus and its load: agv view {log}"),
-    ))
-}
 
 /// Moves the laser's times to those of the encoders if they are off, and tells by how much they were.
 pub(super) fn put_right(input: &mut LogInput) -> Option<ClockOffset> {
@@ -47,20 +29,50 @@ pub(super) fn finding(offset: &ClockOffset, log: &str) -> Finding {
     )
 }
 
-/// The recording with the laser's times moved to those of the encoders. None if they are not off.
+/// The recording with the laser's times moved to those of the encoders, and by how much they were late, s: those of another clock by their
+/// arrival first, then what the motion says. None if they are not off.
 #[must_use]
-pub fn moved(recording: &Recording) -> Option<(Recording, ClockOffset)> {
+pub fn moved(recording: &Recording) -> Option<(Recording, f64)> {
+    let (mut right, mut late) = (recording.clone(), 0.0);
+    if let Some(apart) = other_clock(recording) {
+        move_laser(&mut right, apart);
+        late += apart;
+    }
+    if let Some(rest) = late_by_motion(&right) {
+        move_laser(&mut right, rest);
+        late += rest;
+    }
+    (late != 0.0).then_some((right, late))
+}
+
+/// By how much the first laser is of another clock, s, if the log is in the order of arrival.
+fn other_clock(recording: &Recording) -> Option<f64> {
+    let streams = Stream::all(recording);
+    let mut of_laser = streams.iter().filter(|stream| stream.source.laser().is_some());
+    of_laser.find_map(late_at_arrival).filter(|late| late.abs() > OTHER_CLOCK)
+}
+
+fn late_by_motion(recording: &Recording) -> Option<f64> {
     let mut input = LogInput::of(recording);
-    let offset = put_right(&mut input)?;
-    let mut right = recording.clone();
-    for event in &mut right.events {
+    if let Some(offset) = put_right(&mut input) {
+        return Some(offset.late);
+    }
+    let vehicle = VehicleCheck::new(recording, input, |_| ());
+    let by_wheels = vehicle.by_wheels.iter().find_map(WheelExplanation::late);
+    by_wheels.or_else(|| {
+        let mut right = vehicle.mended()?;
+        put_right(&mut right).map(|offset| offset.late)
+    })
+}
+
+fn move_laser(recording: &mut Recording, late: f64) {
+    for event in &mut recording.events {
         match event {
-            RecordedEvent::Scan(scan) => scan.start = scan.start.offset(-offset.late),
+            RecordedEvent::Scan(scan) => scan.start = scan.start.offset(-late),
             RecordedEvent::Reflectors(seen) => {
-                seen.observations.iter_mut().for_each(|one| one.time = one.time.offset(-offset.late));
+                seen.observations.iter_mut().for_each(|one| one.time = one.time.offset(-late));
             }
             _ => {}
         }
     }
-    Some((right, offset))
 }

@@ -18,7 +18,8 @@ const PDO_BYTES: u32 = 8;
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 
 const DEVICE_TYPE: Object = Object::new(0x1000, 0);
-const OPERATING_PARAMETERS: Object = Object::new(0x6000, 0);
+/// Bit of the operating parameters that says that the position is scaled.
+const SCALED: u16 = 1 << 2;
 const PRESET: Object = Object::new(0x6003, 0);
 const OPERATING_STATUS: Object = Object::new(0x6500, 0);
 const STORE_ALL: Object = Object::new(0x1010, 1);
@@ -31,7 +32,7 @@ const WRITABLE: [Object; 9] = [
     object::PDO_TRANSMISSION,
     object::PDO_INHIBIT_TIME,
     object::PDO_EVENT_TIMER,
-    OPERATING_PARAMETERS,
+    object::OPERATING_PARAMETERS,
     PRESET,
     STORE_ALL,
 ];
@@ -72,11 +73,13 @@ impl EncoderObjects {
             (object::SINGLE_TURN_RESOLUTION, STEPS),
             (Object::new(0x6502, 0), revolutions),
         ];
+        // What a shaft of whole revolutions has is not scaled.
+        let is_scaled = values != u64::from(STEPS) * u64::from(revolutions);
         let half = [
             (object::HEARTBEAT_TIME, 0),
             (object::PDO_INHIBIT_TIME, 0),
             (object::PDO_EVENT_TIMER, 0),
-            (OPERATING_PARAMETERS, 0),
+            (object::OPERATING_PARAMETERS, if is_scaled { SCALED } else { 0 }),
             (OPERATING_STATUS, 0),
             (Object::new(0x6503, 0), 0),
             (Object::new(0x6504, 0), 0),
@@ -119,7 +122,7 @@ impl EncoderObjects {
 
     /// The position that is told: counted in the direction that is set, and moved by the preset.
     fn position(&self) -> u32 {
-        let falls = self.number(OPERATING_PARAMETERS) & 1 != 0;
+        let falls = self.number(object::OPERATING_PARAMETERS) & 1 != 0;
         let counted = if falls { (self.range - self.shaft) % self.range } else { self.shaft };
         ((counted + self.offset) % self.range) as u32
     }
@@ -220,7 +223,7 @@ impl ObjectDictionary for EncoderObjects {
             STORE_ALL if value == SAVE => return Ok(()),
             STORE_ALL => return Err(AbortCode::CannotStore),
             PRESET => self.preset(value),
-            OPERATING_PARAMETERS => self.put(OPERATING_STATUS, bytes),
+            object::OPERATING_PARAMETERS => self.put(OPERATING_STATUS, bytes),
             _ => {}
         }
         self.put(asked, bytes);

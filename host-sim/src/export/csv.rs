@@ -2,7 +2,9 @@
 
 use std::io::Write;
 
+use agv_core::integrity::Alarm;
 use agv_core::localizer::{Mode, Reason};
+use agv_core::state::ProtectionLevel;
 use serde::Serialize;
 
 use crate::drive::Track;
@@ -24,9 +26,18 @@ struct Row {
     dead_reckoning_m: f64,
     acceptance: f64,
     normalised_square: f64,
+    level_position_m: Option<f64>,
+    level_heading_rad: Option<f64>,
+    alarm: Alarm,
+    correction_m: f64,
     true_x_m: Option<f64>,
     true_y_m: Option<f64>,
     true_heading_rad: Option<f64>,
+}
+
+/// A protection level; none where there is no bound.
+fn bound(level: f64) -> Option<f64> {
+    (level < 0.5 * ProtectionLevel::UNBOUNDED.position).then_some(level)
 }
 
 /// Writes the poses of a replayed drive, and beside them the true ones.
@@ -53,6 +64,10 @@ pub fn write(recording: &Recording, track: &Track, output: impl Write) -> Result
             dead_reckoning_m: pose.dead_reckoning_distance,
             acceptance: pose.acceptance,
             normalised_square: pose.normalised_square,
+            level_position_m: bound(pose.level.position),
+            level_heading_rad: bound(pose.level.heading),
+            alarm: recording.parameters.alert_limits.alarm(pose.mode, &pose.level),
+            correction_m: pose.correction,
             true_x_m: truth.map(|truth| truth.x),
             true_y_m: truth.map(|truth| truth.y),
             true_heading_rad: truth.map(|truth| truth.theta),

@@ -102,9 +102,11 @@ Dummy0006=0
 Dummy0007=0
 
 [Comments]
-Lines=2
+Lines=4
 Line1=Objects 2001h to 2008h are whole telegrams; their signals are described in agv.dbc.
 Line2=Objects from 4000h on are the settings of the controller.
+Line3=1800h to 1804h and 1A00h to 1A04h are written in pre-operational only. A controller that starts itself (bit 2 of 1F80h is 0) is put there first.
+Line4=1010h stores the settings, 1014h, 1016h, 1017h and all PDO parameters, and is answered when that is done: in up to 3 s.
 ",
         settings.nodes.vendor
     )

@@ -16,7 +16,7 @@ use mcap::{Compression, WriteOptions};
 use serde::Serialize;
 
 use crate::drive::{KINDS, kind_name, mode_name, reason_name};
-use crate::log::SOFTWARE;
+use crate::log::{self, LogError, SOFTWARE};
 use crate::output_file::OutputFile;
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
 use crate::replay::Replay;
@@ -25,7 +25,7 @@ use crate::ros::messages::{
     Odometry, Pose as RosPose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, TransformStamped,
     Transforms, Twist, TwistWithCovariance, Vector, covariance,
 };
-use crate::ros::{Kind, MessageError, definition, encode};
+use crate::ros::{ATTACHED_LOG, Kind, MessageError, attachment, definition, encode};
 
 /// Why a drive cannot be exported.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +46,9 @@ pub enum McapExportError {
         /// What is wrong.
         source: mcap::McapError,
     },
+    /// The log cannot be attached.
+    #[error(transparent)]
+    Log(#[from] LogError),
     /// A message is too large.
     #[error(transparent)]
     Message(#[from] MessageError),
@@ -196,6 +199,7 @@ pub fn write(
     for next in truth {
         writer.write_pose(Topic::Truth, next.time, next.pose)?;
     }
+    writer.attach(recording)?;
     writer.finish()
 }
 
@@ -262,6 +266,17 @@ impl Writer {
             }
         }
         self.write(Topic::Landmarks, now, &Markers { markers })
+    }
+
+    /// What the messages have no place for.
+    fn attach(&mut self, recording: &Recording) -> Result<(), McapExportError> {
+        let io = |source| McapExportError::Io { path: self.path.clone(), source };
+        let folder = tempfile::tempdir().map_err(io)?;
+        let log = folder.path().join(ATTACHED_LOG);
+        log::write(&log, recording)?;
+        let Some(attachment) = attachment(ATTACHED_LOG, std::fs::read(&log).map_err(io)?) else { return Ok(()) };
+        let attached = self.container.attach(&attachment);
+        attached.map_err(|source| McapExportError::Container { path: self.path.clone(), source })
     }
 
     fn finish(mut self) -> Result<McapSummary, McapExportError> {

@@ -45,8 +45,8 @@ pub struct Capture {
     pub lost: u64,
     /// Connections that are left out because another one to a sensor was open.
     pub left_out: usize,
-    /// Whether the file ends in the middle of a packet.
-    pub is_cut: bool,
+    /// What is missing from the file.
+    pub seen: packets::Seen,
 }
 
 /// Reads the connections to a sensor on one of `ports` (see [`PORTS`]). Segments are put in order, repetitions left out.
@@ -59,9 +59,8 @@ pub fn read(path: &Path, ports: &[u16]) -> Result<Capture, CaptureError> {
         talks.packet(time, &packet);
         ControlFlow::Continue(())
     })?;
-    talks.packets = seen.packets;
-    talks.is_cut = seen.is_cut;
-    let capture = talks.finish();
+    let mut capture = talks.finish();
+    (capture.packets, capture.seen) = (seen.packets, seen);
     if capture.raw.is_empty() {
         let ports = ports.iter().map(u16::to_string).collect::<Vec<_>>().join(" or ");
         return Err(CaptureError::NoSensor { path: path.to_owned(), packets: capture.packets, ports });
@@ -104,8 +103,6 @@ struct Talks<'a> {
     /// Connections that may go on, by client and sensor.
     open: HashMap<(Address, Address), usize>,
     talks: Vec<Talk>,
-    packets: usize,
-    is_cut: bool,
     end: Time,
 }
 
@@ -145,8 +142,8 @@ impl Talks<'_> {
 
     /// The connections one after the other. Of two at the same time the one on which the sensor said more is taken.
     fn finish(self) -> Capture {
-        let Self { mut talks, packets, is_cut, end, .. } = self;
-        let mut capture = Capture { packets, is_cut, ..Capture::default() };
+        let Self { mut talks, end, .. } = self;
+        let mut capture = Capture::default();
         for talk in &mut talks {
             for is_from_sensor in [false, true] {
                 let stream = &mut talk.streams[usize::from(is_from_sensor)];

@@ -7,11 +7,11 @@ use agv_controller::{self as controller, EncoderNodes, EncoderOutput, channels, 
 use agv_core::localizer::{Event, Parameters};
 use agv_core::measurement::Time;
 use agv_core::record::{Damage, Item, RAW_A_RECORD, Raw, RawSource, Record};
-use agv_wire::can::canopen::transmit_pdo_id;
 use agv_wire::can::frame::{AnyFrame, Frame};
 use agv_wire::can::slcan::Message;
 use agv_wire::nav350::SensorFrame;
 
+use super::overheard;
 use crate::link::encoder_listener::EncoderListener;
 use crate::link::nav350_listener::{Heard, Listener};
 use crate::log::{self, LogError, Reader, Writer};
@@ -71,7 +71,7 @@ pub fn read(path: &Path) -> Result<Vec<RawBytes>, LogError> {
 /// If the log cannot be written.
 pub fn write(path: &Path, drive: &mut Recording, raw: &[RawBytes], nodes: &EncoderNodes) -> Result<(), LogError> {
     let mut writer = Writer::begin(path, &drive.parameters, &drive.landmarks)?;
-    let mut maker = EventMaker::new(nodes, &drive.parameters, Bus::Overheard);
+    let mut maker = EventMaker::overhearing(nodes, &drive.parameters, raw);
     for one in raw {
         for bytes in pieces(&one.bytes) {
             writer.write(&Record::Raw(Raw { source: one.source, time: one.time, bytes }))?;
@@ -87,7 +87,7 @@ pub fn write(path: &Path, drive: &mut Recording, raw: &[RawBytes], nodes: &Encod
 /// Whether raw bytes say anything that a sensor of that vehicle has measured.
 #[must_use]
 pub fn means_something(drive: &Recording, raw: &[RawBytes], nodes: &EncoderNodes) -> bool {
-    let mut maker = EventMaker::new(nodes, &drive.parameters, Bus::Overheard);
+    let mut maker = EventMaker::overhearing(nodes, &drive.parameters, raw);
     let is_measured = |event: &RecordedEvent| !matches!(event, RecordedEvent::EncoderFaults(_));
     raw.iter().any(|one| maker.events(one).iter().any(is_measured))
 }
@@ -131,13 +131,22 @@ pub struct EventMaker<'a> {
     bus: Bus,
     nav350: Listener,
     encoders: Option<Encoders>,
+    /// Time between reports of encoders that are overheard, s, if it is known.
+    period: Option<f64>,
 }
 
 impl<'a> EventMaker<'a> {
     /// A maker of the events of a vehicle.
     #[must_use]
     pub fn new(nodes: &'a EncoderNodes, parameters: &'a Parameters, bus: Bus) -> Self {
-        Self { nodes, parameters, bus, nav350: Listener::new(SensorFrame::default()), encoders: None }
+        Self { nodes, parameters, bus, nav350: Listener::new(SensorFrame::default()), encoders: None, period: None }
+    }
+
+    /// A maker of the events of a whole recording of a bus whose master is another; how often its encoders report is read there.
+    #[must_use]
+    pub fn overhearing(nodes: &'a EncoderNodes, parameters: &'a Parameters, raw: &[RawBytes]) -> Self {
+        let period = overheard::period(raw, &overheard::encoders(nodes, &parameters.vehicle));
+        Self { period, ..Self::new(nodes, parameters, Bus::Overheard) }
     }
 
     /// The events that bytes complete.
@@ -168,8 +177,10 @@ impl<'a> EventMaker<'a> {
     fn look(&mut self, time: Time, frame: Option<&Frame>, events: &mut Vec<RecordedEvent>) {
         let is_first = self.encoders.is_none();
         // Encoders that were switched on later were not missing before.
-        let is_of_encoder =
-            |frame: &Frame| self.nodes.encoders.iter().any(|node| frame.id() == transmit_pdo_id(*node, 1));
+        let is_of_encoder = |frame: &Frame| {
+            let encoders = self.nodes.encoders.iter().zip(&self.nodes.profiles);
+            encoders.into_iter().any(|(node, profile)| frame.id() == overheard::position_id(*node, *profile))
+        };
         // Whose own controller tells the motion is listened to in any case.
         let tells_itself = self.nodes.motion_frames.is_some() && self.parameters.vehicle.counters().is_empty();
         let bus = if tells_itself { Bus::Served } else { self.bus };
@@ -178,9 +189,11 @@ impl<'a> EventMaker<'a> {
         }
         let encoders = self.encoders.get_or_insert_with(|| match bus {
             Bus::Served => Encoders::Served(Box::new(controller::Encoders::new(self.nodes, self.parameters, time))),
-            Bus::Overheard => {
-                Encoders::Overheard(Box::new(EncoderListener::new(&channels(self.nodes, self.parameters), time)))
-            }
+            Bus::Overheard => Encoders::Overheard(Box::new(EncoderListener::new(
+                &channels(self.nodes, self.parameters),
+                time,
+                self.period,
+            ))),
         });
         match encoders {
             // The first record says when the bus was opened.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::delimited;
 use crate::text_file::{self, TextFileError};
 
 /// One row and where it stands.
@@ -13,7 +14,7 @@ pub struct Row {
     pub numbers: Vec<f64>,
 }
 
-/// Reads rows of `columns` numbers, separated by commas. A first row that is no number is a heading.
+/// Reads rows of `columns` numbers, separated by commas, semicolons or tabulators. A first row that is no number is a heading.
 ///
 /// # Errors
 /// If the file is missing, empty, not text, or a row has another number of columns or something that is no finite number.
@@ -21,12 +22,13 @@ pub fn read_rows(path: &Path, columns: usize) -> Result<Vec<Row>, TextFileError>
     let expected = "a table of numbers";
     let text = text_file::read(path, expected)?;
     let problem = |line, problem| TextFileError::Line { path: path.to_owned(), line, problem };
-    let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let table = delimited::of_text(&text);
     let mut rows = Vec::new();
-    for (index, record) in table.records().enumerate() {
-        let record = record.map_err(|error| problem(index + 1, error.to_string()))?;
-        let line = record.position().map_or(index + 1, |position| position.line() as usize);
-        let is_heading = index == 0 && record.iter().all(|word| word.trim().parse::<f64>().is_err());
+    for (index, (line, record)) in table.rows.iter().enumerate() {
+        let line = *line;
+        let number = |word: &str| delimited::number(word, table.has_decimal_commas);
+        let is_heading =
+            index == 0 && record.iter().all(|word| number(word).is_none() && word.trim().parse::<f64>().is_err());
         if is_heading {
             continue;
         }
@@ -36,9 +38,9 @@ pub fn read_rows(path: &Path, columns: usize) -> Result<Vec<Row>, TextFileError>
         let numbers = record
             .iter()
             .enumerate()
-            .map(|(column, word)| match word.trim().parse::<f64>() {
-                Ok(number) if number.is_finite() => Ok(number),
-                _ => Err(problem(line, format!("column {} is no number: {:?}", column + 1, shorten(word)))),
+            .map(|(column, word)| {
+                number(word)
+                    .ok_or_else(|| problem(line, format!("column {} is no number: {:?}", column + 1, shorten(word))))
             })
             .collect::<Result<_, _>>()?;
         rows.push(Row { line, numbers });

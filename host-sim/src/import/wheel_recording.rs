@@ -9,6 +9,7 @@ use agv_core::odometry::{Tricycle, Vehicle, WheelBased, WheelMotion};
 use serde::Deserialize;
 use thiserror::Error;
 
+use super::Imported;
 use super::wheel_table::{self, TableColumns};
 use crate::calibrate::wheeled::drive::WheelDrive;
 use crate::recording::{RecordedEvent, Recording, Reference};
@@ -50,16 +51,17 @@ struct Description {
 ///
 /// # Errors
 /// If one of them is missing or bad, or they do not fit each other.
-pub fn read(table: &Path, columns: &Path) -> Result<Recording, TextFileError> {
+pub fn read(table: &Path, columns: &Path) -> Result<Imported, TextFileError> {
     let text = text_file::read(columns, "a description of columns")?;
     let description: Description = toml::from_str(&text).map_err(|error| {
         let line = error.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
         TextFileError::of_line(columns, line, error.message().lines().collect::<Vec<_>>().join(" "))
     })?;
     let radius = description.table.wheel.first().and_then(|wheel| wheel.radius);
-    let drive = wheel_table::read(table, &description.table)?;
-    of(&drive, description.vehicle, radius, description.sensor)
-        .map_err(|error| TextFileError::of_line(columns, 1, error.to_string()))
+    let (drive, account) = wheel_table::read_all(table, &description.table)?;
+    let recording = of(&drive, description.vehicle, radius, description.sensor)
+        .map_err(|error| TextFileError::of_line(columns, 1, error.to_string()))?;
+    Ok(Imported { recording, account })
 }
 
 /// The drive of that vehicle. `radius` is that of the first wheel, m, for vehicles that count a way.

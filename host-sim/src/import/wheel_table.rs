@@ -9,7 +9,9 @@ use serde::Deserialize;
 
 use super::table::shorten;
 use super::units::{self, Measure};
+use crate::account::Account;
 use crate::calibrate::wheeled::drive::{WheelDrive, WheelStep};
+use crate::delimited;
 use crate::text_file::{self, TextFileError};
 
 /// A column of a table.
@@ -85,6 +87,8 @@ struct Found {
     factor: f64,
     measure: Measure,
     is_change: bool,
+    /// Whether a comma stands before the fraction.
+    has_decimal_commas: bool,
 }
 
 impl Found {
@@ -97,9 +101,9 @@ impl Found {
         if word.is_empty() {
             return Ok(None);
         }
-        match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Some(number * self.factor)),
-            _ => Err(format!("column {} is no number: {:?}", self.name, shorten(word))),
+        match delimited::number(word, self.has_decimal_commas) {
+            Some(number) => Ok(Some(number * self.factor)),
+            None => Err(format!("column {} is no number: {:?}", self.name, shorten(word))),
         }
     }
 }
@@ -123,27 +127,47 @@ struct Layout {
     reference: Option<(Option<Found>, [Found; 3])>,
 }
 
-/// Reads a table. A row without a value for all columns of the wheels, or of the reference, says nothing of them.
+/// Reads a table. A row without a value for all columns of the wheels, or of the reference, says nothing of them; neither does one of the
+/// time of the row before.
 ///
 /// # Errors
 /// If the file is missing, empty, not text, lacks a column, has a bad cell, or its time runs backward.
 pub fn read(path: &Path, columns: &TableColumns) -> Result<WheelDrive, TextFileError> {
+    read_all(path, columns).map(|(drive, _)| drive)
+}
+
+/// The same, with what became of the rows.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_all(path: &Path, columns: &TableColumns) -> Result<(WheelDrive, Account), TextFileError> {
     let text = text_file::read(path, "a table")?;
     let problem = |line: usize, problem: String| TextFileError::Line { path: path.to_owned(), line, problem };
-    let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let table = delimited::of_text(&text);
     let mut layout = None;
     let mut reader = Rows::default();
-    for (index, record) in table.records().enumerate() {
-        let record = record.map_err(|error| problem(index + 1, error.to_string()))?;
-        let line = record.position().map_or(index + 1, |position| position.line() as usize);
+    for (index, (line, record)) in table.rows.iter().enumerate() {
         if layout.is_none() {
-            layout = Some(Layout::find(columns, &record).map_err(|text| problem(line, text))?);
+            layout =
+                Some(Layout::find(columns, record, table.has_decimal_commas).map_err(|text| problem(*line, text))?);
             if columns.has_heading {
                 continue;
             }
         }
         let Some(layout) = &layout else { continue };
-        reader.take(layout, &record).map_err(|text| problem(line, text))?;
+        // A last line that does not end may lack its last cells.
+        let is_last = index + 1 == table.rows.len() && !text.ends_with('\n');
+        let cells = table.rows.first().map_or(0, |(_, first)| first.len());
+        if is_last && record.len() < cells {
+            reader.account.warn(format!("the file ends in the middle of line {line}: it was read up to there"));
+            continue;
+        }
+        match reader.take(layout, record, *line) {
+            Err(_) if is_last && !reader.steps.is_empty() => {
+                reader.account.warn(format!("the file ends in the middle of line {line}: it was read up to there"));
+            }
+            outcome => outcome.map_err(|text| problem(*line, text))?,
+        }
     }
     if reader.steps.is_empty() {
         return Err(TextFileError::Empty { path: path.to_owned() });
@@ -152,13 +176,15 @@ pub fn read(path: &Path, columns: &TableColumns) -> Result<WheelDrive, TextFileE
 }
 
 impl Layout {
-    fn find(columns: &TableColumns, first: &csv::StringRecord) -> Result<Self, String> {
+    fn find(columns: &TableColumns, first: &csv::StringRecord, has_decimal_commas: bool) -> Result<Self, String> {
         let names: HashMap<String, usize> = if columns.has_heading {
             first.iter().enumerate().map(|(index, name)| (name.trim().to_owned(), index)).collect()
         } else {
             (0..first.len()).map(|index| ((index + 1).to_string(), index)).collect()
         };
-        let find = |column: &Column, wanted: &[Measure]| find(&names, column, wanted);
+        let find = |column: &Column, wanted: &[Measure]| {
+            find(&names, column, wanted).map(|found| Found { has_decimal_commas, ..found })
+        };
         let wheel = |wheel: &WheelColumns| {
             let turning = [Measure::Angle, Measure::Rate, Measure::Speed];
             let turn = wheel.turn.as_ref().map(|column| find(column, &turning)).transpose()?;
@@ -186,18 +212,31 @@ impl Layout {
 
 fn find(names: &HashMap<String, usize>, column: &Column, wanted: &[Measure]) -> Result<Found, String> {
     let name = column.column.clone();
-    let index = *names.get(&name).ok_or_else(|| format!("there is no column {name:?}"))?;
+    let index = *names.get(&name).ok_or_else(|| {
+        let mut known: Vec<(&usize, &str)> = names.iter().map(|(name, index)| (index, name.as_str())).collect();
+        known.sort_unstable();
+        let known: Vec<&str> = known.into_iter().map(|(_, name)| name).collect();
+        format!("there is no column {name:?} among {}", shorten_to(&known.join(", "), LISTED))
+    })?;
     let (measure, factor) = units::find(&column.unit, column.ticks)
         .ok_or_else(|| format!("column {name:?} has no known unit: {:?}; there are {}", column.unit, units::names()))?;
     if !wanted.contains(&measure) {
         return Err(format!("column {name:?} cannot be in {}", column.unit));
     }
-    Ok(Found { index, name, factor, measure, is_change: column.is_change })
+    Ok(Found { index, name, factor, measure, is_change: column.is_change, has_decimal_commas: false })
+}
+
+/// Letters of the names that a message lists.
+const LISTED: usize = 120;
+
+fn shorten_to(text: &str, letters: usize) -> String {
+    text.chars().take(letters).collect()
 }
 
 /// What was read so far.
 #[derive(Default)]
 struct Rows {
+    account: Account,
     first: Option<f64>,
     last: Option<(f64, Vec<WheelState>)>,
     steps: Vec<WheelStep>,
@@ -205,10 +244,10 @@ struct Rows {
 }
 
 impl Rows {
-    fn take(&mut self, layout: &Layout, record: &csv::StringRecord) -> Result<(), String> {
+    fn take(&mut self, layout: &Layout, record: &csv::StringRecord, line: usize) -> Result<(), String> {
         let time = layout.time.value(record)?;
         if let Some(time) = time {
-            self.take_wheels(layout, record, time)?;
+            self.take_wheels(layout, record, time, line)?;
         }
         if let Some((own, pose)) = &layout.reference {
             let time = own.as_ref().map_or(Ok(time), |own| own.value(record))?;
@@ -216,19 +255,37 @@ impl Rows {
             if let (Some(time), Some(x), Some(y), Some(heading)) =
                 (time, x.value(record)?, y.value(record)?, heading.value(record)?)
             {
-                if self.poses.last().is_some_and(|(last, _)| time <= *last) {
-                    return Err("the time of the reference runs backward".to_owned());
+                match self.poses.last() {
+                    Some((last, _)) if time < *last => {
+                        return Err("the time of the reference runs backward".to_owned());
+                    }
+                    Some((last, _)) if time == *last => {
+                        self.account.leave_out("poses of the time of the pose before", format!("at line {line}"));
+                    }
+                    _ => self.poses.push((time, Pose { x, y, theta: wrap(heading) })),
                 }
-                self.poses.push((time, Pose { x, y, theta: wrap(heading) }));
             }
         }
         Ok(())
     }
 
-    fn take_wheels(&mut self, layout: &Layout, record: &csv::StringRecord, time: f64) -> Result<(), String> {
+    fn take_wheels(
+        &mut self,
+        layout: &Layout,
+        record: &csv::StringRecord,
+        time: f64,
+        line: usize,
+    ) -> Result<(), String> {
         let duration = self.last.as_ref().map_or(0.0, |(last, _)| time - last);
-        if self.last.is_some() && duration <= 0.0 {
-            return Err("time runs backward".to_owned());
+        if duration < 0.0 {
+            let before = time - duration;
+            return Err(format!(
+                "time runs backward, from {before} s to {time} s: where a second run begins, begin a second file"
+            ));
+        }
+        if self.last.is_some() && duration == 0.0 {
+            self.account.leave_out("rows of the time of the row before", format!("at line {line}"));
+            return Ok(());
         }
         let mut states = Vec::new();
         for (number, wheel) in layout.wheels.iter().enumerate() {
@@ -236,6 +293,7 @@ impl Rows {
             let Some(state) = wheel.state(record, &before, duration)? else { return Ok(()) };
             states.push(state);
         }
+        self.account.take(1);
         let first = *self.first.get_or_insert(time);
         if let Some((_, before)) = &self.last {
             let motion = |(before, after): (&WheelState, &WheelState)| WheelMotion {
@@ -251,9 +309,9 @@ impl Rows {
     }
 
     /// Both clocks begin with the first row of the wheels.
-    fn finish(self) -> WheelDrive {
+    fn finish(self) -> (WheelDrive, Account) {
         let first = self.first.unwrap_or(0.0);
-        WheelDrive::new(self.steps, self.poses.into_iter().map(|(time, pose)| (time - first, pose)))
+        (WheelDrive::new(self.steps, self.poses.into_iter().map(|(time, pose)| (time - first, pose))), self.account)
     }
 }
 

@@ -25,6 +25,49 @@ use crate::accuracy::Spread;
 
 /// Most reflectors of a layout.
 pub const REFLECTORS: usize = 1024;
+/// Layouts are no wider, m: halls and yards reach some hundred metres.
+pub const WIDEST: f64 = 3000.0;
+/// Places that are looked at, at the most.
+pub const PLACES: usize = 100_000;
+
+/// Why a layout cannot be checked.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum CheckError {
+    /// There are too many reflectors.
+    #[error("it has {found} reflectors, and {REFLECTORS} can be checked")]
+    TooMany {
+        /// How many there are.
+        found: usize,
+    },
+    /// A reflector is nowhere.
+    #[error("the place of a reflector is no number")]
+    NotFinite,
+    /// It is wider than any.
+    #[error(
+        "its reflectors are {extent:.0} m apart, and layouts reach {WIDEST:.0} m: are they in millimetres? Metres are wanted"
+    )]
+    TooWide {
+        /// Its longer side, m.
+        extent: f64,
+    },
+    /// There is too much to look at.
+    #[error(
+        "{places} places {spacing} m apart are too many: {PLACES} can be looked at. Is the layout of {x:.0} m by {y:.0} m in \
+         millimetres? Otherwise --spacing {wanted:.0}"
+    )]
+    TooManyPlaces {
+        /// How many there would be.
+        places: u64,
+        /// How far they are apart, m.
+        spacing: f64,
+        /// Extent of the layout, m.
+        x: f64,
+        /// Extent of the layout, m.
+        y: f64,
+        /// Distance with which there are few enough, m.
+        wanted: f64,
+    },
+}
 
 /// What is assumed of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,12 +202,16 @@ impl Check {
 /// be elsewhere.
 ///
 /// # Errors
-/// If there are too many reflectors, or one is nowhere.
-pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, MapError> {
+/// [`CheckError`].
+pub fn check(positions: &[Point], options: &CheckOptions) -> Result<Check, CheckError> {
+    check_extent(positions, options.spacing)?;
     let (mut map, mut index) = (Box::new(FixedMap::<REFLECTORS>::new()), Box::new(ReflectorIndex::<4096>::new()));
     let reflectors: Vec<Landmark> =
         (0..).zip(positions).map(|(id, position)| Landmark::reflector(id, *position, 0.0)).collect();
-    map.extend(&reflectors)?;
+    map.extend(&reflectors).map_err(|error| match error {
+        MapError::NotFinite => CheckError::NotFinite,
+        _ => CheckError::TooMany { found: positions.len() },
+    })?;
     index.build(map.view());
     let map = index.of(map.view());
     let places = grid(positions, options.spacing);
@@ -198,10 +245,36 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     median.is_finite().then_some(median)
 }
 
-/// Places over the rectangle around the reflectors.
-fn grid(positions: &[Point], spacing: f64) -> Vec<Point> {
+/// Whether the grid over the layout is one that can be looked at.
+fn check_extent(positions: &[Point], spacing: f64) -> Result<(), CheckError> {
+    if positions.iter().any(|position| !(position.x.is_finite() && position.y.is_finite())) {
+        return Err(CheckError::NotFinite);
+    }
+    if positions.is_empty() {
+        return Ok(());
+    }
+    let (low, high) = rectangle(positions);
+    let (x, y) = (high.x - low.x, high.y - low.y);
+    if x.max(y) > WIDEST {
+        return Err(CheckError::TooWide { extent: x.max(y) });
+    }
+    let places = ((x / spacing).floor() + 1.0) * ((y / spacing).floor() + 1.0);
+    if places > PLACES as f64 {
+        let wanted = (x * y / PLACES as f64).sqrt().max(x.max(y) / PLACES as f64).ceil() + 1.0;
+        return Err(CheckError::TooManyPlaces { places: places as u64, spacing, x, y, wanted });
+    }
+    Ok(())
+}
+
+fn rectangle(positions: &[Point]) -> (Point, Point) {
     let low = positions.iter().fold(Point::repeat(f64::INFINITY), |low, position| low.inf(position));
     let high = positions.iter().fold(Point::repeat(f64::NEG_INFINITY), |high, position| high.sup(position));
+    (low, high)
+}
+
+/// Places over the rectangle around the reflectors.
+fn grid(positions: &[Point], spacing: f64) -> Vec<Point> {
+    let (low, high) = rectangle(positions);
     let steps = |axis: usize| ((high[axis] - low[axis]) / spacing).max(0.0) as usize;
     if positions.is_empty() {
         return Vec::new();
@@ -321,6 +394,22 @@ mod tests {
         assert_eq!(check.ambiguous_share, 1.0);
         let first = check.resemblances[0];
         assert_eq!((first.turn_deg, first.shift_m, first.places), (180.0, [50.0, 60.0], check.places));
+    }
+
+    #[test]
+    fn a_layout_in_millimetres_is_asked_about_and_never_laid_out() {
+        for factor in [1000.0, 70.0] {
+            // The second one is of some kilometres, which a grid of 4 m could cover.
+            let wide: Vec<Point> = irregular().iter().map(|position| factor * position).collect();
+            let problem = check(&wide, &OPTIONS).map(|_| ()).unwrap_err().to_string();
+            assert!(problem.contains("millimetres"), "{problem}");
+        }
+        let nowhere = [Point::new(0.0, f64::NAN), Point::new(1.0, 2.0)];
+        assert_eq!(check(&nowhere, &OPTIONS).map(|_| ()).unwrap_err(), CheckError::NotFinite);
+        // The spacing that is named does.
+        let fine = CheckOptions { spacing: 0.01, ..OPTIONS };
+        let Err(CheckError::TooManyPlaces { wanted, .. }) = check(&irregular(), &fine) else { panic!() };
+        assert!(check(&irregular(), &CheckOptions { spacing: wanted, ..OPTIONS }).is_ok());
     }
 
     #[test]

@@ -6,23 +6,46 @@ use agv_core::geometry::Point;
 use crate::report::{Cell, FigureError, HeatMap, Page, PointSet, Table, heat_map};
 
 /// Limits of the expected standard deviation of the position that are told apart, m, and what they mean.
-const DEVIATIONS: [(f64, &str); 5] = [
+const DEVIATIONS: [(f64, &str); 7] = [
     (0.002, "up to 2 mm"),
+    (0.003, "up to 3 mm"),
     (0.005, "up to 5 mm"),
     (0.01, "up to 1 cm"),
     (0.02, "up to 2 cm"),
+    (0.05, "up to 5 cm"),
     (f64::INFINITY, "more, or none"),
 ];
 
+/// Shares of places where a vehicle finds itself, from which a layout is good, and partly so.
+const GOOD: f64 = 0.98;
+const PARTLY: f64 = 0.9;
+
 /// Limits of the number of reflectors.
-const COUNTS: [(usize, &str); 5] = [(2, "up to 2"), (3, "3"), (5, "4 or 5"), (8, "6 to 8"), (usize::MAX, "9 and more")];
+const COUNTS: [(usize, &str); 7] =
+    [(1, "none or 1"), (2, "2"), (3, "3"), (4, "4"), (6, "5 or 6"), (8, "7 or 8"), (usize::MAX, "9 and more")];
 
 /// A page with the pictures of a check.
 ///
 /// # Errors
 /// If a picture cannot be drawn.
-pub fn page(name: &str, positions: &[Point], options: &CheckOptions, check: &Check) -> Result<Page, FigureError> {
+pub fn page(
+    name: &str,
+    positions: &[Point],
+    names: &[String],
+    options: &CheckOptions,
+    check: &Check,
+) -> Result<Page, FigureError> {
     let mut page = Page::new(&format!("Layout {name}"));
+    let unique = format!("{:.1} %", 100.0 * check.unique_share);
+    let is_good = check.unique_share >= GOOD && check.close_pairs.is_empty();
+    let class = if is_good {
+        "good"
+    } else if check.unique_share >= PARTLY {
+        "partly"
+    } else {
+        "poor"
+    };
+    page.verdict(class, &format!("A vehicle that is switched on finds itself at {unique} of the places."));
     page.section("Summary").table(&Table { heading: Vec::new(), rows: check.rows() });
     let warnings = check.warnings();
     if !warnings.is_empty() {
@@ -46,16 +69,16 @@ pub fn page(name: &str, positions: &[Point], options: &CheckOptions, check: &Che
     });
     let by_answer = cells(&|place| match place.finding {
         Finding::Unique => 0,
-        Finding::Unknown => 2,
-        Finding::Resembles { .. } => 3,
-        Finding::TooFew => 4,
+        Finding::Unknown => 4,
+        Finding::Resembles { .. } => 5,
+        Finding::TooFew => 6,
     });
     let deviations = DEVIATIONS.map(|(_, name)| name);
     let mut counts = COUNTS.map(|(_, name)| name);
     counts.reverse();
-    let answers = ["finds itself", "", "no clear answer", "may be elsewhere", "too few seen"];
+    let answers = ["finds itself", "", "", "", "no clear answer", "may be elsewhere", "too few seen"];
     let draw = |cells: &[Cell], classes: &[&str]| {
-        heat_map(&HeatMap { cells, size: options.spacing, classes, points: reflectors })
+        heat_map(&HeatMap { cells, size: options.spacing, classes, points: reflectors, names })
     };
     page.section("How well the pose is determined");
     page.figure(

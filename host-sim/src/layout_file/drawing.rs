@@ -5,6 +5,10 @@ use dxf::entities::{Entity, EntityType, ModelPoint, Text};
 use dxf::enums::Units;
 use dxf::{Drawing, DxfError, Point};
 
+use super::blocks::{self, Place};
+use super::reading::{Reading, Unit};
+use crate::account::Account;
+
 /// Layer of the points and their names.
 const LAYER: &str = "REFLECTORS";
 
@@ -34,48 +38,115 @@ pub(super) fn write(landmarks: &[IdentifiedLandmark]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// The landmarks of a drawing: its points, centres of circles and places of blocks. A whole number that is written at a
-/// landmark names it; the others are numbered. A drawing that states no unit is in millimetres.
-pub(super) fn parse(text: &str) -> Result<Vec<IdentifiedLandmark>, (usize, String)> {
-    let drawing = Drawing::load(&mut text.as_bytes()).map_err(|error| (line(&error), error.to_string()))?;
-    let Some(metres) = metres(drawing.header.default_drawing_units) else {
-        return Err((1, format!("the unit {:?} is none of a layout", drawing.header.default_drawing_units)));
-    };
-    let (mut places, mut names) = (Vec::new(), Vec::new());
-    for entity in drawing.entities() {
-        match &entity.specific {
-            EntityType::ModelPoint(point) => places.push(&point.location),
-            EntityType::Circle(circle) => places.push(&circle.center),
-            EntityType::Insert(insert) => places.push(&insert.location),
-            EntityType::Text(text) => names.extend(text.value.trim().parse::<u16>().map(|name| (name, &text.location))),
-            _ => {}
-        }
+/// Whether bytes are a drawing in binary.
+pub(super) fn is_binary(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"AutoCAD Binary DXF")
+}
+
+/// The landmarks of a drawing: its points, centres of circles and places of blocks, of what is shown in model space. A whole number that
+/// is written at a landmark, or in an attribute of its block, names it; the others are numbered.
+pub(super) fn parse(
+    bytes: &[u8],
+    reading: &Reading,
+    account: &mut Account,
+) -> Result<Vec<IdentifiedLandmark>, (usize, String)> {
+    let drawing = Drawing::load(&mut &*bytes).map_err(|error| (line(&error), error.to_string()))?;
+    let found = blocks::collect(&drawing, &frozen_layers(bytes), reading.layer.as_deref(), account);
+    if found.places.is_empty() {
+        let layer = reading.layer.as_ref().map(|layer| format!(" on the layer {layer}")).unwrap_or_default();
+        let hidden: Vec<String> = account.beside().iter().map(ToString::to_string).collect();
+        let hidden = if hidden.is_empty() { String::new() } else { format!(" ({})", hidden.join(", ")) };
+        return Err((1, format!("there are no points, circles or blocks in the drawing{layer}{hidden}")));
     }
-    if places.is_empty() {
-        return Err((1, "there are no points, circles or blocks in the drawing".to_owned()));
-    }
-    let distance = |a: &Point, b: &Point| (a.x - b.x).hypot(a.y - b.y) * metres;
-    let name_of = |place: &Point| {
-        let near = names.iter().filter(|(_, at)| distance(at, place) < NAME_DISTANCE);
-        near.min_by(|a, b| distance(a.1, place).total_cmp(&distance(b.1, place))).map(|(name, _)| *name)
+    let metres = metres(&drawing, &found.places, reading, account).map_err(|problem| (1, problem))?;
+    let distance = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) * metres;
+    let name_of = |place: &Place| {
+        let near = found.names.iter().filter(|(_, at)| distance(at, &place.at) < NAME_DISTANCE);
+        let nearest = near.min_by(|a, b| distance(&a.1, &place.at).total_cmp(&distance(&b.1, &place.at)));
+        place.name.or(nearest.map(|(name, _)| *name))
     };
-    let named: Vec<Option<u16>> = places.iter().map(|place| name_of(place)).collect();
+    let named: Vec<Option<u16>> = found.places.iter().map(name_of).collect();
     let mut free = (0..=u16::MAX).filter(|name| !named.contains(&Some(*name)));
-    let mut landmarks: Vec<IdentifiedLandmark> = Vec::with_capacity(places.len());
-    for (place, name) in places.iter().zip(&named) {
+    let mut landmarks: Vec<IdentifiedLandmark> = Vec::with_capacity(found.places.len());
+    for (place, name) in found.places.iter().zip(&named) {
         let Some(id) = name.or_else(|| free.next()) else { return Err((1, "there are too many points".to_owned())) };
         if landmarks.iter().any(|known| known.id == id) {
             return Err((1, format!("two points are named {id}")));
         }
-        landmarks.push(super::reflector(id, place.x * metres, place.y * metres));
+        let at = reading.placed(place.at.map(|value| value * metres));
+        super::check_range(at).map_err(|problem| (1, problem))?;
+        landmarks.push(super::reflector(id, at[0], at[1]));
+    }
+    account.take(landmarks.len());
+    let unnamed = named.iter().filter(|name| name.is_none()).count();
+    if unnamed > 0 {
+        account
+            .note(format!("{unnamed} of {} points have no whole number beside them: they were numbered", named.len()));
     }
     Ok(landmarks)
 }
 
+/// Names of the layers that are frozen, which the reader of drawings does not tell: bit 1 of their flags (DXF reference, LAYER). Those of
+/// a binary drawing are not known.
+fn frozen_layers(bytes: &[u8]) -> Vec<String> {
+    let Ok(text) = std::str::from_utf8(bytes) else { return Vec::new() };
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let (pairs, _) = lines.as_chunks::<2>();
+    let mut frozen = Vec::new();
+    let (mut is_layer, mut name) = (false, "");
+    for [code, value] in pairs {
+        match *code {
+            "0" => (is_layer, name) = (*value == "LAYER", ""),
+            "2" if is_layer => name = value,
+            "70" if is_layer && value.parse::<i32>().is_ok_and(|flags| flags & 1 != 0) => frozen.push(name.to_owned()),
+            _ => {}
+        }
+    }
+    frozen
+}
+
+/// A hall is wider than this and narrower than that, m.
+const HALL: (f64, f64) = (1.0, 10_000.0);
+
+/// The length of the drawing's unit, m. A drawing that states none is in millimetres, unless it would then be no hall.
+fn metres(drawing: &Drawing, places: &[Place], reading: &Reading, account: &mut Account) -> Result<f64, String> {
+    if let Some(unit) = reading.unit {
+        return Ok(unit.metres());
+    }
+    let stated = drawing.header.default_drawing_units;
+    let width = |axis: usize| {
+        let values = places.iter().map(|place| place.at[axis]);
+        values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
+    };
+    let extent = width(0).max(width(1));
+    let is_hall = |unit: f64| extent == 0.0 || (HALL.0..HALL.1).contains(&(extent * unit));
+    let (millimetre, metre) = (Unit::Millimetre.metres(), Unit::Metre.metres());
+    if stated != Units::Unitless {
+        let metres =
+            length(stated).ok_or(format!("the unit {stated:?} is none of a layout: state another with --unit"))?;
+        if !is_hall(metres) {
+            account.warn(format!(
+                "in the drawing's unit ({stated:?}) the layout is {:.3} m wide: if that is wrong, state the unit with --unit",
+                extent * metres
+            ));
+        }
+        return Ok(metres);
+    }
+    if !is_hall(millimetre) && is_hall(metre) {
+        account.warn(format!(
+            "the drawing states no unit: metres were taken, as in millimetres it would be {:.3} m wide; state the unit with --unit",
+            extent * millimetre
+        ));
+        return Ok(metre);
+    }
+    account.note("the drawing states no unit: millimetres were taken");
+    Ok(millimetre)
+}
+
 /// The length of a unit, m.
-fn metres(unit: Units) -> Option<f64> {
+fn length(unit: Units) -> Option<f64> {
     match unit {
-        Units::Unitless | Units::Millimeters => Some(1e-3),
+        Units::Millimeters => Some(1e-3),
         Units::Centimeters => Some(1e-2),
         Units::Decimeters => Some(1e-1),
         Units::Meters => Some(1.0),

@@ -6,7 +6,13 @@
 //! name at the same place.
 
 #[cfg(feature = "drawings")]
+mod blocks;
+#[cfg(feature = "drawings")]
 mod drawing;
+mod reading;
+mod table;
+
+pub use reading::{Reading, Unit};
 
 use std::path::Path;
 use std::str::FromStr;
@@ -14,6 +20,7 @@ use std::str::FromStr;
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_wire::nav350::{Coordinate, IdentifiedLandmark, LayoutLandmark, Size};
 
+use crate::account::Account;
 use crate::mapping::map_file;
 use crate::output_file;
 use crate::text_file::{self, TextFileError};
@@ -123,22 +130,94 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
     text
 }
 
+/// A layout that was read, and what became of the rest of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedLayout {
+    /// Its landmarks.
+    pub landmarks: Vec<IdentifiedLandmark>,
+    /// What was left out, assumed and doubtful.
+    pub account: Account,
+}
+
 /// Reads a layout from a file.
 ///
 /// # Errors
 /// If the file cannot be read, or a line is no landmark.
 pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
-    #[cfg_attr(not(feature = "drawings"), expect(unused_variables, reason = "the others are told apart by their text"))]
+    load_as(path, &Reading::default()).map(|loaded| loaded.landmarks)
+}
+
+/// Reads a layout from a file of which somebody knows more than it says.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_as(path: &Path, reading: &Reading) -> Result<LoadedLayout, TextFileError> {
     let format = Format::of(path)?;
-    let text = text_file::read(path, "a layout")?;
+    let mut account = Account::default();
+    let refused = |(line, problem): (usize, String)| TextFileError::of_line(path, line, problem);
     #[cfg(feature = "drawings")]
     if format == Format::Dxf {
-        return drawing::parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem));
+        let bytes = std::fs::read(path).map_err(|source| TextFileError::of_system(path, source))?;
+        let text;
+        let drawn = if drawing::is_binary(&bytes) {
+            &bytes
+        } else {
+            text = text_file::read(path, "a drawing (DXF)")?;
+            text.as_bytes()
+        };
+        let landmarks = drawing::parse(drawn, reading, &mut account).map_err(refused)?;
+        return Ok(LoadedLayout { landmarks, account });
     }
-    if text.lines().next().is_some_and(|first| first.trim() == map_file::HEADER) {
-        return Ok(layout(&map_file::read(path)?));
+    let text = text_file::read(path, "a layout")?;
+    if text.lines().next().is_some_and(|first| first.trim() == map_file::HEADER) && *reading == Reading::default() {
+        let map = map_file::read(path)?;
+        let landmarks = layout(&map);
+        account.take(landmarks.len());
+        account.set_aside("landmarks that are no reflectors", map.len() - landmarks.len());
+        return Ok(LoadedLayout { landmarks, account });
     }
-    parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem))
+    let landmarks = if format == Format::Csv && table::has_names(&text) {
+        table::parse(&text, reading, &mut account).map_err(refused)?
+    } else {
+        let found = parse(&text).map_err(|(line, problem)| TextFileError::of_line(path, line, problem))?;
+        account.take(found.len());
+        moved(found, reading).map_err(|problem| TextFileError::of_line(path, 1, problem))?
+    };
+    if landmarks.is_empty() {
+        return Err(TextFileError::Empty { path: path.to_owned() });
+    }
+    Ok(LoadedLayout { landmarks, account })
+}
+
+/// The landmarks of a file in millimetres as somebody says that they are to be understood.
+fn moved(mut landmarks: Vec<IdentifiedLandmark>, reading: &Reading) -> Result<Vec<IdentifiedLandmark>, String> {
+    if *reading == Reading::default() {
+        return Ok(landmarks);
+    }
+    let unit = reading.unit.unwrap_or(Unit::Millimetre).metres();
+    for entry in &mut landmarks {
+        let place = reading.placed([f64::from(entry.landmark.x.0) * unit, f64::from(entry.landmark.y.0) * unit]);
+        check_range(place)?;
+        [entry.landmark.x, entry.landmark.y] = place.map(Coordinate::from_metres);
+    }
+    Ok(landmarks)
+}
+
+/// Coordinates of a layout are whole millimetres of 32 bits, m.
+const FARTHEST: f64 = i32::MAX as f64 * 1e-3;
+
+/// Refuses a place that a layout cannot hold.
+fn check_range(place: [f64; 2]) -> Result<(), String> {
+    if place.iter().all(|value| value.abs() < FARTHEST) {
+        return Ok(());
+    }
+    let [x, y] = place;
+    Err(format!(
+        "({x:.1}, {y:.1}) m is too far away, as coordinates of a whole country are: layouts reach {FARTHEST:.0} m. State which point becomes \
+         the origin with --origin {:.0},{:.0}, or the unit with --unit",
+        x.floor(),
+        y.floor()
+    ))
 }
 
 /// Writes a layout to a file.

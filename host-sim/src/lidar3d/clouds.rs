@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use agv_lidar3d::cloud_file;
 
 use super::revolution::Revolution;
+use crate::account::Account;
 use agv_lidar3d::calibration::Laser;
 
-/// Whether a name is that of a point cloud: it ends in .pcd, .bin, .ply or .las.
+/// Whether a name is that of a point cloud: it ends in .pcd, .bin, .ply, .las, or in .laz, which is refused in words.
 #[must_use]
 pub fn is_cloud(path: &Path) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    matches!(ending.as_deref(), Some("pcd" | "bin" | "ply" | "las"))
+    matches!(ending.as_deref(), Some("pcd" | "bin" | "ply" | "las" | "laz"))
 }
 
 /// The point clouds in a folder, by name. Empty if there is none, or the folder cannot be read.
@@ -31,9 +32,28 @@ pub fn in_folder(folder: &Path) -> Vec<PathBuf> {
 /// One line.
 #[cfg(feature = "point-clouds")]
 pub fn read(path: &Path) -> Result<(Revolution, Vec<Laser>), String> {
-    let cloud = cloud_file::read(path).map_err(|error| error.to_string())?;
-    let cloud = cloud_file::ringed(&cloud);
+    let cloud = cloud_file::read_cloud(path).map_err(|error| error.to_string())?;
+    let cloud = cloud_file::ringed(&cloud.points);
     Ok((Revolution { points: cloud.points, is_whole: true, ..Revolution::default() }, cloud.lasers))
+}
+
+/// What was assumed of a file, and what is doubtful in it; nothing if it cannot be read.
+#[cfg(feature = "point-clouds")]
+#[must_use]
+pub fn account(path: &Path) -> Account {
+    let mut account = Account::default();
+    if let Ok(cloud) = cloud_file::read_cloud(path) {
+        cloud.notes.into_iter().for_each(|note| account.note(note));
+        cloud.warnings.into_iter().for_each(|warning| account.warn(warning));
+    }
+    account
+}
+
+/// Stands for the formats where they were left out.
+#[cfg(not(feature = "point-clouds"))]
+#[must_use]
+pub fn account(_: &Path) -> Account {
+    Account::default()
 }
 
 /// Stands for the formats where they were left out.

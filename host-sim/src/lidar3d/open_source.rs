@@ -1,5 +1,6 @@
 //! A source that has been looked at: its revolutions, one after the other.
 
+use std::net::IpAddr;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +10,7 @@ use agv_core::measurement::Time;
 use agv_lidar3d::packet::{Packet, Tally, ouster};
 
 use super::bag_clouds;
-use super::capture;
+use super::capture::{self, Wanted};
 use super::clouds;
 use super::kind::Datagram;
 use super::live::Listener;
@@ -29,6 +30,7 @@ pub(super) enum Packets {
     Capture {
         path: PathBuf,
         port: Option<u16>,
+        address: Option<IpAddr>,
         ouster: Option<Box<ouster::Sensor>>,
     },
     Images(RangeImages),
@@ -149,8 +151,9 @@ impl Packets {
         mut push: impl FnMut(Time, &Datagram<'_>) -> ControlFlow<()>,
     ) -> Result<String, SourceError> {
         match self {
-            Self::Capture { path, port, ouster } => {
-                capture::for_each_until(path, *port, ouster.as_deref(), push)?;
+            Self::Capture { path, port, address, ouster } => {
+                let wanted = Wanted { port: *port, address: *address, ouster: ouster.as_deref() };
+                capture::for_each_until(path, wanted, push)?;
                 Ok(path.display().to_string())
             }
             Self::Images(images) => {

@@ -39,7 +39,7 @@ fn points(cloud: &PointCloud2) -> Result<Vec<(FilePoint, f64)>, String> {
     let needed = |name: &str| field(&[name]).ok_or_else(|| format!("a cloud has no field {name}"));
     let position = [needed("x")?, needed("y")?, needed("z")?];
     let intensity = field(&["intensity", "reflectivity"]);
-    let ring = field(&["ring", "channel"]);
+    let ring = field(&["ring", "channel", "line"]);
     let time = field(&["t", "time", "timestamp", "time_stamp", "offset_time"]);
     let step = cloud.point_step as usize;
     let (count, row) = (cloud.width as usize, cloud.row_step as usize);
@@ -52,9 +52,7 @@ fn points(cloud: &PointCloud2) -> Result<Vec<(FilePoint, f64)>, String> {
         let read = |field: &PointField| value(field, bytes, cloud.is_bigendian);
         let [x, y, z] = position.map(read);
         let missing = || "a field lies outside of its point, or is of no kind that ROS knows".to_owned();
-        // Whole numbers of time are nanoseconds.
-        let unit = |field: &PointField| if field.datatype < FLOAT { 1e-9 } else { 1.0 };
-        let time = time.map_or(Some(0.0), |field| Some(unit(field) * read(field)?)).ok_or_else(missing)?;
+        let time = time.map_or(Some(0.0), read).ok_or_else(missing)?;
         let point = FilePoint {
             position: [x.ok_or_else(missing)?, y.ok_or_else(missing)?, z.ok_or_else(missing)?],
             intensity: intensity.map_or(Some(0.0), read).ok_or_else(missing)?,
@@ -65,7 +63,31 @@ fn points(cloud: &PointCloud2) -> Result<Vec<(FilePoint, f64)>, String> {
         };
         points.push((point, time));
     }
+    // Whole numbers of time are nanoseconds.
+    let unit = match time {
+        Some(field) if field.datatype < FLOAT => 1e-9,
+        _ => unit_of_times(&points, cloud.header.stamp.nanoseconds()),
+    };
+    points.iter_mut().for_each(|(_, time)| *time *= unit);
     Ok(points)
+}
+
+/// A scan lasts no longer, s.
+const LONGEST_SCAN: f64 = 2.0;
+/// Units in which drivers tell the times of points, s.
+const UNITS: [f64; 4] = [1.0, 1e-3, 1e-6, 1e-9];
+/// A time of a point by the clock is this near to the stamp of the cloud, s.
+const NEAR: f64 = 1e5;
+
+/// The unit of times that are no whole numbers, s: that in which they agree with the stamp, or the largest one in which the scan lasts no
+/// longer than scans do. Drivers of Livox tell nanoseconds by the clock, others milliseconds from the stamp on.
+fn unit_of_times(points: &[(FilePoint, f64)], stamp: i64) -> f64 {
+    let times = || points.iter().map(|(_, time)| *time).filter(|time| time.is_finite());
+    let (least, most) = times().fold((f64::MAX, f64::MIN), |(least, most), time| (least.min(time), most.max(time)));
+    let stamp = stamp as f64 * 1e-9;
+    let agrees = |unit: &&f64| (least * **unit - stamp).abs() < NEAR && stamp > ABSOLUTE;
+    let is_short = |unit: &&f64| (most - least) * **unit <= LONGEST_SCAN;
+    UNITS.iter().find(|unit| agrees(unit)).or_else(|| UNITS.iter().find(is_short)).copied().unwrap_or(1.0)
 }
 
 /// How many points there are; None if the bytes do not hold so many.

@@ -58,7 +58,12 @@ pub struct Revolutions {
     current: Revolution,
     has_begun: bool,
     last: Option<u16>,
+    /// Points in a row that lie before the beginning of the current revolution.
+    late: usize,
 }
+
+/// More points in a row that seem to come late are those behind a gap, about a packet of each of the densest sensors.
+const MOST_LATE: usize = 5000;
 
 impl Revolutions {
     /// Of a sensor.
@@ -69,6 +74,7 @@ impl Revolutions {
             current: Revolution::default(),
             has_begun: false,
             last: None,
+            late: 0,
             beginning: 0,
         }
     }
@@ -81,7 +87,7 @@ impl Revolutions {
 
     /// Takes a packet; `take` is called with each revolution that it ends.
     pub fn datagram(&mut self, time: Time, datagram: &Datagram<'_>, mut take: impl FnMut(Revolution)) {
-        let Self { decoder, beginning, current, has_begun, last } = self;
+        let Self { decoder, beginning, current, has_begun, last, late } = self;
         if current.points.is_empty() {
             current.start = time;
         }
@@ -98,7 +104,12 @@ impl Revolutions {
                 *has_begun = true;
                 take(whole);
             }
-            *last = Some(turned);
+            // A packet that came late begins no revolution, and the next one does not end it again.
+            let is_late = last.is_some_and(|last| turned > last && turned - last > TURN / 2);
+            *late = if is_late { *late + 1 } else { 0 };
+            if !is_late || *late > MOST_LATE {
+                *last = Some(turned);
+            }
             let after = (1e9 * time.since(current.start)).round() as i32;
             current.points.push(Point { time: after.saturating_add(point.time), ..point });
         });

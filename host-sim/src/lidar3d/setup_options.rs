@@ -1,5 +1,6 @@
 //! What somebody states about a sensor, and why that does not do.
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 
 use agv_lidar3d::calibration::CalibrationError;
@@ -18,6 +19,8 @@ pub struct SetupOptions {
     pub calibration: Option<PathBuf>,
     /// UDP port of a capture; None for that of the first packet of a sensor.
     pub port: Option<u16>,
+    /// Address from which the sensor sends, of a capture; None for that of the first packet of a sensor.
+    pub address: Option<IpAddr>,
     /// How the offsets of its beams are measured.
     pub offsets: Offsets,
     /// Whether the maker's two-point correction is used where a laser states it.

@@ -108,7 +108,8 @@ fn opened_capture(path: PathBuf, options: &SetupOptions) -> Opened {
         SurveyError::Capture(error) => SourceError::Capture(error),
         SurveyError::Setup(error) => SourceError::Setup(error),
     })?;
-    let packets = Packets::Capture { port: survey.port, path, ouster: options.ouster()?.map(Box::new) };
+    let packets =
+        Packets::Capture { port: survey.port, address: survey.address, path, ouster: options.ouster()?.map(Box::new) };
     Ok((survey, None, packets))
 }
 
@@ -125,7 +126,8 @@ fn opened_images(path: &Path) -> Opened {
 fn opened_clouds(path: &Path, files: Vec<PathBuf>, options: &SetupOptions) -> Opened {
     let first = files.first().ok_or_else(|| SourceError::Cloud(format!("{}: no cloud", path.display())))?;
     let (_, lasers) = clouds::read(first).map_err(SourceError::Cloud)?;
-    let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, ..Survey::default() };
+    let account = clouds::account(first);
+    let survey = Survey { kind: Some(Kind::Cloud), turns: files.len() as f64, account, ..Survey::default() };
     Ok((survey, Some(Setup::of_clouds(options, lasers)), Packets::Clouds(files)))
 }
 

@@ -1,5 +1,6 @@
 //! What a stream of packets is, before any of it is decoded.
 
+use std::net::IpAddr;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -8,9 +9,10 @@ use agv_lidar3d::calibration::Calibration;
 use agv_lidar3d::calibration::calibration_from_stream;
 use agv_lidar3d::packet::{Packet, Sensor, Tail, counts_between, hesai};
 
-use super::capture::{self, CaptureError};
+use super::capture::{self, CaptureError, Wanted};
 use super::kind::{Datagram, Kind};
 use super::setup_options::{SetupError, SetupOptions};
+use crate::account::Account;
 
 /// Why nothing is known of a capture.
 #[derive(Debug, thiserror::Error)]
@@ -32,6 +34,10 @@ pub struct Survey {
     pub refused: usize,
     /// UDP port to which the sensor sends, in a capture.
     pub port: Option<u16>,
+    /// Address from which it sends, in a capture.
+    pub address: Option<IpAddr>,
+    /// What is missing or doubtful.
+    pub account: Account,
     /// Other packets.
     pub other: usize,
     /// Whether the file ends in the middle of a packet.
@@ -58,13 +64,19 @@ impl Survey {
     pub fn of_capture(path: &Path, options: &SetupOptions) -> Result<Self, SurveyError> {
         let ouster = options.ouster()?;
         let mut surveyor = Surveyor::default();
-        let seen = capture::for_each_until(path, options.port, ouster.as_ref(), |time, datagram| {
+        let wanted = Wanted { port: options.port, address: options.address, ouster: ouster.as_ref() };
+        let seen = capture::for_each_until(path, wanted, |time, datagram| {
             surveyor.datagram(time, datagram);
             ControlFlow::Continue(())
         })?;
+        let late = surveyor.late;
         let mut survey = surveyor.finish();
+        seen.tell(&mut survey.account);
+        if late > 0 {
+            survey.account.warn(format!("{late} of {} packets came behind later ones", survey.packets));
+        }
         (survey.refused, survey.other, survey.is_cut) = (seen.refused, seen.other, seen.is_cut);
-        survey.port = seen.port;
+        (survey.port, survey.address) = (seen.port, seen.address);
         if let Some(ouster) = ouster {
             let columns = survey.packets * ouster.columns_per_packet;
             survey.turns = columns as f64 / f64::from(ouster.columns_per_frame);
@@ -79,13 +91,18 @@ impl Survey {
     }
 }
 
+/// Hundredths of a degree in a turn of the head.
+const TURN: i64 = 36_000;
+
 /// Takes note of packets one after the other.
 #[derive(Default)]
 pub struct Surveyor {
     survey: Survey,
     tails: Vec<Tail>,
     last_azimuth: Option<u16>,
-    counts: u64,
+    counts: i64,
+    /// Packets whose first angle lies behind the last one of the packet before.
+    late: usize,
 }
 
 impl Surveyor {
@@ -107,6 +124,7 @@ impl Surveyor {
             (first, None) => first.name().to_owned(),
             (first, Some(second)) => format!("{} and {}", first.name(), second.name()),
         });
+        self.begin_at(packet.azimuth(0));
         for azimuth in (0..packet.blocks()).filter_map(|block| packet.azimuth(block)) {
             self.turn_to(azimuth);
         }
@@ -126,16 +144,25 @@ impl Surveyor {
             survey.version = Some(text.iter().map(|byte| char::from(*byte)).collect());
         }
         self.tails.push(tail);
+        self.begin_at(packet.blocks().next().map(|block| block.azimuth()));
         for block in packet.blocks() {
             self.turn_to(block.azimuth());
         }
     }
 
+    /// The head turns on; an angle that lies behind is that of a packet that came late.
     fn turn_to(&mut self, azimuth: u16) {
         if let Some(last) = self.last_azimuth {
-            self.counts += u64::from(counts_between(last, azimuth));
+            let step = i64::from(counts_between(last, azimuth));
+            self.counts += if step > TURN / 2 { step - TURN } else { step };
         }
         self.last_azimuth = Some(azimuth);
+    }
+
+    /// Takes note of a packet that begins at that angle.
+    fn begin_at(&mut self, azimuth: Option<u16>) {
+        let step = self.last_azimuth.zip(azimuth).map(|(last, azimuth)| i64::from(counts_between(last, azimuth)));
+        self.late += usize::from(step.is_some_and(|step| step > TURN / 2));
     }
 
     /// The kind of sensor, as far as it is known.
@@ -148,7 +175,7 @@ impl Surveyor {
     #[must_use]
     pub fn finish(self) -> Survey {
         let mut survey = self.survey;
-        survey.turns = self.counts as f64 / 36_000.0;
+        survey.turns = self.counts.max(0) as f64 / TURN as f64;
         if survey.kind == Some(Kind::Velodyne(Sensor::Hdl64e)) {
             survey.calibration = calibration_from_stream(self.tails);
         } else {

@@ -7,7 +7,7 @@ use agv_controller::{BusEvent, EncoderNodes, EncoderOutput, Encoders};
 use agv_core::localizer::Parameters;
 use agv_core::measurement::{EncoderFault, Time};
 use agv_core::record::{RawSource, Record};
-use agv_wire::can::frame::{AnyFrame, Frame};
+use agv_wire::can::frame::{AnyFrame, Frame, Id};
 use agv_wire::can::slcan::Message;
 
 use super::{Limits, LiveError, Recorder};
@@ -26,6 +26,26 @@ pub struct CanSummary {
     pub fault_changes: usize,
     /// How often the bus was lost.
     pub lost: usize,
+    /// Nodes that were heard, one bit each, by the identifiers of CANopen.
+    pub nodes: u128,
+}
+
+impl CanSummary {
+    /// The nodes that were heard, in order.
+    #[must_use]
+    pub fn heard(&self) -> Vec<u8> {
+        (1..=127).filter(|node| self.nodes & (1 << node) != 0).collect()
+    }
+
+    fn hear(&mut self, frame: &AnyFrame) {
+        // Emergencies, process data, answers to service data, heartbeats (CiA 301, 7.3.3).
+        let Id::Standard(identifier) = frame.id() else { return };
+        let identifier = identifier.as_raw();
+        let (function, node) = (identifier >> 7, identifier & 0x7F);
+        if node != 0 && matches!(function, 1 | 3 | 5 | 7 | 9 | 11 | 14) {
+            self.nodes |= 1 << node;
+        }
+    }
 }
 
 /// How long a look at the bus may take.
@@ -61,7 +81,7 @@ pub fn record_can(
     let encoders = Encoders::new(nodes, parameters, start);
     let mut recording = Recording { recorder, encoders, summary: CanSummary::default(), faults: [None; 2] };
     let mut tried = Instant::now();
-    while !is_stopped.load(Ordering::Relaxed) && !limits.is_over(clock.now(), recording.summary.frames == 0) {
+    while !is_stopped.load(Ordering::Relaxed) && !limits.is_over(clock.now(), recording.summary.samples == 0) {
         let deadline = Instant::now() + LOOK.min(clock.until(limits.until));
         let outcome = match &mut bus {
             Some(bus) => recording.look(&mut **bus, clock, deadline),
@@ -106,6 +126,7 @@ impl Recording<'_> {
         let line = frame.map(|frame| Message::from(*frame).encode()).unwrap_or_default();
         recorder.write_raw(RawSource::FromCan, now, &line)?;
         summary.frames += usize::from(frame.is_some());
+        frame.into_iter().for_each(|frame| summary.hear(frame));
         let mut answers = Vec::new();
         let mut outputs = Vec::new();
         encoders.look(now, frame.and_then(AnyFrame::classic), |output| outputs.push(output));
@@ -135,5 +156,22 @@ impl Recording<'_> {
             recorder.write(&Record::Event(event.event()))?;
         }
         Ok(answers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use agv_wire::can::frame::{AnyFrame, Frame, standard_id};
+
+    use super::CanSummary;
+
+    #[test]
+    fn nodes_are_heard_by_what_they_send() {
+        let mut summary = CanSummary::default();
+        // An emergency, process data, a heartbeat; orders of a master, SYNC and NMT are of no node.
+        for identifier in [0x083, 0x185, 0x70A, 0x603, 0x204, 0x080, 0x000] {
+            summary.hear(&AnyFrame::from(Frame::new(standard_id(identifier), &[0; 4]).unwrap()));
+        }
+        assert_eq!(summary.heard(), [3, 5, 10]);
     }
 }

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -32,13 +32,28 @@ struct Inner {
     frame: Vec<u8>,
 }
 
+impl Inner {
+    fn tell(&mut self, bytes: Arc<[u8]>) {
+        // Who is slow misses a frame; who has gone is forgotten.
+        self.listeners
+            .retain(|listener| !matches!(listener.try_send(Arc::clone(&bytes)), Err(TrySendError::Disconnected(_))));
+    }
+}
+
 impl Relay {
     /// A relay on any free port.
     ///
     /// # Errors
     /// If there is none.
     pub fn bind() -> io::Result<Self> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
+        Self::of(TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?)
+    }
+
+    /// A relay on a port that somebody has opened.
+    ///
+    /// # Errors
+    /// If the socket fails.
+    pub fn of(listener: TcpListener) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
         let inner = Inner { greeting: Vec::new(), listeners: Vec::new(), sequence: 0, frame: vec![0; MAX_FRAME] };
         Ok(Self { listener, inner: Mutex::new(inner) })
@@ -59,7 +74,7 @@ impl Relay {
     /// Passes a record on.
     pub fn pass(&self, record: &Record) {
         let mut inner = self.inner();
-        let Inner { greeting, listeners, sequence, frame } = &mut *inner;
+        let Inner { greeting, sequence, frame, .. } = &mut *inner;
         if matches!(record, Record::Header(_)) {
             // A controller that has started again.
             greeting.clear();
@@ -72,11 +87,16 @@ impl Relay {
         if matches!(record, Record::Header(_) | Record::Landmarks(_)) {
             greeting.extend_from_slice(bytes);
         }
-        let bytes: Arc<[u8]> = bytes.into();
-        // Who is slow misses a frame; who has gone is forgotten.
-        listeners.retain(|listener| {
-            !matches!(listener.try_send(Arc::clone(&bytes)), Err(std::sync::mpsc::TrySendError::Disconnected(_)))
-        });
+        let bytes = bytes.into();
+        inner.tell(bytes);
+    }
+
+    /// Passes a record on whose frame somebody else has made and numbered, behind those that each listener is given first.
+    pub fn pass_frame(&self, bytes: &[u8]) {
+        let mut inner = self.inner();
+        if !inner.listeners.is_empty() && !bytes.is_empty() {
+            inner.tell(bytes.into());
+        }
     }
 
     /// Serves listeners until `is_stopped`.

@@ -11,10 +11,11 @@ pub use start_search::{ContourFinder, ContourRoom, StartSearchError, find_start,
 use std::time::{Duration, Instant};
 
 use agv_core::contours::KeptMap;
-use agv_core::localizer::{ContourCapacities, LandmarkUse, Localizer, PoseOutput};
+use agv_core::localizer::{ContourCapacities, LandmarkUse, Localizer, PoseOutput, PredictionState};
 use agv_core::maps::MapError;
-use agv_core::odometry::{GyroErrors, OdometryBias};
+use agv_core::measurement::Time;
 use agv_core::record::Output;
+use serde::Serialize;
 use thiserror::Error;
 
 use crate::recording::Recording;
@@ -22,22 +23,31 @@ use crate::recording::Recording;
 /// What the localiser said of a whole recording.
 #[derive(Clone, Debug, Default)]
 pub struct Replay {
-    /// The pose, and what was known of the odometry, before the first event.
-    pub start: Option<(PoseOutput, OdometryBias)>,
+    /// The pose, and what was known of the motion, before the first event.
+    pub start: Option<(PoseOutput, PredictionState)>,
     /// The pose after each event.
     pub poses: Vec<PoseOutput>,
-    /// What had been learnt of the odometry after each event.
-    pub biases: Vec<OdometryBias>,
-    /// What had been learnt of the gyro after each event; nothing of a vehicle without one.
-    pub gyro: Vec<GyroErrors>,
+    /// What had been learnt of the motion after each event.
+    pub predictions: Vec<PredictionState>,
     /// What became of each observation, event by event.
     pub uses: Vec<LandmarkUse>,
     /// For each event, how many observations there were up to and including it.
     pub use_ends: Vec<usize>,
     /// Landmarks that were found while driving, as they are at the end.
     pub dynamic_landmarks: Vec<[f64; 2]>,
+    /// Scans that were laid onto contours.
+    pub contours: ContourCounts,
     /// Processor time that the core took.
     pub elapsed: Duration,
+}
+
+/// What became of the scans that were laid onto contours: those of a kept map, or of the distance behind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ContourCounts {
+    /// Scans.
+    pub scans: usize,
+    /// Those that corrected the pose.
+    pub matched: usize,
 }
 
 impl Replay {
@@ -84,16 +94,22 @@ pub fn replay_in(
         MapError::Full => ReplayError::MapTooLarge,
         MapError::NotFinite => ReplayError::MapNotFinite,
     })?;
-    let start = Some((localizer.outputs().pose, localizer.odometry_bias()));
+    let start = Some((localizer.outputs().pose, localizer.prediction_state()));
     let mut replay = Replay { start, poses: Vec::with_capacity(recording.events.len()), ..Replay::default() };
+    let mut told: Option<Time> = None;
     let start = Instant::now();
     for (index, event) in recording.events.iter().enumerate() {
         let outputs = localizer.handle(&event.view());
+        let status = &outputs.sources.contours;
+        if status.told != told {
+            told = status.told;
+            replay.contours.scans += 1;
+            replay.contours.matched += usize::from(status.accepted > 0);
+        }
         replay.uses.extend_from_slice(&outputs.uses);
         replay.use_ends.push(replay.uses.len());
         replay.poses.push(outputs.pose);
-        replay.biases.push(localizer.odometry_bias());
-        replay.gyro.extend(localizer.gyro_errors());
+        replay.predictions.push(localizer.prediction_state());
         if index % 1024 == 0 {
             progress(index);
         }

@@ -2,7 +2,6 @@
 
 use agv_controller::MOTIONS;
 use agv_core::localizer::{Event, OutputPredictor};
-use agv_core::odometry::GyroErrors;
 use agv_core::record::{MAX_FRAME, Published, Record, encode};
 
 use super::{Comparison, Replay};
@@ -91,12 +90,9 @@ impl<'a> Publisher<'a> {
         }
         self.answered = answered;
         if let Some(answer) = answered.checked_sub(1) {
-            self.predictor.update_gyro(self.replay.gyro.get(answer).copied());
-            self.predictor.update(&self.replay.poses[answer], &self.replay.biases[answer]);
-        } else if let Some((pose, bias)) = &self.replay.start {
-            let has_gyro = !self.replay.gyro.is_empty();
-            self.predictor.update_gyro(has_gyro.then(GyroErrors::default));
-            self.predictor.update(pose, bias);
+            self.predictor.update(&self.replay.poses[answer], &self.replay.predictions[answer]);
+        } else if let Some((pose, prediction)) = &self.replay.start {
+            self.predictor.update(pose, prediction);
         }
     }
 }

@@ -6,6 +6,7 @@ use super::figure::{
     Area, BACKGROUND_INK, Extent, Figure, FigureError, HEIGHT, MARGIN, MARKS, Mark, PointSet, Series, Shape,
     WARNING_INK, X_LABELS, Y_LABELS, axes, axis_number, colour, draw,
 };
+use super::kinds::look_of;
 use super::thinning::{thin_line, thin_points};
 
 /// Points of one line, and of one set of points, that are drawn at the most.
@@ -57,7 +58,9 @@ pub fn scatter_chart(labels: [&str; 2], sets: &[PointSet], bounds: Option<Bounds
     let mut legend: Vec<_> = sets
         .iter()
         .enumerate()
-        .map(|(index, set)| (Mark::Point(Shape::of(index)), colour(index), set.name.to_owned()))
+        .map(|(index, set)| {
+            (Mark::Point(look_of(set.name, index).shape), look_of(set.name, index).colour, set.name.to_owned())
+        })
         .collect();
     legend.extend(bounds.map(|bounds| (Mark::Dashes, BLACK, bounds.name.to_owned())));
     let (x, y) = extents(points, bounds);
@@ -67,9 +70,12 @@ pub fn scatter_chart(labels: [&str; 2], sets: &[PointSet], bounds: Option<Bounds
         for (index, set) in sets.iter().enumerate() {
             let thinned = thin_points(set.points, SET_POINTS);
             let finite = thinned.into_iter().filter(|point| point.0.is_finite() && point.1.is_finite());
-            let ink = colour(index).mix(0.6);
-            match Shape::of(index) {
-                Shape::Disc => chart.draw_series(finite.map(|point| Circle::new(point, 2, ink.filled())))?,
+            let look = look_of(set.name, index);
+            let ink = look.colour.mix(0.6);
+            match look.shape {
+                Shape::Disc | Shape::Square | Shape::Frame => {
+                    chart.draw_series(finite.map(|point| Circle::new(point, 2, ink.filled())))?
+                }
                 Shape::Cross => chart.draw_series(finite.map(|point| Cross::new(point, 3, ink)))?,
                 Shape::Triangle => {
                     chart.draw_series(finite.map(|point| TriangleMarker::new(point, 3, ink.filled())))?

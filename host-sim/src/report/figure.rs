@@ -65,6 +65,8 @@ pub(super) enum Shape {
     Disc,
     Cross,
     Triangle,
+    Square,
+    Frame,
 }
 
 impl Shape {
@@ -93,13 +95,16 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// From light to dark, in order for every eye (cividis; J. Nunez, C. Anderton, R. Renslow, PLoS ONE 13(7), 2018).
-pub(super) const SHADES: [RGBColor; 5] = [
-    RGBColor(255, 234, 70),
-    RGBColor(203, 186, 105),
-    RGBColor(148, 142, 119),
-    RGBColor(87, 92, 109),
-    RGBColor(0, 34, 78),
+/// From good to bad: dark green to light, and from light to dark red; their lightness alone tells on which side a shade is, as the good ones
+/// are greenish for every eye (C. Brewer, ColorBrewer, `BrBG` turned, 2003).
+pub(super) const SHADES: [RGBColor; 7] = [
+    RGBColor(1, 102, 94),
+    RGBColor(53, 151, 143),
+    RGBColor(128, 205, 193),
+    RGBColor(199, 234, 229),
+    RGBColor(246, 232, 195),
+    RGBColor(191, 129, 45),
+    RGBColor(84, 48, 5),
 ];
 
 /// Grey of what stands in the background.

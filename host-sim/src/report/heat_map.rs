@@ -29,7 +29,12 @@ pub struct HeatMap<'a> {
     pub classes: &'a [&'a str],
     /// Points above the squares.
     pub points: PointSet<'a>,
+    /// The name of each point, which is written beside it if they are few; or none.
+    pub names: &'a [String],
 }
+
+/// Names that are written at the most.
+const NAMES: usize = 80;
 
 /// Greatest height of the plan, pixels.
 const TALLEST: f64 = 720.0;
@@ -71,9 +76,16 @@ pub fn heat_map(map: &HeatMap) -> Result<Figure, FigureError> {
         chart.draw_series(cells)?;
         chart.draw_series(map.points.points.iter().map(|point| Circle::new(*point, 5, WHITE.filled())))?;
         chart.draw_series(map.points.points.iter().map(|point| Circle::new(*point, 4, POINT_INK.filled())))?;
+        if map.names.len() <= NAMES {
+            let named = map.points.points.iter().zip(map.names);
+            let style = ("sans-serif", 15).into_font().color(&BLACK);
+            chart.draw_series(
+                named.map(|(point, name)| EmptyElement::at(*point) + Text::new(name.clone(), (7, -14), style.clone())),
+            )?;
+        }
         Ok(())
     })
 }
 
-/// Colour of the points, unlike every shade.
-const POINT_INK: RGBColor = RGBColor(213, 94, 0);
+/// Colour of the points: that of reflectors everywhere.
+const POINT_INK: RGBColor = RGBColor(0, 114, 178);

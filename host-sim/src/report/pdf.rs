@@ -22,6 +22,14 @@ pub enum PdfError {
         /// What the operating system says.
         source: std::io::Error,
     },
+    /// The browser wrote a part of it.
+    #[error("{}: Chromium has written {bytes} bytes, and the end is missing: is the disk full?", path.display())]
+    Cut {
+        /// The file.
+        path: PathBuf,
+        /// What there is of it.
+        bytes: usize,
+    },
     /// The browser wrote nothing.
     #[error("{}: Chromium has not written the PDF", path.display())]
     Nothing {
@@ -56,10 +64,22 @@ pub fn write_pdf(html: &Path, pdf: &Path) -> Result<(), PdfError> {
     // The page is this program's own, without scripts, so that no sandbox is needed; as root there is none.
     command.args(["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]).arg(target).arg(html);
     let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    let is_written = || aside.metadata().is_ok_and(|written| written.len() > 0);
-    if status.is_ok_and(|status| status.success()) && is_written() {
-        file.finish().map_err(io(pdf))
-    } else {
+    let is_done = status.is_ok_and(|status| status.success());
+    let bytes = std::fs::read(&aside).map_err(io(pdf))?;
+    if !is_done || bytes.is_empty() {
         Err(PdfError::Nothing { path: pdf.to_owned() })
+    } else if !is_whole(&bytes) {
+        // Chromium says nothing of a disk that is full.
+        Err(PdfError::Cut { path: pdf.to_owned(), bytes: bytes.len() })
+    } else {
+        file.finish().map_err(io(pdf))
     }
+}
+
+/// Where the mark of its end stands, from the end (PDF 32000-1, 7.5.5, and Adobe's own readers).
+const TAIL: usize = 1024;
+
+fn is_whole(bytes: &[u8]) -> bool {
+    let tail = &bytes[bytes.len().saturating_sub(TAIL)..];
+    bytes.starts_with(b"%PDF-") && tail.windows(5).any(|word| word == b"%%EOF")
 }

@@ -1,5 +1,6 @@
 //! Messages of ROS 2 as their recordings hold them, to the extent that vehicles and this program exchange.
 
+mod attachment;
 mod bag;
 mod bag_message;
 mod database;
@@ -7,7 +8,8 @@ mod encoding;
 pub mod messages;
 mod schema;
 
-pub use bag::{Bag, BagError};
+pub use attachment::{ATTACHED_LOG, attachment};
+pub use bag::{Bag, BagError, is_recording};
 pub use bag_message::BagMessage;
 pub use encoding::{MessageError, decode, encode};
 pub use schema::{Kind, definition};

@@ -48,8 +48,10 @@ impl Phase<'_> {
 
 /// Length over which the steering law takes a change of curvature, m.
 const CURVATURE_WINDOW: f64 = 0.5;
-/// Length within which the steering law takes away an offset from the path, m.
+/// Length within which the steering law takes away an offset from the path, m, and in so many of its steps at least: a law that sees its
+/// pose less often sways.
 const RETURN_LENGTH: f64 = 0.6;
+const RETURN_STEPS: f64 = 5.0;
 /// The wheel turns no farther than this to either side, rad.
 const LARGEST_STEERING: f64 = 1.4;
 
@@ -91,7 +93,7 @@ pub fn drive(
                     (leg, start, way_before, way)
                 }
             };
-            let command = steering_command(leg, start, way_after, &state.pose, wheelbase);
+            let command = steering_command(leg, start, [way_before, way_after], &state.pose, wheelbase);
             let steering = state.steering + (command - state.steering).clamp(-steering_step, steering_step);
             let mean_steering = 0.5 * (state.steering + steering);
             let moved = leg.direction.sign() * (way_after - way_before);
@@ -131,14 +133,15 @@ fn timetable<'a>(path: &'a Path, options: &DriveOptions) -> Vec<Phase<'a>> {
     phases
 }
 
-/// The steering angle (rad) that keeps a vehicle at `pose` on the leg from `start` after `way` (m).
+/// The steering angle (rad) that keeps a vehicle at `pose` on the leg from `start` between two ways (m).
 #[must_use]
-pub fn steering_command(leg: &Leg, start: &Pose, way: f64, pose: &Pose, wheelbase: f64) -> f64 {
+pub fn steering_command(leg: &Leg, start: &Pose, [before, way]: [f64; 2], pose: &Pose, wheelbase: f64) -> f64 {
     let reference = leg.pose(start, way);
     let lateral = reference.between(pose).y;
     let heading = difference(pose.theta, reference.theta);
+    let return_length = RETURN_LENGTH.max(RETURN_STEPS * (way - before).abs());
     let curvature = leg.mean_curvature(way, CURVATURE_WINDOW)
-        - lateral / (RETURN_LENGTH * RETURN_LENGTH)
-        - leg.direction.sign() * 2.0 * heading / RETURN_LENGTH;
+        - lateral / (return_length * return_length)
+        - leg.direction.sign() * 2.0 * heading / return_length;
     libm::atan(wheelbase * curvature).clamp(-LARGEST_STEERING, LARGEST_STEERING)
 }

@@ -102,7 +102,7 @@ fn replay(path: &Path, size: u64, shared: &Shared, is_stopped: &AtomicBool) -> R
 const PAUSE: Duration = Duration::from_millis(200);
 
 /// Follows the log stream of a controller until it ends or `is_stopped`, and writes it to `output` if that is given.
-/// Waits for a controller that does not answer yet.
+/// Waits for a controller that does not answer yet, and calls `wait` with the reason, the first time and when it changes.
 ///
 /// # Errors
 /// If what comes is no log, or the log cannot be written.
@@ -111,7 +111,9 @@ pub fn follow(
     output: Option<&Path>,
     shared: &Shared,
     is_stopped: &Arc<AtomicBool>,
+    mut wait: impl FnMut(&str),
 ) -> Result<(), FeedError> {
+    let mut told = String::new();
     let mut copy = output.map(LogCopy::new);
     let outcome = loop {
         let mut has_begun = false;
@@ -126,7 +128,14 @@ pub fn follow(
             })
         });
         match outcome {
-            Err(LogError::Empty { .. } | LogError::Io { .. }) if !has_begun && !is_stopped.load(Ordering::Relaxed) => {
+            Err(reason @ (LogError::Empty { .. } | LogError::Io { .. }))
+                if !has_begun && !is_stopped.load(Ordering::Relaxed) =>
+            {
+                let reason = reason.to_string();
+                if reason != told {
+                    wait(&reason);
+                    told = reason;
+                }
                 std::thread::sleep(PAUSE);
             }
             outcome => break outcome,

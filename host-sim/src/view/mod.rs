@@ -15,5 +15,6 @@ pub use happening::{Happening, HappeningKind};
 pub use moment::Moment;
 pub use overview::Overview;
 pub use path::{Outline, Window};
+pub(crate) use server::serve_router;
 pub use server::{Shared, serve};
 pub use timeline::{Status, Timeline};

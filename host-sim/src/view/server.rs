@@ -69,7 +69,6 @@ const LOOK: Duration = Duration::from_millis(50);
 /// # Errors
 /// If the socket fails.
 pub fn serve(listener: TcpListener, shared: &Shared, is_stopped: &Arc<AtomicBool>) -> std::io::Result<()> {
-    listener.set_nonblocking(true)?;
     let router = Router::new()
         .route("/", get(page))
         .route("/api/description", get(description))
@@ -81,8 +80,21 @@ pub fn serve(listener: TcpListener, shared: &Shared, is_stopped: &Arc<AtomicBool
         .layer(middleware::from_fn(guard))
         .with_state(shared.clone());
     let is_stopped = Arc::clone(is_stopped);
+    serve_router(listener, router, move || is_stopped.load(Ordering::Relaxed))
+}
+
+/// Serves what a router has until `is_over`.
+///
+/// # Errors
+/// If the socket fails.
+pub(crate) fn serve_router(
+    listener: TcpListener,
+    router: Router,
+    is_over: impl Fn() -> bool + Send + 'static,
+) -> std::io::Result<()> {
+    listener.set_nonblocking(true)?;
     let end = async move {
-        while !is_stopped.load(Ordering::Relaxed) {
+        while !is_over() {
             tokio::time::sleep(LOOK).await;
         }
     };

@@ -46,13 +46,14 @@ pub fn ringed(cloud: &[FilePoint]) -> Ringed {
     for (ring, (number, _)) in order.iter().enumerate() {
         ring_of[*number] = ring as u8;
     }
+    let factor = intensity_factor(&seen);
     let point = |(point, number): (&&FilePoint, &usize)| {
         let [x, y, _] = point.position;
         let azimuth = (TURN - y.atan2(x).to_degrees() * 100.0).round().rem_euclid(TURN);
         let ring = ring_of[*number];
         Point {
             position: point.position.map(|value| value as f32),
-            intensity: point.intensity.clamp(0.0, f64::from(u16::MAX)) as u16,
+            intensity: (factor * point.intensity).clamp(0.0, f64::from(u16::MAX)).round() as u16,
             azimuth: azimuth as u16,
             laser: ring,
             ring,
@@ -61,6 +62,20 @@ pub fn ringed(cloud: &[FilePoint]) -> Ringed {
     };
     let laser = |(_, elevation): &(usize, f64)| Laser { elevation: *elevation, is_enabled: true, ..Laser::default() };
     Ringed { points: seen.iter().zip(&numbers).map(point).collect(), lasers: order.iter().map(laser).collect() }
+}
+
+/// From the unit of a file to whole numbers: shares of the largest intensity, as KITTI has them, become those of 255, and what is larger
+/// than 65,535 is scaled down.
+fn intensity_factor(points: &[&FilePoint]) -> f64 {
+    let intensities = || points.iter().map(|point| point.intensity).filter(|value| value.is_finite());
+    let largest = intensities().fold(0.0, f64::max);
+    if largest > f64::from(u16::MAX) {
+        f64::from(u16::MAX) / largest
+    } else if largest > 0.0 && largest <= 1.0 && intensities().any(|value| value.fract() != 0.0) {
+        255.0
+    } else {
+        1.0
+    }
 }
 
 fn elevation([x, y, z]: [f64; 3]) -> f64 {

@@ -63,6 +63,7 @@ fn pack(folder: &Path, parts: &Parts, epoch: &str) -> anyhow::Result<[PathBuf; 2
     let root = folder.join(format!("agv-{VERSION}"));
     program(&root, &parts.agv)?;
     documents(&root)?;
+    service(&root)?;
     write(&root.join("share/doc/agv/LICENSES-OF-OTHERS"), parts.texts.as_bytes())?;
     book::write(&repository().join("docs/src"), &root.join("share/doc/agv/book"))?;
     if parts.has_firmware {
@@ -110,6 +111,18 @@ fn documents(root: &Path) -> anyhow::Result<()> {
     }
     for name in ["agv.dbc", "agv.eds"] {
         copy(&repository().join("docs").join(name), &root.join("share/agv").join(name))?;
+    }
+    Ok(())
+}
+
+/// The controller as a service of systemd: its unit, its user, and an example of what it is told.
+fn service(root: &Path) -> anyhow::Result<()> {
+    for (name, place) in [
+        ("agv.service", "lib/systemd/system/agv.service"),
+        ("sysusers.conf", "lib/sysusers.d/agv.conf"),
+        ("vehicle.toml", "share/agv/vehicle.toml"),
+    ] {
+        copy(&repository().join("agv/service").join(name), &root.join(place))?;
     }
     Ok(())
 }

@@ -25,10 +25,13 @@ fn said(command: &mut Command) -> String {
 }
 
 /// What every archive holds.
-const FILES: [&str; 14] = [
+const FILES: [&str; 17] = [
     "bin/agv",
+    "lib/systemd/system/agv.service",
+    "lib/sysusers.d/agv.conf",
     "share/agv/agv.dbc",
     "share/agv/agv.eds",
+    "share/agv/vehicle.toml",
     "share/bash-completion/completions/agv",
     "share/doc/agv/CHANGELOG.md",
     "share/doc/agv/LICENSE-APACHE",

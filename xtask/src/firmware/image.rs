@@ -55,7 +55,7 @@ impl Region {
 /// Bytes of a map of contours, which the vehicle's board reads where they lie in flash, and the emulated one in RAM.
 const CONTOUR_MAP: u64 = 128 * 1024;
 
-/// The emulated board, with what the vehicle's has: its flash, and its RAM in domains D1 and D2 together.
+/// The emulated board, with what the vehicle's has: its flash, and its RAM in domains D1 to D3 together.
 pub const AN500: Board = Board {
     feature: "an500",
     chip: None,
@@ -64,7 +64,7 @@ pub const AN500: Board = Board {
     ram: &[Region {
         name: "RAM",
         addresses: 0x2000_0000..0x2040_0000,
-        budget: H743.ram[0].budget + H743.ram[1].budget + CONTOUR_MAP,
+        budget: H743.ram[0].budget + H743.ram[1].budget + H743.ram[2].budget + CONTOUR_MAP,
     }],
 };
 

@@ -4,12 +4,12 @@ mod noise;
 mod plan;
 mod wheels;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use agv_core::calibration::{MountingSide, Offsets};
 use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::odometry::Vehicle;
-use agv_host_sim::calibrate::causes::{Explanation, QUESTIONS, TRIES, differences, explain};
+use agv_host_sim::calibrate::causes::{Cause, Explanation, FEWEST_REFLECTORS, QUESTIONS, TRIES, differences, explain};
 use agv_host_sim::calibrate::drive::{Drive, Preparation};
 use agv_host_sim::calibrate::found::{Found, Grade, Method, Question, find, find_any};
 use agv_host_sim::calibrate::log_input::LogInput;
@@ -18,6 +18,8 @@ use agv_host_sim::calibrate::model::PARAMETERS;
 use agv_host_sim::calibrate::refusal::Refusal;
 use agv_host_sim::calibrate::report::{add_calibration, parameter_rows, remark_rows};
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
+use agv_host_sim::calibrate::wheeled::mistakes::explain_wheels;
+use agv_host_sim::drive_check::with_laser_motion;
 use agv_host_sim::mapping::map_file;
 use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
@@ -177,9 +179,25 @@ struct Outlier {
     theta_rad: f64,
 }
 
+/// Poses that are given at a few places tell no motion.
+const FEW_POSES: usize = 20;
+
 /// Differences of the wheelbase that are told: in standard deviations, and as a share of it.
 const CLEAR: f64 = 4.0;
 const NOTABLE: f64 = 0.003;
+
+/// Share of the wheelbase below which its deviation must be for the drive to tell it.
+const TOLD: f64 = 0.01;
+
+/// The parameters with a wheelbase that is another than the believed one, if the drive tells it.
+fn with_wheelbase(input: &LogInput, preparation: &Preparation) -> Option<(Found, Drive)> {
+    let drive = Drive::new(input, preparation).ok()?;
+    let (found, drive) = find_any(drive, &QUESTIONS).ok()?;
+    let [.., deviation, _, _, _, _] = found.deviations;
+    let causes = differences(&found, &drive.nominal, drive.is_from_stops());
+    let is_other = causes.iter().any(|cause| matches!(cause, Cause::Wheelbase(_)));
+    (is_other && deviation > 0.0 && deviation < TOLD * drive.nominal.wheelbase).then_some((found, drive))
+}
 
 /// Every explanation of a drive that cannot be calibrated.
 fn explanations(input: &LogInput) -> Vec<Explanation> {
@@ -210,7 +228,7 @@ fn explained(refusal: &Refusal, explanations: &[Explanation]) -> anyhow::Error {
 impl Calibrate {
     /// Whether nothing is asked for that the joint fit of several wheels does not have.
     fn is_plain(&self) -> bool {
-        let is_switched = self.wheelbase || self.steering_ratio || self.mend;
+        let is_switched = self.wheelbase || self.steering_ratio;
         let is_given = self.side.is_some() || self.map.is_some() || self.report.is_some();
         matches!(self.method, MethodName::Joint | MethodName::Clocks) && !is_switched && !is_given
     }
@@ -227,9 +245,15 @@ impl Calibrate {
         let reading = progress::bar("reading", size);
         let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
+        let input = self.with_laser_motion(input, log)?;
         if matches!(input.parameters.vehicle, Vehicle::Wheels(_)) || self.method == MethodName::Clocks {
-            ensure!(self.is_plain(), "{}: the fit of any wheels takes no option but --apply and --json", log.display());
-            return wheels::run(&input, self.apply.as_deref(), self.json).with_context(|| log.display().to_string());
+            ensure!(
+                self.is_plain(),
+                "{}: the fit of any wheels takes no option but --mend, --apply and --json",
+                log.display()
+            );
+            let fit = wheels::Fit { mend: self.mend, apply: self.apply.as_deref(), is_json: self.json };
+            return wheels::run(input, &fit).with_context(|| log.display().to_string());
         }
         let map: Option<Vec<Landmark>> = match &self.map {
             Some(path) => {
@@ -272,6 +296,18 @@ impl Calibrate {
         Ok(())
     }
 
+    /// Takes what the laser sees for its motion, where neither another instrument nor the odometry with reflectors tells it.
+    fn with_laser_motion(&self, input: LogInput, log: &Path) -> anyhow::Result<LogInput> {
+        let is_tricycle = matches!(input.parameters.vehicle, Vehicle::Tricycle(_)) && self.method != MethodName::Clocks;
+        let reflectors = input.revolutions.iter().filter(|seen| seen.len() >= FEWEST_REFLECTORS).count();
+        let is_told = input.laser_poses.len() > 1 || input.given_poses.len() > FEW_POSES;
+        if is_told || (is_tricycle && 2 * reflectors > input.revolutions.len() && reflectors > 0) {
+            return Ok(input);
+        }
+        let (recording, _) = agv_host_sim::log::read(log)?;
+        Ok(with_laser_motion(&input, &recording).unwrap_or(input))
+    }
+
     /// The parameters; with what explains the drive mended, if that is wanted.
     fn calibrated(&self, input: &LogInput, preparation: &Preparation) -> anyhow::Result<(Found, Drive)> {
         let attempt = |input: &LogInput, preparation: &Preparation| {
@@ -285,17 +321,31 @@ impl Calibrate {
             _ => attempt(input, preparation),
         };
         let refusal: Refusal = match first {
-            Ok(found) => return Ok(found),
+            Ok(found) if !self.mend => return Ok(found),
+            // A wheelbase that was held is to be mended, too.
+            Ok((found, drive)) => return Ok(with_wheelbase(input, preparation).unwrap_or((found, drive))),
             Err(refusal) => refusal,
         };
         let explanations = explanations(input);
-        let mended = explanations.iter().find_map(|found| Some((found, mended(input, found)?)));
+        // What no setting mends is not mended by another that looks alike.
+        let are_few = |cause: &Cause| matches!(cause, Cause::FewReflectors(_));
+        let is_named = explanations.iter().any(|found| !found.causes.iter().all(are_few));
+        let by_reflectors = explanations.iter().find_map(|found| Some((found.to_string(), mended(input, found)?)));
+        let by_wheels = || {
+            let (recording, _) = agv_host_sim::log::read(self.log.as_deref()?).ok()?;
+            let input = with_laser_motion(input, &recording)?;
+            let found = explain_wheels(&input, |_, _| ()).into_iter().find(|found| found.is_mendable())?;
+            Some((found.to_string(), found.mended))
+        };
+        let mended = by_reflectors.or_else(|| if self.mend && !is_named { by_wheels() } else { None });
         let Some((explanation, right)) = mended.filter(|_| self.mend) else {
             return Err(explained(&refusal, &explanations));
         };
         // What explains the drive was found by one of these questions.
         let asked: Vec<Question> = std::iter::once(self.question()).chain(QUESTIONS).collect();
-        let again = Drive::new(&right, preparation).and_then(|drive| find_any(drive, &asked));
+        let again = Drive::new(&right, preparation)
+            .and_then(|drive| find_any(drive, &asked))
+            .or_else(|_| Drive::among_few(&right).and_then(|drive| find_any(drive, &asked)));
         let (found, mut drive) = again.map_err(|again| explained(&again, &explanations))?;
         drive.remarks.push(format!("{explanation}: mended"));
         Ok((found, drive))

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use agv_host_sim::calibrate::innovation_noise::{KindNoise, Noise as Found, STEPS, Squares, find};
+use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::drive::kind_name;
 use agv_host_sim::log;
 use agv_host_sim::mapping::map_file;
@@ -14,15 +15,15 @@ use crate::command::progress;
 use crate::command::setting_arguments::SettingArguments;
 
 const HELP: &str = "\
-The drive is cut into sixteen pieces. The noise is fitted on every other one and held against those between. A squared innovation is stated by the one that
-the filter expects, for one degree of freedom: 1 if the noise is right, less if the filter is told too much of it.
+The drive is cut into sixteen pieces. The noise is fitted on every other one and held against those between. The mean normalised square
+of the innovations is 2 if the noise is right, as in agv replay and agv check, and less if the filter is told too much of it.
 What the map shares between sightings, how exact it is, and what the odometry does are found with it: each is told apart from the
 others by every sighting.
 
 Examples:
   agv calibrate noise drive.agvlog
   agv calibrate noise drive.agvlog --output measured.agvlog
-  agv calibrate noise drive.agvlog --map-output map.csv --json
+  agv calibrate noise drive.agvlog --apply noise.toml --map-output map.csv --json
 
 Keys of --json: good, sources [source, good, before, after, check {count, mean}], settings [name, before, after],
 map [source, factor].";
@@ -38,6 +39,9 @@ pub struct Noise {
     /// Write the log with the noise that was found, and with what the localiser then answers.
     #[arg(short, long, value_name = "LOG2")]
     output: Option<PathBuf>,
+    /// Write the settings that were found to a file that 'agv ctl HOST apply' and 'agv replay --vehicle' take.
+    #[arg(long, value_name = "FILE")]
+    apply: Option<PathBuf>,
     /// Write the map with the deviations that were found.
     #[arg(long, value_name = "MAP")]
     map_output: Option<PathBuf>,
@@ -62,6 +66,10 @@ impl Noise {
         if let Some(path) = &self.map_output {
             map_file::write(path, &found.recording.landmarks)?;
         }
+        if let Some(path) = &self.apply {
+            let settings = found.settings.iter().map(|changed| (changed.name.to_owned(), changed.after)).collect();
+            VehicleFile { settings, ..VehicleFile::default() }.write(path)?;
+        }
         if self.json {
             println!("{}", serde_json::to_string_pretty(&summary(&found))?);
         } else {
@@ -71,10 +79,11 @@ impl Noise {
     }
 
     fn print(&self, found: &Found) {
-        println!("{:<18} {:>10} {:>10} {:>10}", "squared innovation", "before", "after", "check");
+        println!("{:<32} {:>10} {:>10} {:>10}", "normalised square, 2 expected", "before", "after", "check");
         for noise in &found.kinds {
-            let [before, after, check] = [noise.before, noise.after, noise.check].map(|squares| squares.mean);
-            println!("{:<18} {before:>10.2} {after:>10.2} {check:>10.2}", kind_name(noise.kind));
+            let [before, after, check] =
+                [noise.before, noise.after, noise.check].map(|squares| COMPONENTS * squares.mean);
+            println!("{:<32} {before:>10.2} {after:>10.2} {check:>10.2}", kind_name(noise.kind));
         }
         for changed in &found.settings {
             println!("{:<32} {:.6} was {:.6}", changed.name, changed.after, changed.before);
@@ -85,6 +94,9 @@ impl Noise {
         for noise in found.kinds.iter().filter(|noise| !noise.is_good()) {
             println!("{}: the other half of the drive disagrees", kind_name(noise.kind));
         }
+        if let Some(path) = &self.apply {
+            println!("next: agv ctl HOST --key FILE apply {}", path.display());
+        }
         match &self.output {
             Some(path) => println!("next: agv accept {}", path.display()),
             None => println!("next: agv calibrate noise {} --output measured.agvlog", self.log.display()),
@@ -92,8 +104,11 @@ impl Noise {
     }
 }
 
+/// Components of an innovation: means are stated for both, as everywhere.
+const COMPONENTS: f64 = 2.0;
+
 fn summary(found: &Found) -> serde_json::Value {
-    let squares = |squares: Squares| json!({ "count": squares.count, "mean": squares.mean });
+    let squares = |squares: Squares| json!({ "count": squares.count, "mean": COMPONENTS * squares.mean });
     let source = |noise: &KindNoise| {
         json!({
             "source": kind_name(noise.kind),

@@ -9,11 +9,13 @@ use agv_host_sim::calibrate::wheeled::clock::Clock;
 use agv_host_sim::calibrate::wheeled::fit::{self, Fitted};
 use agv_host_sim::calibrate::wheeled::fitted_vehicle::{fitted_vehicle, has_setting};
 use agv_host_sim::calibrate::wheeled::log_drive::LogDrive;
+use agv_host_sim::calibrate::wheeled::mistakes::explain_wheels;
 use agv_host_sim::calibrate::wheeled::unknowns::Unknown;
 use anyhow::Context as _;
 use serde::Serialize;
 
 use crate::command::output::note;
+use crate::command::progress;
 
 #[derive(Serialize)]
 struct Summary {
@@ -23,9 +25,38 @@ struct Summary {
     residual_m: f64,
 }
 
+/// What is asked for.
+pub struct Fit<'a> {
+    /// Whether mistakes are undone first.
+    pub mend: bool,
+    /// Where the settings go.
+    pub apply: Option<&'a Path>,
+    /// Whether the summary is JSON.
+    pub is_json: bool,
+}
+
+/// What makes sense of the drive: with one explanation, the vehicle that it says; with none or with a sound one, the vehicle as it is.
+fn mended(input: LogInput) -> anyhow::Result<LogInput> {
+    let bar = progress::spinner().with_message("looking for mistakes");
+    let found = explain_wheels(&input, |_, _| bar.tick());
+    bar.finish_and_clear();
+    if found.is_empty() || found.iter().any(|one| one.mistakes.is_empty()) {
+        return Ok(input);
+    }
+    let mendable = found.iter().find(|one| one.is_mendable());
+    let explanation = mendable.with_context(|| {
+        let words: Vec<String> = found.iter().map(ToString::to_string).collect();
+        format!("{}: no setting mends that; agv check says what to do", words.join(", or "))
+    })?;
+    note(&format!("agv: {explanation}: mended"));
+    Ok(explanation.mended.clone())
+}
+
 /// Fits the vehicle of the log, prints what was found, and writes it to a file if one is given.
-pub fn run(input: &LogInput, apply: Option<&Path>, is_json: bool) -> anyhow::Result<()> {
-    let LogDrive { kind, nominal, drive } = LogDrive::new(input)?;
+pub fn run(input: LogInput, asked: &Fit) -> anyhow::Result<()> {
+    let input = if asked.mend { mended(input)? } else { input };
+    let (apply, is_json) = (asked.apply, asked.is_json);
+    let LogDrive { kind, nominal, drive } = LogDrive::new(&input)?;
     let mut unknowns = Unknown::of(kind, &nominal.wheels, true);
     if apply.is_some() {
         // What has no setting stays as it is, and the rest is fitted to go with it.
@@ -39,7 +70,9 @@ pub fn run(input: &LogInput, apply: Option<&Path>, is_json: bool) -> anyhow::Res
         for open in found.fitted.iter().filter(|fitted| fitted.is_open) {
             note(&format!("agv: the drive does not tell the {}: it stays about as it was", open.name));
         }
-        VehicleFile::of_vehicle(&Parameters { vehicle, ..input.parameters }).write(path)?;
+        let mut parameters = Parameters { vehicle, ..input.parameters };
+        *parameters.lasers.first_mut() = found.model.sensor;
+        VehicleFile::of_vehicle(&parameters).write(path)?;
     }
     let clock = found.clocks.first().copied().unwrap_or_default();
     if is_json {

@@ -1,5 +1,6 @@
 //! What all of these commands are told about a sensor.
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 
 use agv_host_sim::lidar3d::SetupOptions;
@@ -28,6 +29,9 @@ pub struct SensorArguments {
     /// UDP port of a capture; without it that of the first packet of a sensor.
     #[arg(long, value_name = "PORT")]
     port: Option<u16>,
+    /// Address from which the sensor of a capture sends; without it that of the first packet of a sensor.
+    #[arg(long, value_name = "IP")]
+    address: Option<IpAddr>,
     /// How the offsets of a beam are measured.
     #[arg(long, default_value = "orthogonal")]
     offsets: Offsets,
@@ -89,6 +93,7 @@ impl SensorArguments {
             offsets: self.offsets.into(),
             two_points: self.two_points,
             port: self.port,
+            address: self.address,
             near: self.near,
             far: self.far,
         }

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use agv_host_sim::export::point_cloud::{self, Format, PointCloudError};
 use agv_host_sim::lidar3d::{Revolution, Source};
@@ -10,7 +11,7 @@ use anyhow::ensure;
 use serde_json::json;
 
 use super::arguments::{SOURCES, SensorArguments, tally_object, tally_rows};
-use crate::command::{output, progress, stop};
+use crate::command::{import_summary, progress, stop};
 
 const HELP: &str = "\
 Each revolution becomes a file of its own if there is more than one: scan.pcd becomes scan_0000.pcd and so on.
@@ -22,7 +23,7 @@ Examples:
   agv lidar3d decode ouster.pcap --calibration ouster.json --output scan.pcd
   agv lidar3d decode drive.pcap --organised --output scan.pcd --json
 
-Keys of --json: revolutions, files, returns {points, empty, false_near, false_far, unused, equal}.";
+Keys of --json: revolutions, files, returns {points, empty, false_near, false_far, unused, equal}, left_out, beside, notes, warnings.";
 
 /// Write the points of each revolution as PCD, PLY or LAS.
 #[derive(clap::Args)]
@@ -51,11 +52,14 @@ pub struct Decode {
     /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
+    /// End with exit code 3 if there is a warning.
+    #[arg(long)]
+    strict: bool,
 }
 
 impl Decode {
     /// Runs the command.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(self) -> anyhow::Result<ExitCode> {
         let format = Format::of(&self.output)?;
         ensure!(!self.organised || format == Format::Pcd, "--organised goes with a name that ends in .pcd");
         ensure!(self.count != Some(0), "--count must be at least 1");
@@ -66,6 +70,8 @@ impl Decode {
         if let Some(warning) = &setup.warning {
             eprintln!("{warning}");
         }
+        let account = source.survey.account.clone();
+        let name = self.source.name();
         let length = source.length();
         let bar = progress::bar("decoding", length.unwrap_or(0));
         let is_single = self.count == Some(1);
@@ -102,14 +108,11 @@ impl Decode {
             "there are {number} whole revolutions, none from number {} on; --parts takes those that are not whole",
             self.first
         );
-        if self.json {
-            println!("{}", json!({ "revolutions": number, "files": files, "returns": tally_object(tally) }));
-        } else {
-            let mut rows = vec![["files".to_owned(), files.to_string()]];
-            rows.extend(tally_rows(tally));
-            output::print_rows(&rows);
-        }
-        Ok(())
+        let mut rows = vec![["files".to_owned(), files.to_string()]];
+        rows.extend(tally_rows(tally));
+        let found = json!({ "revolutions": number, "files": files, "returns": tally_object(tally) });
+        import_summary::print_account(Path::new(&name), &rows, found, &account, self.json)?;
+        Ok(import_summary::exit_code(&account.warnings(), self.strict))
     }
 
     fn write(&self, path: &Path, revolution: &Revolution, order: &RingOrder) -> Result<(), PointCloudError> {

@@ -1,6 +1,8 @@
 //! `agv lidar3d info`.
 
 use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
 
 use agv_host_sim::lidar3d::kind::Kind;
 use agv_host_sim::lidar3d::survey::Survey;
@@ -9,7 +11,7 @@ use agv_lidar3d::packet::Sensor;
 use serde_json::json;
 
 use super::arguments::{SOURCES, SensorArguments, tally_object, tally_rows};
-use crate::command::{output, progress, stop};
+use crate::command::{import_summary, output, progress, stop};
 
 const HELP: &str = "\
 Examples:
@@ -18,7 +20,8 @@ Examples:
   agv lidar3d info udp
 
 Keys of --json: sensor, return_mode, port, warning, version, packets, refused, other, cut, duration_s, turns, turns_per_s,
-  calibration_in_stream, lasers, returns {points, empty, false_near, false_far, unused, equal}; returns is null without a calibration.";
+  calibration_in_stream, lasers, returns {points, empty, false_near, false_far, unused, equal}, address, notes, warnings; returns is
+  null without a calibration.";
 
 /// What sends a stream of packets, and what is in it.
 #[derive(clap::Args)]
@@ -32,11 +35,14 @@ pub struct Info {
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
+    /// End with exit code 3 if there is a warning.
+    #[arg(long)]
+    strict: bool,
 }
 
 impl Info {
     /// Runs the command.
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(self) -> anyhow::Result<ExitCode> {
         let stop = stop::on_interrupt()?;
         let name = self.source.name();
         let source = self.source.open(&self.sensor.options(), &stop)?;
@@ -47,6 +53,7 @@ impl Info {
             Err(SetupError::NoCalibration { .. } | SetupError::UnknownSensor) => None,
             Err(error) => return Err(error.into()),
         };
+        let exit_code = import_summary::exit_code(&survey.account.warnings(), self.strict);
         let lasers = setup.as_ref().map(|setup| setup.lasers.len());
         let kind = setup.as_ref().map(|setup| setup.kind).or(survey.kind);
         let sensor = kind.map(Kind::name);
@@ -79,18 +86,23 @@ impl Info {
                 "calibration_in_stream": survey.calibration.is_some(),
                 "lasers": lasers,
                 "returns": tally.map(tally_object),
+                "address": survey.address.map(|address| address.to_string()),
+                "notes": survey.account.notes(),
+                "warnings": survey.account.warnings(),
             });
             println!("{}", serde_json::to_string_pretty(&object)?);
-            return Ok(());
+            import_summary::complain(Path::new(&name), &survey.account.warnings());
+            return Ok(exit_code);
         }
         let mut rows = vec![
-            ["source".to_owned(), name],
+            ["source".to_owned(), name.clone()],
             ["sensor".to_owned(), sensor.unwrap_or("unknown; name it with --sensor").to_owned()],
         ];
         rows.extend(survey_rows(&survey, warning));
         rows.extend(tally.into_iter().flat_map(tally_rows));
         output::print_rows(&rows);
-        Ok(())
+        import_summary::print_words(survey.account.notes(), &survey.account.warnings());
+        Ok(exit_code)
     }
 }
 
@@ -100,6 +112,7 @@ fn survey_rows(survey: &Survey, warning: Option<String>) -> Vec<[String; 2]> {
     let rate = turn_rate(survey);
     let mut rows = Vec::new();
     rows.extend(survey.return_mode.iter().map(|mode| ["returns of a firing".to_owned(), mode.clone()]));
+    rows.extend(survey.address.map(|address| ["address".to_owned(), address.to_string()]));
     rows.extend(survey.port.map(|port| ["UDP port".to_owned(), port.to_string()]));
     rows.extend(survey.version.iter().map(|version| ["version".to_owned(), version.clone()]));
     rows.extend(warning.map(|warning| ["warning".to_owned(), warning]));

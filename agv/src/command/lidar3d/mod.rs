@@ -12,6 +12,8 @@ mod places;
 pub mod relocalise;
 mod view;
 
+use std::process::ExitCode;
+
 /// Multi-beam lidars: look at, decode, convert and calibrate, find their mount, and recognise places.
 #[derive(clap::Args)]
 pub struct Lidar3d {
@@ -33,16 +35,17 @@ enum Action {
 
 impl Lidar3d {
     /// Runs the command.
-    pub fn run(self) -> anyhow::Result<()> {
-        match self.action {
-            Action::Info(command) => command.run(),
-            Action::Decode(command) => command.run(),
+    pub fn run(self) -> anyhow::Result<ExitCode> {
+        let outcome = match self.action {
+            Action::Decode(command) => return command.run(),
+            Action::Info(command) => return command.run(),
             Action::Convert(command) => command.run(),
             Action::Calibrate(command) => command.run(),
             Action::Mount(command) => command.run(),
             Action::Bridge(command) => command.run(),
             Action::Places(command) => command.run(),
             Action::View(command) => command.run(),
-        }
+        };
+        outcome.map(|()| ExitCode::SUCCESS)
     }
 }

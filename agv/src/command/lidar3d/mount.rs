@@ -18,7 +18,7 @@ use anyhow::ensure;
 use serde_json::{Value, json};
 
 use super::arguments::{SOURCES, SensorArguments};
-use crate::command::{output, progress, stop};
+use crate::command::{import_summary, output, progress, stop};
 
 const HELP: &str = "\
 Height, roll and pitch are those of the floor. Heading and place come of a drive with bends both ways: the motions of the sensor between
@@ -99,7 +99,9 @@ impl Mount {
 
     /// Each scan with its pose: the times are made.
     fn by_poses(&self, path: &Path) -> anyhow::Result<Found> {
-        let poses = poses::read(path)?;
+        let poses::ReadPoses { poses, account } = poses::read_all(path)?;
+        account.notes().iter().for_each(|text| output::note(&format!("agv: {}: {text}", path.display())));
+        import_summary::complain(path, &account.warnings());
         let time = |number: usize| Time::from_seconds(1.0 + INTERVAL * number as f64);
         let odometry: Vec<Truth> = poses
             .iter()

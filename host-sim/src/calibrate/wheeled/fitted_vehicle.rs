@@ -1,7 +1,7 @@
 //! The vehicle of the settings that a fit has found.
 
 use agv_core::odometry::{
-    Differential, DrivenWheel, Mecanum, Omnidirectional, SteeredWheel, Tricycle, Vehicle, Wheel, WheelVehicle,
+    Counted, Differential, DrivenWheel, Mecanum, Omnidirectional, SteeredWheel, Tricycle, Vehicle, Wheel, WheelVehicle,
 };
 
 use super::unknowns::{Moves, Unknown, WheeledModel};
@@ -100,4 +100,39 @@ fn all<const N: usize>(mut driven: [DrivenWheel; N], found: &WheeledModel) -> [D
         driven.radius = wheel.radius;
     }
     driven
+}
+
+/// Changes the scale of the counter of a wheel. False if the vehicle has none.
+#[must_use]
+pub fn with_counter_scale(vehicle: &mut Vehicle, wheel: usize, counted: Counted, change: impl Fn(f64) -> f64) -> bool {
+    let scale = match vehicle {
+        Vehicle::Tricycle(tricycle) => match counted {
+            Counted::Turn => Some(&mut tricycle.drive_scale),
+            Counted::Steering => Some(&mut tricycle.steering_scale),
+        },
+        Vehicle::Wheels(vehicle) => counter_scale(vehicle, wheel, counted),
+        _ => None,
+    };
+    scale.map(|scale| *scale = change(*scale)).is_some()
+}
+
+fn counter_scale(vehicle: &mut WheelVehicle, wheel: usize, counted: Counted) -> Option<&mut f64> {
+    let driven = match vehicle {
+        WheelVehicle::Differential(axle) => [&mut axle.left, &mut axle.right].into_iter().nth(wheel),
+        WheelVehicle::Ackermann(car) => match counted {
+            Counted::Steering => return Some(&mut car.steering.scale),
+            Counted::Turn => [&mut car.rear.left, &mut car.rear.right].into_iter().nth(wheel),
+        },
+        WheelVehicle::BiSteerable(vehicle) => {
+            let steered = [&mut vehicle.front, &mut vehicle.rear].into_iter().nth(wheel)?;
+            match counted {
+                Counted::Steering => return Some(&mut steered.steering.scale),
+                Counted::Turn => Some(&mut steered.drive),
+            }
+        }
+        WheelVehicle::ThreeOmnidirectional(vehicle) => vehicle.driven.get_mut(wheel),
+        WheelVehicle::FourOmnidirectional(vehicle) => vehicle.driven.get_mut(wheel),
+        WheelVehicle::Mecanum(vehicle) => vehicle.driven.get_mut(wheel),
+    };
+    driven.filter(|_| counted == Counted::Turn).map(|driven| &mut driven.turn.scale)
 }

@@ -5,6 +5,7 @@ pub mod drive;
 pub mod fit;
 pub mod fitted_vehicle;
 pub mod log_drive;
+pub mod mistakes;
 pub mod path;
 pub mod trajectory_error;
 pub mod unknowns;

@@ -18,9 +18,10 @@ use agv_wire::nav350::SensorFrame;
 use serde::{Deserialize, Serialize};
 
 use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose, knows_where_it_is};
-use super::{Driven, HeardEmergency, HeardPose, VehicleError, settings_like, write_contours, write_flash};
+use super::{Driven, HeardEmergency, HeardPose, VehicleError, own_nodes, settings_like, write_contours, write_flash};
 use crate::contour_map::ContourMap;
 use crate::emulate::board::{ADDRESS, HOST};
+use crate::emulate::foreign_traffic::ForeignTraffic;
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::EmulatedMotion;
 use crate::live::stream::LogCopy;
@@ -50,9 +51,12 @@ struct Vehicle<'a> {
 #[derive(Serialize)]
 struct Said {
     until: u64,
-    frames: Vec<(u32, String)>,
+    frames: Vec<SaidFrame>,
     laser: String,
 }
+
+/// A frame as its identifier, whether that has 29 bits, whether it asks for data, and its data.
+type SaidFrame = (u32, bool, bool, String);
 
 /// What the chip has said.
 #[derive(Deserialize)]
@@ -148,6 +152,10 @@ struct Play<'a> {
     begin: Option<u64>,
     last_order: u64,
     orders: u8,
+    foreign: ForeignTraffic,
+    foreign_rate: f64,
+    /// Frames of other nodes that are due.
+    foreign_due: f64,
     frames: Vec<Frame>,
     laser: Vec<u8>,
     log: Vec<u8>,
@@ -171,6 +179,8 @@ pub struct InChipOptions<'a> {
     pub contours: Option<&'a ContourMap>,
     /// Whether it has to find out where it is.
     pub is_not_told: bool,
+    /// Frames of other nodes in each second, from when the drive begins.
+    pub foreign_rate: f64,
 }
 
 /// Lets the vehicle drive for `seconds` of a recording, or to its end, with the controller that `program` emulates. Settings, map and
@@ -213,6 +223,9 @@ pub fn drive_in_chip(
         begin: None,
         last_order: 0,
         orders: 0,
+        foreign: ForeignTraffic::new(1, &own_nodes(&settings)),
+        foreign_rate: options.foreign_rate,
+        foreign_due: 0.0,
         frames: Vec::new(),
         laser: Vec::new(),
         log: Vec::new(),
@@ -245,11 +258,14 @@ impl Play<'_> {
     /// What is said to the chip, which then runs until that time.
     fn said(&mut self, until: u64) -> Said {
         let frames = std::mem::take(&mut self.frames);
-        let identifier = |frame: &Frame| match frame.id() {
-            Id::Standard(id) => u32::from(id.as_raw()),
-            Id::Extended(id) => id.as_raw(),
+        let said = |frame: &Frame| {
+            let (identifier, is_extended) = match frame.id() {
+                Id::Standard(id) => (u32::from(id.as_raw()), false),
+                Id::Extended(id) => (id.as_raw(), true),
+            };
+            (identifier, is_extended, frame.is_remote(), hexadecimal(frame.data()))
         };
-        let frames = frames.iter().map(|frame| (identifier(frame), hexadecimal(frame.data()))).collect();
+        let frames = frames.iter().map(said).collect();
         Said { until, frames, laser: hexadecimal(&std::mem::take(&mut self.laser)) }
     }
 
@@ -271,6 +287,11 @@ impl Play<'_> {
         self.frames.extend(self.motion.poll(time));
         self.frames.extend(self.gyro.iter_mut().flat_map(|gyro| gyro.poll(time)));
         if self.begin.is_some() {
+            self.foreign_due += self.foreign_rate * STEP as f64 * 1e-6;
+            while self.foreign_due >= 1.0 {
+                self.foreign_due -= 1.0;
+                self.frames.push(self.foreign.next_frame());
+            }
             return Ok(());
         }
         if self.mode().is_some_and(knows_where_it_is) {

@@ -20,6 +20,7 @@ use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
 use agv_settings::Settings;
 use agv_settings::store::KEY;
+use agv_wire::can::canopen::NodeId;
 use agv_wire::nav350::SensorFrame;
 
 pub use chip::{InChip, InChipOptions, drive_in_chip};
@@ -97,6 +98,12 @@ pub fn settings_like(recording: &Recording, laser_port: u16) -> Settings {
     // It is told on the bus where it starts.
     settings.nodes.accepts_pose = true;
     settings
+}
+
+/// The controller and its encoders.
+fn own_nodes(settings: &Settings) -> Vec<NodeId> {
+    let encoders = settings.nodes.encoders.iter().map(|encoder| encoder.node);
+    encoders.chain([settings.nodes.controller]).filter_map(NodeId::new).collect()
 }
 
 /// Writes the flash of a vehicle that is set up so into a folder, and says where.

@@ -14,6 +14,7 @@ use agv_wire::can::controller::{Content, PoseReceiver};
 use agv_wire::can::frame::Frame;
 
 use super::error::VehicleError;
+use super::own_nodes;
 use super::watch::{BusTrouble, Heard, HeardEmergency, HeardPose};
 use crate::bus::{Bus, SlcanBus};
 use crate::emulate::board::{Board, BoardError};
@@ -117,11 +118,7 @@ impl Stage<'_> {
     }
 
     fn begin(&self, bus: SlcanBus, delay: RunDelay) -> Result<Play<'_>, VehicleError> {
-        let nodes = self.settings.nodes;
-        let node = |number| NodeId::new(number).unwrap_or(FIRST_NODE);
-        let controller = node(nodes.controller);
-        let own: Vec<NodeId> =
-            nodes.encoders.iter().map(|encoder| encoder.node).chain([nodes.controller]).map(node).collect();
+        let controller = NodeId::new(self.settings.nodes.controller).unwrap_or(FIRST_NODE);
         let start = Instant::now();
         Ok(Play {
             stage: self,
@@ -130,7 +127,7 @@ impl Stage<'_> {
             motion: EmulatedMotion::new(self.recording, &EncoderNodes::of(self.settings))?.standing(),
             gyro: EmulatedGyro::of(self.recording, &self.settings.gyro_frame),
             receiver: PoseReceiver::new(controller),
-            foreign: ForeignTraffic::new(1, &own),
+            foreign: ForeignTraffic::new(1, &own_nodes(self.settings)),
             foreign_due: 0.0,
             start,
             looked: start,

@@ -69,7 +69,7 @@ impl Sensor {
     }
 
     fn tracks(&self, turns: &[&Turn], start: f64) -> Vec<Track> {
-        let frame = &self.drive.frame;
+        let frame = &self.frame();
         let point = |seen: &ReflectorObservation| {
             let (sine, cosine) = libm::sincos(frame.angle(f64::from(seen.bearing)));
             Point::new(f64::from(seen.range) * cosine, f64::from(seen.range) * sine)

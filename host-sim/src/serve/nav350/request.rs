@@ -1,21 +1,22 @@
 //! What is done with a request: variables are read and written here, methods are called in `method.rs`.
 
 use agv_wire::cola::{Dialect, Fault, Raw, Text};
-use agv_wire::nav350::{Answer, MethodName, Request, Setting, Size, UserLevel, Value, Variable};
+use agv_wire::nav350::{Answer, Orientation, Request, Setting, Size, UserLevel, Value, Variable};
 
 use super::encoding::{encode, refuse, why, zero};
 use super::pending::Pending;
 use super::sensor::Sensor;
+
+/// Variables that the sensor has beside those that are known, as its maker's client asks for them at start-up (sick_scan_xd).
+const OTHERS: [&str; 5] = ["SCdevicestate", "ODoprh", "ODpwrc", "LocationName", "LMDscandatacfg"];
 
 impl Sensor {
     /// The bytes that answer a payload at once.
     pub(super) fn answer(&mut self, dialect: Dialect, payload: &[u8], now: f64, pending: &mut Pending) -> Vec<u8> {
         match Request::decode(dialect, payload) {
             Ok(Request::Read(variable)) => self.read(dialect, variable),
-            Ok(Request::ReadOther(name)) if MethodName::find(name).is_some() => {
-                refuse(dialect, Fault::UNKNOWN_VARIABLE)
-            }
-            Ok(Request::ReadOther(name)) => zero(dialect, name),
+            Ok(Request::ReadOther(name)) if OTHERS.contains(&name) => zero(dialect, name),
+            Ok(Request::ReadOther(_)) => refuse(dialect, Fault::UNKNOWN_VARIABLE),
             Ok(Request::Write(setting)) => self.write(dialect, &setting),
             Ok(Request::Call(method)) => self.call(dialect, &method, now, pending),
             Err(_) => refuse(dialect, why(dialect, payload)),
@@ -56,6 +57,9 @@ impl Sensor {
         let Some(owned) = owned(setting) else { return refuse(dialect, Fault::INVALID_DATA) };
         match owned {
             Setting::ReflectorSize(Size(size)) if !(1..=150).contains(&size) => {
+                return refuse(dialect, Fault::LOCAL_CONDITION);
+            }
+            Setting::CoordinateOrientation(number) if Orientation::of_number(number).is_none() => {
                 return refuse(dialect, Fault::LOCAL_CONDITION);
             }
             Setting::MapConfiguration(configuration) if !(1..=127).contains(&configuration.mean) => {

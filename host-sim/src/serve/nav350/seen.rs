@@ -5,7 +5,7 @@ use agv_core::measurement::{ReflectorObservation, Time};
 use agv_wire::cola::{Element, Sequence};
 use agv_wire::nav350::{
     Angle, Channel, ChannelName, Coordinate, CoordinateFormat, DeviceTime, Distance, IdentifiedLandmark,
-    LandmarkDataFormat, PoseDataFormat, PoseDetails, PoseReport, PositionMode, Reflector, ReflectorDetails,
+    LandmarkDataFormat, Milliangle, PoseDataFormat, PoseDetails, PoseReport, PositionMode, Reflector, ReflectorDetails,
     ScanDataFormat, Setting, Size,
 };
 
@@ -105,7 +105,7 @@ impl<'a> Seen<'a> {
 
     /// The pose at the end of the turn, if it is known.
     pub(super) fn pose(&self) -> Option<PoseReport> {
-        let frame = &self.sensor.drive.frame;
+        let frame = self.sensor.frame();
         let (pose, format) = (self.turn.pose?, self.pose_format());
         let details = format.has_details.then(|| {
             let used = self.identities().iter().flatten().count();
@@ -132,7 +132,7 @@ impl<'a> Seen<'a> {
 
     /// The reflectors, seen from the sensor.
     pub(super) fn reflectors(&self) -> Vec<Reflector> {
-        let (frame, format) = (&self.sensor.drive.frame, self.landmark_format());
+        let (frame, format) = (self.sensor.frame(), self.landmark_format());
         let identities = if format.has_details { self.identities() } else { vec![None; self.turn.reflectors.len()] };
         let reflectors = self.turn.reflectors.iter().zip(identities).zip(0_u16..);
         let reflectors = reflectors.map(|((observation, global_id), local_id)| {
@@ -152,14 +152,24 @@ impl<'a> Seen<'a> {
         let (turn, format) = (self.turn, self.scan_format());
         // One mode has distances only, another one directions too; its number is not documented.
         let has_angles = format.channels != 1;
+        let first = i64::from(self.first().0);
         let directions = (0..turn.ranges.len() as i64)
             .filter(|_| has_angles)
-            .map(|beam| 10 * (i64::from(turn.first.0) + beam * i64::from(turn.resolution)).rem_euclid(360_000) as u32);
-        SeenScan {
-            ranges: turn.ranges.clone(),
-            directions: directions.collect(),
-            remission: if format.has_remission { turn.remission.clone() } else { Vec::new() },
+            .map(|beam| 10 * (first + beam * i64::from(turn.resolution)).rem_euclid(360_000) as u32);
+        let mut ranges = turn.ranges.clone();
+        let mut remission = if format.has_remission { turn.remission.clone() } else { Vec::new() };
+        if self.sensor.is_turned() {
+            ranges.reverse();
+            remission.reverse();
         }
+        SeenScan { ranges, directions: directions.collect(), remission }
+    }
+
+    /// Direction of the first beam. Beams are listed by growing angles: of a sensor whose angles grow the other way, from the last one on.
+    fn first(&self) -> Milliangle {
+        let Turn { first, resolution, ranges, .. } = self.turn;
+        let beams = i32::try_from(ranges.len().saturating_sub(1)).unwrap_or(i32::MAX);
+        if self.sensor.is_turned() { Milliangle(-(first.0 + beams * i32::from(*resolution))) } else { *first }
     }
 
     fn channel<'b, T: Element>(&self, name: ChannelName, samples: &'b [T]) -> Channel<'b, T> {
@@ -167,7 +177,7 @@ impl<'a> Seen<'a> {
             name,
             scale: 1.0,
             offset: 0.0,
-            first: self.turn.first,
+            first: self.first(),
             resolution: self.turn.resolution,
             start: self.time(self.turn.start),
             samples: Sequence::Values(samples),

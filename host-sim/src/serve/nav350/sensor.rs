@@ -1,7 +1,7 @@
 //! What the sensor is: its settings, layout, modes and clock.
 
 use agv_wire::cola::Dialect;
-use agv_wire::nav350::{DeviceTime, IdentifiedLandmark, OperatingMode, Setting, SpeedReport};
+use agv_wire::nav350::{DeviceTime, IdentifiedLandmark, OperatingMode, Orientation, SensorFrame, Setting, SpeedReport};
 
 use super::drive::{Drive, Turn};
 use super::factory;
@@ -97,6 +97,17 @@ impl Sensor {
     /// Lets the vehicle of a sensor that stands drive off at `time`.
     pub fn begin(&mut self, time: f64) {
         self.drive_start = Some(time);
+    }
+
+    /// Whether its angles grow the other way than those of the drive.
+    pub(super) fn is_turned(&self) -> bool {
+        self.settings.contains(&Setting::CoordinateOrientation(Orientation::Clockwise as u8))
+    }
+
+    /// Its axes, with the orientation that it was told.
+    pub(super) fn frame(&self) -> SensorFrame {
+        let frame = self.drive.frame;
+        SensorFrame { is_clockwise: frame.is_clockwise != self.is_turned(), ..frame }
     }
 
     pub(super) fn device_time(&self, seconds: f64) -> DeviceTime {

@@ -2,7 +2,7 @@
 
 use super::believed::believed_parameters;
 use super::keys::{self, Key};
-use super::{PathKind, Scenario, ScenarioError, WorldOptions};
+use super::{MotionReport, PathKind, Scenario, ScenarioError, WorldOptions};
 
 impl Scenario {
     /// Whether every value makes sense.
@@ -18,6 +18,7 @@ impl Scenario {
         demand("people.way", self.people.iter().all(|person| !person.way.is_empty()), "a list of at least one point")?;
         self.check_path()?;
         self.check_world()?;
+        self.check_effects()?;
         believed_parameters(self).check().map_err(ScenarioError::Parameters)
     }
 
@@ -52,6 +53,38 @@ impl Scenario {
         }
         demand("path.legs", has_legs, "a list of at least one leg")?;
         demand("path.legs.segments", self.path.legs.iter().all(|leg| !leg.segments.is_empty()), "at least one segment")
+    }
+
+    /// Whether every mistake that is stated is one that this kind of vehicle can have.
+    fn check_effects(&self) -> Result<(), ScenarioError> {
+        use MotionReport::{
+            Ackermann, BiSteerable, Differential, Encoders, Increments, Mecanum, Omnidirectional, Speed,
+            ThreeOmnidirectional, TricycleSpeed,
+        };
+        let reports = self.vehicle.reports;
+        let truth = &self.vehicle.truth;
+        let is_tricycle = reports == Encoders;
+        let has_wheelbase = matches!(reports, Encoders | Speed | TricycleSpeed);
+        let without = "left out: it has no effect on a vehicle that reports this";
+        let of_tricycle = [
+            ("vehicle.true.drive_reversed", truth.drive_reversed),
+            ("vehicle.true.steering_reversed", truth.steering_reversed),
+            ("vehicle.true.encoders_swapped", truth.encoders_swapped),
+            ("vehicle.true.steering_offset_backward_error_deg", truth.steering_offset_backward_error_deg != 0.0),
+        ];
+        for (key, is_stated) in of_tricycle {
+            demand(key, is_tricycle || !is_stated, without)?;
+        }
+        demand("vehicle.true.wheelbase_error", has_wheelbase || truth.wheelbase_error == 0.0, without)?;
+        let wheels = match reports {
+            Encoders | Speed | TricycleSpeed | Increments => 1,
+            Differential | BiSteerable | Ackermann => 2,
+            ThreeOmnidirectional => 3,
+            Omnidirectional | Mecanum => 4,
+        };
+        let slips = &self.odometry.slips;
+        let has_wheel = slips.iter().all(|slip| slip.wheel < wheels);
+        demand("odometry.slips.wheel", has_wheel, "the number of a driven wheel, from 0")
     }
 
     fn check_world(&self) -> Result<(), ScenarioError> {

@@ -94,6 +94,7 @@ impl ScenarioError {
         let (line, problem) = match &self {
             Self::Parse { line, problem } => (Some(*line), format!("this is not a scenario: {problem}")),
             Self::Value { key, value, .. } => (line::of_key(text, key, *value), self.to_string()),
+            Self::Parameters(error) => (line::of_leaf(text, error.leaf), self.to_string()),
             _ => return self,
         };
         Self::Line { path: path.to_owned(), line: line.unwrap_or(1), problem }
@@ -170,7 +171,8 @@ impl Scenario {
     pub fn parse(text: &str) -> Result<Self, ScenarioError> {
         let scenario: Self = toml::from_str(text).map_err(|error| {
             let (line, problem) = toml_complaint(text, &error);
-            ScenarioError::Parse { line, problem }
+            let is_wrong = |text: &str| toml::from_str::<Self>(text).err().map(|error| error.message().to_owned());
+            ScenarioError::Parse { line: line::of_error(text, line, is_wrong), problem: line::in_plain_words(&problem) }
         })?;
         scenario.check()?;
         Ok(scenario)

@@ -129,16 +129,16 @@ class MapView {
   landmarks(c, model, sx, sy, width, height) {
     const isNear = this.camera.scale > 14;
     c.font = "12px system-ui, sans-serif";
-    const one = (mark, x, y, hits) => {
+    const one = (mark, x, y, hits, name) => {
       if (x < -20 || y < -20 || x > width + 20 || y > height + 20) return;
       c.globalAlpha = hits ? 1 : 0.45;
       MARKS[mark](c, x, y, mark === "reflector" ? 5 : 4);
       c.globalAlpha = 1;
-      if (isNear && hits) { c.fillStyle = "#595959"; c.fillText(hits, x + 8, y + 4); }
+      if (isNear && name !== undefined) { c.fillStyle = "#595959"; c.fillText(name, x + 8, y + 4); }
       this.drawn.landmarks += 1;
     };
     const hits = model.moment ? model.moment.hits : [];
-    model.description.landmarks.forEach(([kind, , x, y], k) => one(kind, sx(x), sy(y), hits[k] || 0));
+    model.description.landmarks.forEach(([kind, id, x, y], k) => one(kind, sx(x), sy(y), hits[k] || 0, id));
     for (const { position: [x, y], hits } of model.moment ? model.moment.found : []) one("found", sx(x), sy(y), hits);
   }
 

@@ -36,7 +36,7 @@ pub struct Drive {
 /// Time between two samples, s.
 const SAMPLE: f64 = 0.01;
 
-const FAULTS: [EncoderFault; 8] = [
+const FAULTS: [EncoderFault; 9] = [
     EncoderFault::Late,
     EncoderFault::Missing,
     EncoderFault::Frozen,
@@ -45,6 +45,7 @@ const FAULTS: [EncoderFault; 8] = [
     EncoderFault::Reported,
     EncoderFault::HeartbeatLost,
     EncoderFault::WrongRange,
+    EncoderFault::WrongDirection,
 ];
 
 impl Drive {

@@ -198,7 +198,7 @@ pub fn drive(
         if rest < NEAR {
             return Some(plant.pose);
         }
-        let wanted = steering_command(&approach.leg, &approach.start, way, &pose, believed.wheelbase);
+        let wanted = steering_command(&approach.leg, &approach.start, [way, way], &pose, believed.wheelbase);
         // What is commanded is a reading of the encoder.
         let believed_offset = if sign < 0.0 { believed.offset_backward } else { believed.offset_forward };
         let command = wanted - believed_offset + plant.offset();

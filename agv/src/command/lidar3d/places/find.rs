@@ -142,6 +142,12 @@ impl Find {
         );
         let named = || format!("{}: the places have no poses", self.places.display());
         let search = PlaceSearch::new(map).with_context(named)?;
+        ensure!(
+            map.limit.is_some_and(|limit| limit > 0.0),
+            "{}: which answers may be believed was not learnt when the places were indexed: they were too few, or their poses are wrong; index \
+             them again, or name a --method that compares signatures",
+            self.places.display()
+        );
         let mut rows = Vec::new();
         let mut sequence = Sequence::new(self.sequence.into());
         let stop = stop::on_interrupt()?;

@@ -14,7 +14,7 @@ use serde_json::json;
 
 use super::Drive;
 use crate::command::lidar3d::arguments::SOURCES;
-use crate::command::{output, progress, stop};
+use crate::command::{import_summary, output, progress, stop};
 
 const HELP: &str = "\
 With poses, a scan becomes a place if it is further than --shift from the place before, and from places that look alike it is
@@ -56,7 +56,9 @@ impl Index {
     pub fn run(self) -> anyhow::Result<()> {
         ensure!(self.shift >= 0.0 && self.shift.is_finite(), "--shift must not be negative");
         ensure!(self.height.is_none_or(|height| height > 0.0 && height < 50.0), "--height must be from 0 to 50 m");
-        let poses = self.poses.as_deref().map(poses::read).transpose()?;
+        let poses = self.poses.as_deref().map(poses::read_all).transpose()?;
+        let account = poses.as_ref().map(|found| found.account.clone()).unwrap_or_default();
+        let poses = poses.map(|found| found.poses);
         let mut places: Vec<StoredPlace> = Vec::new();
         let (mut scans, mut missing, mut rings) = (0, None, 0);
         let mut keys = KeySignatures::default();
@@ -91,13 +93,23 @@ impl Index {
             anyhow::bail!("{}: it holds {count} poses, fewer than there are scans", path.display());
         }
         let mut map = PlaceMap { standing: eye.standing, rings, span: eye.span, limit: None, places };
-        map.limit = learnt_limit(&map);
+        // Places of which none has a neighbour teach nothing.
+        map.limit = learnt_limit(&map).filter(|limit| *limit > 0.0);
+        let mut warnings = account.warnings();
+        if map.limit.is_none() && poses.is_some() {
+            let count = map.places.len();
+            warnings.push(format!(
+                "which answers may be believed could not be learnt from {count} places: 'find' by aligned scans will refuse them; index more of the drive, or check the poses"
+            ));
+        }
         place_map::write(&self.output, &map)?;
         let height = map.standing.height();
         if self.json {
             let summary =
                 json!({ "scans": scans, "places": map.places.len(), "sensor_height_m": height, "limit": map.limit });
             println!("{summary}");
+            account.notes().iter().for_each(|text| output::note(&format!("note: {text}")));
+            warnings.iter().for_each(|text| output::note(&format!("warning: {text}")));
         } else {
             output::print_rows(&[
                 ["scans".to_owned(), scans.to_string()],
@@ -105,6 +117,7 @@ impl Index {
                 ["sensor height".to_owned(), format!("{height:.2} m")],
                 ["believed from".to_owned(), map.limit.map_or("-".to_owned(), |limit| format!("{limit:.2}"))],
             ]);
+            import_summary::print_words(account.notes(), &warnings);
         }
         Ok(())
     }

@@ -1,14 +1,19 @@
 //! The acceptance test of a vehicle: one replayed drive, and halts that somebody has measured, line by line.
 
+mod marks;
+
 use std::path::Path;
 
 use agv_core::localizer::Mode;
 use agv_core::maps::{Landmark, LandmarkKind};
 use serde::Serialize;
 
-use crate::drive::{Figures, kind_name, mode_name};
+use crate::drive::{Figures, GOOD, Track, kind_name, mode_name, percent};
 use crate::replay::Comparisons;
 use crate::text_file::{self, TextFileError};
+use crate::wording::count_of;
+
+pub use marks::{FEWEST_MARKS, MARKS, MarkHalt, halts_of, read_marks};
 
 /// How a line ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -78,15 +83,37 @@ fn halt(line: &str) -> Option<Halt> {
     numbers?.try_into().ok()
 }
 
+/// What somebody has measured of where the vehicle halts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Halts<'a> {
+    /// At one mark.
+    pub at_one: &'a [Halt],
+    /// At surveyed marks.
+    pub at_marks: &'a [MarkHalt],
+}
+
 /// All lines of the test of a vehicle with a `map`: of kinds that are not in it nothing is asked. `said` is what the log holds of what
 /// the vehicle has said.
 #[must_use]
-pub fn test(figures: &Figures, map: &[Landmark], said: &Comparisons, halts: &[Halt]) -> Vec<Line> {
-    let mut lines = vec![same_bits(said), never_lost(figures)];
+pub fn test(figures: &Figures, track: &Track, map: &[Landmark], said: &Comparisons, halts: &Halts) -> Vec<Line> {
+    let mut lines = vec![same_bits(said), never_lost(figures), fit(figures)];
     lines.extend(honest(figures, map));
     lines.extend(fitting(figures, map));
-    lines.push(repeatable(halts));
+    lines.push(repeatable(halts.at_one));
+    lines.push(marks::absolute(track, halts.at_marks));
     lines
+}
+
+/// By its own protection level.
+fn fit(figures: &Figures) -> Line {
+    let fitness = &figures.fitness;
+    let (verdict, found) = if figures.poses == 0 {
+        (Verdict::NotMeasured, "the vehicle was never localised".to_owned())
+    } else {
+        (verdict(fitness.travel_share >= GOOD), fitness.sentence())
+    };
+    let must_be = "the level allows travelling for at least 99 % of the time";
+    Line { what: format!("fit to travel: {}", percent(fitness.travel_share)), verdict, found, must_be }
 }
 
 fn verdict(is_good: bool) -> Verdict {
@@ -174,7 +201,7 @@ fn repeatable(halts: &[Halt]) -> Line {
     let farthest = halts.iter().map(|halt| (halt[0] - along).hypot(halt[1] - across)).fold(0.0, f64::max);
     let turned = halts.iter().map(|halt| (halt[2] - heading).abs()).fold(0.0, f64::max);
     let (verdict, found) = if halts.len() < FEWEST_HALTS {
-        (Verdict::NotMeasured, format!("{} of {FEWEST_HALTS} halts are measured", halts.len()))
+        (Verdict::NotMeasured, format!("{} measured, {FEWEST_HALTS} are wanted", count_of(halts.len(), "halt")))
     } else {
         let is_good = farthest <= HALT[0] && turned <= HALT[1];
         (verdict(is_good), format!("{} halts within {farthest:.1} mm and {turned:.3} deg of their mean", halts.len()))
@@ -195,9 +222,11 @@ mod tests {
             events: 0,
             poses: 0,
             realtime_factor: 0.0,
+            fitness: crate::drive::Fitness::default(),
             modes: Vec::new(),
             mode_changes: Vec::new(),
             observations: Vec::new(),
+            contours: Default::default(),
             innovations: Vec::new(),
             accuracy: None,
         }
@@ -209,8 +238,10 @@ mod tests {
         for outputs in [None, nothing_compared] {
             let said = Comparisons { outputs, published: outputs };
             for halts in [&[][..], &[[0.0; 3]; 9]] {
-                let lines = test(&nothing(), &[], &said, halts);
-                assert_eq!(lines.len(), 5);
+                let track = Track { points: Vec::new(), way: 0.0, standard: None, errors: Vec::new() };
+                let halts = Halts { at_one: halts, at_marks: &[] };
+                let lines = test(&nothing(), &track, &[], &said, &halts);
+                assert_eq!(lines.len(), 7);
                 assert!(lines.iter().all(|line| line.verdict == Verdict::NotMeasured), "{lines:?}");
             }
         }
