@@ -26,25 +26,3 @@ fn the_longest_wait_between_two_looks_is_told() {
     assert_eq!(look(40), Duration::from_millis(15), "it is the longest");
     assert_eq!(RunDelay::of_tasks(folder.path().join("none")).look(start), Duration::ZERO);
 }
-
-#[test]
-fn what_a_hypervisor_takes_is_waited_for() {
-    let folder = tempfile::tempdir().unwrap();
-    let statistics = folder.path().join("stat");
-    // user, nice, system, idle, iowait, irq, softirq, steal, guest: hundredths of a second.
-    let write =
-        |stolen: u64| std::fs::write(&statistics, format!("cpu  9 8 7 6 5 4 3 {stolen} 1 0\ncpu0 1 1\n")).unwrap();
-    let (mut delay, start) = (RunDelay::of_tasks(folder.path()).with_statistics(&statistics), Instant::now());
-    std::fs::create_dir(folder.path().join("1")).unwrap();
-    let mut look = |milliseconds| {
-        let waited = format!("0 {} 1\n", milliseconds * 100_000);
-        std::fs::write(folder.path().join("1/schedstat"), waited).unwrap();
-        delay.look(start + Duration::from_millis(milliseconds))
-    };
-    write(500);
-    assert_eq!(look(0), Duration::ZERO);
-    write(502);
-    assert_eq!(look(20), Duration::from_millis(22));
-    write(503);
-    assert_eq!(look(40), Duration::from_millis(22));
-}
