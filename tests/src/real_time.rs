@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
-use agv_host_sim::emulate::vehicle::{Driven, HeardEmergency};
+use agv_host_sim::emulate::vehicle::{Driven, HeardEmergency, HeardPose};
 use agv_settings::Settings;
 
 use crate::too_busy;
@@ -23,7 +23,8 @@ const TRIES: usize = 5;
 
 /// How long the machine kept encoders and board waiting in all, s.
 ///
-/// The board is seen to wait by the threads of its emulator, where the system counts that, and by its poses, which come as often as by default.
+/// The board is seen to wait by the threads of its emulator, where the system counts that, by its poses, which come as often as by default, and
+/// by what its driver answers late.
 fn waited(driven: &Driven) -> f64 {
     let mut heard = driven.poses.iter().map(|pose| pose.heard).filter(|heard| *heard > driven.begin).peekable();
     let mut gap = 0.0_f64;
@@ -31,7 +32,8 @@ fn waited(driven: &Driven) -> f64 {
         gap = gap.max((*next - one).as_secs_f64());
     }
     let period = 1e-3 * f64::from(Settings::default().publishing_period);
-    driven.longest_stall + driven.longest_delay.max(gap - period)
+    let line = driven.line_delays.iter().map(|line| line.delay.as_secs_f64()).fold(0.0, f64::max);
+    line.max(driven.longest_stall + driven.longest_delay.max(gap - period))
 }
 
 /// Whether neither the encoders, nor the laser, nor the board was kept waiting by the machine: the board hears them late otherwise, and
@@ -41,6 +43,25 @@ pub fn is_fair(driven: &Driven) -> bool {
     let (waited, laser) = (waited(driven), driven.longest_laser_delay);
     println!("encoders and board waited for {waited:.3} s, the laser was late by {laser:.3} s");
     waited < LONGEST_WAIT && laser < LONGEST_LASER_DELAY
+}
+
+/// A line that holds samples back for longer makes encoders late at 2.5 periods of 10 ms: one period is between two samples, and half of
+/// one between two trials of the line.
+const LONGEST_LINE_DELAY: Duration = Duration::from_millis(10);
+/// A fault lasts for 20 periods of sound readings, and is on the bus in the next pose; then the localiser has gone on for ten.
+const RECOVERY: Duration = Duration::from_millis(300);
+
+/// Poses of the drive that were heard while the emulated line was in time, and had been for as long as late encoders are remembered.
+#[must_use]
+pub fn heard_in_time(driven: &Driven) -> Vec<&HeardPose> {
+    let late: Vec<_> = driven.line_delays.iter().filter(|line| line.delay > LONGEST_LINE_DELAY).collect();
+    let longest = late.iter().map(|line| line.delay).max().unwrap_or_default();
+    println!("the line was late {} times, by up to {longest:?}", late.len());
+    let is_in_time = |heard: &&HeardPose| {
+        heard.heard > driven.begin
+            && late.iter().all(|line| heard.heard < line.due || heard.heard > line.due + line.delay + RECOVERY)
+    };
+    driven.poses.iter().filter(is_in_time).collect()
 }
 
 /// Emergencies that tell of a fault. Late encoders (7305h, 7306h) and a late laser (7300h) are none on a drive that was not fair, nor are

@@ -107,6 +107,7 @@ fn waiting(longest_stall: f64) -> Driven {
         first,
         longest_stall,
         longest_delay: 0.0,
+        line_delays: Vec::new(),
         longest_laser_delay: 0.0,
     }
 }

@@ -28,6 +28,7 @@ pub struct SlcanBus {
     decoder: Decoder,
     received: VecDeque<AnyFrame>,
     unreadable: u64,
+    acknowledged: u64,
 }
 
 impl SlcanBus {
@@ -77,7 +78,7 @@ impl SlcanBus {
     }
 
     fn new(name: String, stream: Box<dyn Stream>) -> Self {
-        Self { name, stream, decoder: Decoder::new(), received: VecDeque::new(), unreadable: 0 }
+        Self { name, stream, decoder: Decoder::new(), received: VecDeque::new(), unreadable: 0, acknowledged: 0 }
     }
 
     fn start(name: &str, stream: Box<dyn Stream>, rate: BitRate) -> Result<Self, BusError> {
@@ -85,9 +86,23 @@ impl SlcanBus {
         // The ends of lines cut off what the adapter may still hold of an earlier talk.
         bus.write(b"\r\r\r")?;
         for command in [Command::Close, Command::BitRate(rate), Command::Open] {
-            bus.write(&Message::from(command).encode())?;
+            bus.command(command)?;
         }
         Ok(bus)
+    }
+
+    /// Tells the adapter something.
+    ///
+    /// # Errors
+    /// If it is gone.
+    pub fn command(&mut self, command: Command) -> Result<(), BusError> {
+        self.write(&Message::from(command).encode())
+    }
+
+    /// How many commands the adapter has said to have done.
+    #[must_use]
+    pub fn acknowledged(&self) -> u64 {
+        self.acknowledged
     }
 
     /// How many lines meant nothing.
@@ -144,6 +159,7 @@ impl Bus for SlcanBus {
             for byte in &bytes[..count] {
                 match self.decoder.push(*byte) {
                     Some(Ok(Message::Frame { frame, .. })) => self.received.push_back(frame),
+                    Some(Ok(Message::Acknowledged)) => self.acknowledged += 1,
                     Some(Err(_)) => self.unreadable += 1,
                     _ => {}
                 }

@@ -364,6 +364,7 @@ impl Play<'_> {
             first: self.first,
             longest_stall: 0.0,
             longest_delay: 0.0,
+            line_delays: Vec::new(),
             longest_laser_delay: 0.0,
         })
     }

@@ -5,6 +5,7 @@
 
 mod chip;
 mod error;
+mod line_watch;
 mod network;
 mod pose_errors;
 mod stage;
@@ -25,6 +26,7 @@ use agv_wire::nav350::SensorFrame;
 
 pub use chip::{InChip, InChipOptions, drive_in_chip};
 pub use error::VehicleError;
+pub use line_watch::LineDelay;
 pub use pose_errors::{Errors, errors};
 pub use watch::{BusTrouble, HeardEmergency, HeardPose, Watch};
 
@@ -82,6 +84,8 @@ pub struct Driven {
     /// Longest time that this machine kept a thread of the emulator waiting for a core within a fiftieth of a second, s. Not known, and 0,
     /// where the machine does not run Linux.
     pub longest_delay: f64,
+    /// What waited on the board's line while the vehicle drove. Not known, and empty, of a chip.
+    pub line_delays: Vec<LineDelay>,
     /// Longest time by which this machine sent what the laser saw later than it was due, s. A laser that says nothing for 200 ms is
     /// silent.
     pub longest_laser_delay: f64,
@@ -190,9 +194,20 @@ pub fn drive(
     });
     outcome?;
     let stream = stream.map_err(|_| std::io::Error::other("the recording of the log stream broke down"))??;
-    let Heard { poses, emergencies, begin, longest_stall, longest_delay } =
+    let Heard { poses, emergencies, begin, longest_stall, longest_delay, line_delays } =
         heard.into_inner().unwrap_or_else(PoisonError::into_inner);
     let begin = begin.ok_or(VehicleError::NotLocalised(poses.last().map(|heard| heard.pose.mode)))?;
     let longest_laser_delay = sensor.longest_delay();
-    Ok(Driven { log, stream, poses, emergencies, begin, first, longest_stall, longest_delay, longest_laser_delay })
+    Ok(Driven {
+        log,
+        stream,
+        poses,
+        emergencies,
+        begin,
+        first,
+        longest_stall,
+        longest_delay,
+        line_delays,
+        longest_laser_delay,
+    })
 }

@@ -14,6 +14,7 @@ use agv_wire::can::controller::{Content, PoseReceiver};
 use agv_wire::can::frame::Frame;
 
 use super::error::VehicleError;
+use super::line_watch::{LineDelay, LineWatch};
 use super::own_nodes;
 use super::watch::{BusTrouble, Heard, HeardEmergency, HeardPose};
 use crate::bus::{Bus, SlcanBus};
@@ -65,6 +66,7 @@ struct Play<'a> {
     looked: Instant,
     /// How long the machine keeps the emulator waiting.
     delay: RunDelay,
+    line: LineWatch,
     /// When the drive ends, once it has begun.
     end: Option<Instant>,
     last_order: Instant,
@@ -90,6 +92,7 @@ impl Stage<'_> {
         let mut play = self.begin(bus, board.run_delay())?;
         loop {
             play.note_stall();
+            play.watch_line()?;
             if self.stopped.load(Ordering::Relaxed) || play.end.is_some_and(|end| Instant::now() > end) {
                 return Ok(());
             }
@@ -132,6 +135,7 @@ impl Stage<'_> {
             start,
             looked: start,
             delay,
+            line: LineWatch::new(start),
             end: None,
             last_order: start,
             orders: 0,
@@ -179,17 +183,28 @@ impl Play<'_> {
     /// Notes how long the loop took, and how many frames of other nodes there was time for.
     fn note_stall(&mut self) {
         let now = Instant::now();
-        let passed = (now - self.looked).as_secs_f64();
+        let passed = now - self.looked;
         self.looked = now;
         let rate = f64::from(self.stage.trouble.foreign.load(Ordering::Relaxed));
         // What a stall has held up is left out: a bus takes no more frames than it has time for.
-        self.foreign_due = (self.foreign_due + rate * passed).min(LONGEST_BURST);
+        self.foreign_due = (self.foreign_due + rate * passed.as_secs_f64()).min(LONGEST_BURST);
         if self.end.is_some() {
             let delay = self.delay.look(now).as_secs_f64();
             let mut heard = self.stage.heard();
-            heard.longest_stall = heard.longest_stall.max(passed);
+            heard.longest_stall = heard.longest_stall.max(passed.as_secs_f64());
             heard.longest_delay = delay;
+            heard.line_delays.extend(LineDelay::of(now - passed, passed));
         }
+    }
+
+    /// Notes how late the board's driver hears what is sent.
+    fn watch_line(&mut self) -> Result<(), BoardError> {
+        if self.end.is_some()
+            && let Some(delay) = self.line.poll(&mut self.bus, self.looked)?
+        {
+            self.stage.heard().line_delays.push(delay);
+        }
+        Ok(())
     }
 
     fn send(&mut self, frame: &Frame) -> Result<(), BoardError> {

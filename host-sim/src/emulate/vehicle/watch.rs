@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use agv_wire::can::controller::PublishedPose;
 use agv_wire::can::emcy::Emergency;
 
+use super::line_watch::LineDelay;
 use crate::emulate::board::Ports;
 
 /// A pose that the controller has said, and when.
@@ -68,6 +69,8 @@ pub(super) struct Heard {
     pub longest_stall: f64,
     /// See [`super::Driven::longest_delay`], s.
     pub longest_delay: f64,
+    /// See [`super::Driven::line_delays`].
+    pub line_delays: Vec<LineDelay>,
 }
 
 impl Watch<'_> {
