@@ -174,6 +174,8 @@ fn a_controller_tells_its_state_and_keeps_its_settings() {
     change(&["reboot"]);
     running.hear("starts again");
     running.ports();
+    // There is no laser.
+    running.hear("fault 7300h: the laser is silent or faulty");
     let get_setting = agv(&["ctl", &service, "get", "vehicle.wheelbase", "--json"]);
     assert!(text(&get_setting.stdout).contains("1.234"), "{}", text(&get_setting.stderr));
     let host = format!("127.0.0.1:{status}");
@@ -187,7 +189,11 @@ fn a_controller_tells_its_state_and_keeps_its_settings() {
     };
     assert!(told["laser"] != "sound" && told["is_localised"] == false, "{told}");
     let metrics = get(&host, "/metrics");
-    assert!(metrics.contains("\nagv_localised 0\n") && metrics.contains("# TYPE agv_poses_total counter"), "{metrics}");
+    assert!(
+        metrics.contains("\nagv_localised 0\n") && metrics.contains("# TYPE agv_poses_total counter\nagv_poses_total "),
+        "{metrics}"
+    );
+    assert!(metrics.contains("\nagv_level_metres +Inf\n"), "{metrics}");
     assert!(get(&host, "/").contains("<title>agv run</title>"));
     let (is_content, printed) = running.terminate();
     assert!(is_content && printed.contains("started again            1"), "{printed}");

@@ -134,6 +134,8 @@ const KEPT: &str = "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\
 pub struct McapSummary {
     /// Number of messages of each topic that has any.
     pub messages: BTreeMap<&'static str, u64>,
+    /// Whether the log is attached. One that is too long is not.
+    pub has_log: bool,
 }
 
 /// What is said of a topic outside of the file.
@@ -199,8 +201,8 @@ pub fn write(
     for next in truth {
         writer.write_pose(Topic::Truth, next.time, next.pose)?;
     }
-    writer.attach(recording)?;
-    writer.finish()
+    let has_log = writer.attach(recording)?;
+    writer.finish(has_log)
 }
 
 /// The file.
@@ -268,24 +270,25 @@ impl Writer {
         self.write(Topic::Landmarks, now, &Markers { markers })
     }
 
-    /// What the messages have no place for.
-    fn attach(&mut self, recording: &Recording) -> Result<(), McapExportError> {
+    /// Attaches what the messages have no place for. False if it is too long.
+    fn attach(&mut self, recording: &Recording) -> Result<bool, McapExportError> {
         let io = |source| McapExportError::Io { path: self.path.clone(), source };
         let folder = tempfile::tempdir().map_err(io)?;
         let log = folder.path().join(ATTACHED_LOG);
         log::write(&log, recording)?;
-        let Some(attachment) = attachment(ATTACHED_LOG, std::fs::read(&log).map_err(io)?) else { return Ok(()) };
+        let Some(attachment) = attachment(ATTACHED_LOG, std::fs::read(&log).map_err(io)?) else { return Ok(false) };
         let attached = self.container.attach(&attachment);
-        attached.map_err(|source| McapExportError::Container { path: self.path.clone(), source })
+        attached.map_err(|source| McapExportError::Container { path: self.path.clone(), source })?;
+        Ok(true)
     }
 
-    fn finish(mut self) -> Result<McapSummary, McapExportError> {
+    fn finish(mut self, has_log: bool) -> Result<McapSummary, McapExportError> {
         let path = self.path;
         let container = self.container.finish();
         container.map_err(|source| McapExportError::Container { path: path.clone(), source })?;
         self.container.into_inner().finish().map_err(|source| McapExportError::Io { path, source })?;
         let messages = self.counts.into_iter().map(|(topic, count)| (topic.name(), count)).collect();
-        Ok(McapSummary { messages })
+        Ok(McapSummary { messages, has_log })
     }
 }
 

@@ -68,3 +68,14 @@ fn data(file: &mut File, index: &AttachmentIndex) -> io::Result<Option<Vec<u8>>>
     file.take(index.data_size).read_to_end(&mut data)?;
     Ok(Some(data))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LARGEST_RECORD, attachment};
+
+    #[test]
+    fn what_no_record_holds_is_not_attached() {
+        assert!(attachment("log", vec![0; LARGEST_RECORD / 2]).is_some());
+        assert!(attachment("log", vec![0; LARGEST_RECORD / 2 + 1]).is_none());
+    }
+}

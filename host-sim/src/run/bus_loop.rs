@@ -5,11 +5,13 @@ use std::time::{Duration, Instant};
 
 use agv_controller::{Bus, BusOutput, ChangeableSettings, SettingObjects};
 use agv_settings::service::Controller;
+use agv_wire::can::canopen::Message;
 use agv_wire::can::controller_node::ErrorKind;
 use agv_wire::can::sdo::{AbortCode, Object, ObjectDictionary, ValueBytes};
 
 use super::bus_port::BusPort;
 use super::exchange::{Exchange, Task};
+use super::fault::Fault;
 use super::flash_file::FlashFile;
 use super::periods::PeriodClock;
 use crate::bus::BusChange;
@@ -114,7 +116,12 @@ impl BusLoop<'_> {
         let (mut is_sent, mut is_late) = (true, false);
         let mut take = |output| match output {
             // A frame for which there is no room is left out; what it says is said again.
-            BusOutput::Send(frame) => is_sent &= port.send(&frame),
+            BusOutput::Send(frame) => {
+                if let Ok(Message::Emergency { emergency, .. }) = Message::decode(&frame) {
+                    exchange.tell_fault(Fault::of(&emergency));
+                }
+                is_sent &= port.send(&frame);
+            }
             BusOutput::Event(told) => exchange.pass_on(told),
             BusOutput::Published(published) => {
                 if is_sent {

@@ -13,6 +13,7 @@ use agv_core::state::{LaserHealth, Mode, PoseOutput};
 use agv_wire::can::controller_node::CommunicationParameters;
 use agv_wire::nav350::{Revolution, SensorSpeed, SensorWatch};
 
+use super::fault::Fault;
 use super::periods::Periods;
 use crate::link::clock::Clock;
 
@@ -24,6 +25,9 @@ const PUBLISHED_POSES: usize = 128;
 const REVOLUTIONS: usize = 3;
 /// Poses that wait to be told to other programs.
 const POSES: usize = 128;
+
+/// Faults that wait to be told to people.
+const FAULTS: usize = 64;
 
 /// What must run, each a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +85,7 @@ pub(super) struct Exchange {
     events: SyncSender<Told>,
     published: SyncSender<SentPose>,
     poses: SyncSender<PoseOutput>,
+    faults: (SyncSender<Fault>, Mutex<Receiver<Fault>>),
     localizer: OnceLock<Thread>,
     estimate: Mutex<Option<Estimate>>,
     laser: Mutex<SensorWatch>,
@@ -114,6 +119,7 @@ impl Exchange {
         let (published, published_end) = sync_channel(PUBLISHED_POSES);
         let (poses, poses_end) = sync_channel(POSES);
         let (revolutions, revolutions_end) = sync_channel(REVOLUTIONS);
+        let (faults, faults_end) = sync_channel(FAULTS);
         let (free_revolutions, free_revolutions_end) = sync_channel(REVOLUTIONS);
         for _ in 0..REVOLUTIONS {
             // There is room for all.
@@ -127,6 +133,7 @@ impl Exchange {
             events,
             published,
             poses,
+            faults: (faults, Mutex::new(faults_end)),
             localizer: OnceLock::new(),
             estimate: Mutex::new(None),
             laser: Mutex::new(SensorWatch::new()),
@@ -221,6 +228,16 @@ impl Exchange {
     /// How many records of the log were left out.
     pub fn lost_records(&self) -> u32 {
         self.lost_records.load(Ordering::Relaxed)
+    }
+
+    /// The bus was told of a fault, or of its end. Without room it is left out: the bus has it nevertheless.
+    pub fn tell_fault(&self, fault: Fault) {
+        let _ = self.faults.0.try_send(fault);
+    }
+
+    /// The next fault, or end of one, that the bus was told of.
+    pub fn next_fault(&self) -> Option<Fault> {
+        locked(&self.faults.1).try_recv().ok()
     }
 
     /// Leaves what was published to the log and to other programs; without room it is left out.

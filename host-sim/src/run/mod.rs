@@ -10,6 +10,7 @@ mod bus_port;
 mod configuration;
 mod demonstration;
 mod exchange;
+mod fault;
 mod flash_file;
 mod kept;
 mod kept_pose;
@@ -43,6 +44,7 @@ pub use bus_port::OpenBus;
 pub use configuration::{Configuration, ConfigurationError};
 pub use demonstration::{Demonstration, DemonstrationError};
 pub use exchange::BusState;
+pub use fault::Fault;
 pub use flash_file::{FlashFile, FlashFileError, Refused};
 pub use kept::{CONTOURS, FLASH, Kept, SOFTWARE, StoreFolderError, read};
 pub use kept_pose::{KeptPose, POSE};
@@ -189,6 +191,12 @@ impl Running<'_> {
             is_standing: exchange.is_standing(),
             left_out: [exchange.lost_events(), exchange.lost_revolutions(), exchange.lost_records()],
         }
+    }
+
+    /// The next fault, or end of one, that the bus was told of and that nobody has asked for yet.
+    #[must_use]
+    pub fn next_fault(&self) -> Option<Fault> {
+        self.exchange.next_fault()
     }
 
     /// Poses on the bus so far.

@@ -1,6 +1,5 @@
 //! How the controller is, for people and for machines: a page, JSON and the text of Prometheus, over HTTP.
 
-use std::fmt::Write;
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -11,6 +10,10 @@ use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
 use axum::{Json, Router};
+use prometheus_client::encoding::prometheus_text;
+use prometheus_client::metrics::counter::ConstCounter;
+use prometheus_client::metrics::gauge::ConstGauge;
+use prometheus_client::registry::Registry;
 use serde::Serialize;
 
 use super::exchange::{BusState, is_localised};
@@ -91,30 +94,46 @@ impl Status {
     #[must_use]
     pub fn metrics(&self) -> String {
         let mut text = String::new();
-        let mut tell = |name: &str, kind: &str, help: &str, value: f64| {
-            let value = if value == f64::INFINITY { "+Inf".to_owned() } else { value.to_string() };
-            // A string takes all that is written to it.
-            let _ = write!(text, "# HELP agv_{name} {help}\n# TYPE agv_{name} {kind}\nagv_{name} {value}\n");
-        };
-        let flag = |is_set: bool| f64::from(u8::from(is_set));
-        let level = |of: fn(&PoseLine) -> Option<f64>| self.pose.as_ref().and_then(of).unwrap_or(f64::INFINITY);
-        tell("starts_total", "counter", "Starts with this store.", self.starts.into());
-        tell("uptime_seconds", "gauge", "Time since the start.", self.uptime_s);
-        tell("localised", "gauge", "1 if the pose rests on what the vehicle sees.", flag(self.is_localised));
-        tell("level_metres", "gauge", "Protection level of the position.", level(|pose| pose.level_m));
-        tell("level_radians", "gauge", "Protection level of the heading.", level(|pose| pose.level_rad));
-        tell("bus_open", "gauge", "1 if the CAN bus is open.", flag(self.bus == BusState::Open));
-        tell("laser_sound", "gauge", "1 if the laser can be used.", flag(self.laser == "sound"));
-        tell("standing", "gauge", "1 if the vehicle stands.", flag(self.is_standing));
-        tell("poses_total", "counter", "Poses on the CAN bus.", self.poses as f64);
-        tell("pose_period_p50_seconds", "gauge", "Median time between poses.", 1e-3 * self.period_ms.p50);
-        tell("pose_period_p999_seconds", "gauge", "99.9 % of the times are not longer.", 1e-3 * self.period_ms.p999);
-        tell("pose_period_max_seconds", "gauge", "Longest time between poses.", 1e-3 * self.period_ms.max);
-        tell("missed_deadlines_total", "counter", "Deadlines without a pose.", self.missed as f64);
-        tell("lost_events_total", "counter", "Events without room.", self.left_out.events.into());
-        tell("lost_revolutions_total", "counter", "Revolutions without room.", self.left_out.revolutions.into());
-        tell("lost_records_total", "counter", "Records of the log without room.", self.left_out.records.into());
+        // A string takes all that is written to it.
+        let _ = prometheus_text::encode(&mut text, &self.registry());
         text
+    }
+
+    fn registry(&self) -> Registry {
+        let mut registry = Registry::with_prefix("agv");
+        let level = |of: fn(&PoseLine) -> Option<f64>| self.pose.as_ref().and_then(of).unwrap_or(f64::INFINITY);
+        let counters = [
+            ("starts", "Starts with this store", self.starts.into()),
+            ("poses", "Poses on the CAN bus", self.poses),
+            ("missed_deadlines", "Deadlines without a pose", self.missed),
+            ("lost_events", "Events without room", self.left_out.events.into()),
+            ("lost_revolutions", "Revolutions without room", self.left_out.revolutions.into()),
+            ("lost_records", "Records of the log without room", self.left_out.records.into()),
+        ];
+        for (name, help, count) in counters {
+            registry.register(name, help, ConstCounter::new(count));
+        }
+        let flags = [
+            ("localised", "1 if the pose rests on what the vehicle sees", self.is_localised),
+            ("bus_open", "1 if the CAN bus is open", self.bus == BusState::Open),
+            ("laser_sound", "1 if the laser can be used", self.laser == "sound"),
+            ("standing", "1 if the vehicle stands", self.is_standing),
+        ];
+        for (name, help, is_set) in flags {
+            registry.register(name, help, ConstGauge::new(i64::from(is_set)));
+        }
+        let gauges = [
+            ("uptime_seconds", "Time since the start", self.uptime_s),
+            ("level_metres", "Protection level of the position", level(|pose| pose.level_m)),
+            ("level_radians", "Protection level of the heading", level(|pose| pose.level_rad)),
+            ("pose_period_p50_seconds", "Median time between poses", 1e-3 * self.period_ms.p50),
+            ("pose_period_p999_seconds", "99.9 % of the times are not longer", 1e-3 * self.period_ms.p999),
+            ("pose_period_max_seconds", "Longest time between poses", 1e-3 * self.period_ms.max),
+        ];
+        for (name, help, value) in gauges {
+            registry.register(name, help, ConstGauge::new(value));
+        }
+        registry
     }
 }
 
@@ -161,5 +180,5 @@ async fn status(State(board): State<StatusBoard>) -> Json<Option<Status>> {
 
 async fn metrics(State(board): State<StatusBoard>) -> impl IntoResponse {
     let text = board.look().map(|status| status.metrics()).unwrap_or_default();
-    ([(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")], text)
+    ([(header::CONTENT_TYPE, prometheus_text::CONTENT_TYPE)], text)
 }

@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -224,16 +224,23 @@ fn what_is_stored_over_the_service_port_survives_a_restart() {
 fn a_bus_that_was_lost_comes_back() {
     let folder = tempfile::tempdir().unwrap();
     let (bus, is_broken) = (InProcessBus::new(), Arc::new(AtomicBool::new(true)));
-    let breaks = Arc::clone(&is_broken);
+    let (breaks, attempts) = (Arc::clone(&is_broken), Arc::new(AtomicUsize::new(0)));
+    let counts = Arc::clone(&attempts);
     let change = move |options: &mut Options| {
         options.open_bus = Box::new(move || {
+            counts.fetch_add(1, Ordering::Relaxed);
             let bus = Breakable { node: bus.join(), is_broken: Arc::clone(&breaks) };
             bus.check().map(|()| Box::new(bus) as Box<dyn Bus>)
         });
     };
     let (_, remarks) = start(folder.path(), &settings_of_laser(1), change, |running| {
         let is = |state| move || running.condition().bus == state;
-        wait("the loss", is(BusState::Lost));
+        // A loss is told before the bus is tried again.
+        let wait_for_attempt = || {
+            let before = attempts.load(Ordering::Relaxed);
+            wait("an attempt", || attempts.load(Ordering::Relaxed) > before);
+        };
+        wait("the first attempt", || attempts.load(Ordering::Relaxed) > 0);
         for _ in 0..2 {
             is_broken.store(false, Ordering::Relaxed);
             wait("the bus", is(BusState::Open));
@@ -241,6 +248,7 @@ fn a_bus_that_was_lost_comes_back() {
             wait("poses", || running.condition().poses > before + 5);
             is_broken.store(true, Ordering::Relaxed);
             wait("the loss", is(BusState::Lost));
+            wait_for_attempt();
         }
     })
     .unwrap();

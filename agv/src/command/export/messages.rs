@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use agv_host_sim::export;
+use agv_host_sim::export::mcap::McapSummary;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::Replay;
+
+use crate::command::output;
 
 /// Writes a drive; gives how many messages of which topic.
 pub type Write = fn(&Path, &Recording, &Replay, Box<dyn FnMut(usize)>) -> anyhow::Result<Counts>;
@@ -20,7 +23,7 @@ pub fn mcap(
     answers: &Replay,
     progress: Box<dyn FnMut(usize)>,
 ) -> anyhow::Result<Counts> {
-    Ok(export::mcap::write(path, recording, answers, progress)?.messages)
+    Ok(counts(export::mcap::write(path, recording, answers, progress)?))
 }
 
 /// As a folder.
@@ -30,5 +33,14 @@ pub fn rosbag2(
     answers: &Replay,
     progress: Box<dyn FnMut(usize)>,
 ) -> anyhow::Result<Counts> {
-    Ok(export::rosbag2::write(path, recording, answers, progress)?.messages)
+    Ok(counts(export::rosbag2::write(path, recording, answers, progress)?))
+}
+
+fn counts(summary: McapSummary) -> Counts {
+    if !summary.has_log {
+        output::note(
+            "warning: the log is too long to be attached; an import of the file has neither reflectors nor the map",
+        );
+    }
+    summary.messages
 }

@@ -1,5 +1,7 @@
 //! `agv run`.
 
+mod journal;
+
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
@@ -12,7 +14,8 @@ use agv_host_sim::run::{self, Configuration, Demonstration, Options, Ports, Real
 use agv_host_sim::view::{Shared, Timeline, follow, serve};
 use anyhow::{Context, bail, ensure};
 
-use super::output::{note, print_rows};
+use self::journal::Journal;
+use super::output::print_rows;
 use super::stop;
 
 const HELP: &str = "\
@@ -86,9 +89,10 @@ impl Run {
             bail!("{}: bus: {error}", self.config.as_deref().unwrap_or(Path::new("")).display());
         }
         let is_stopped = stop::on_interrupt()?;
+        let journal = Journal::open();
         let summary = match configuration {
-            Some(configuration) => self.with_vehicle(&configuration, &is_stopped)?,
-            None => self.demonstrate(&is_stopped)?,
+            Some(configuration) => self.with_vehicle(&configuration, &is_stopped, journal)?,
+            None => self.demonstrate(&is_stopped, journal)?,
         };
         self.print(&summary)?;
         let must_localise = self.demo || self.seconds.is_some();
@@ -101,9 +105,15 @@ impl Run {
         Ok(())
     }
 
-    fn with_vehicle(&self, configuration: &Configuration, is_stopped: &Arc<AtomicBool>) -> anyhow::Result<Summary> {
+    fn with_vehicle(
+        &self,
+        configuration: &Configuration,
+        is_stopped: &Arc<AtomicBool>,
+        journal: Journal,
+    ) -> anyhow::Result<Summary> {
         let address = configuration.status.listen;
-        self.again(|restarts| {
+        let note = |text: &str| journal.tell(text);
+        again(journal, |restarts| {
             let listener = TcpListener::bind(address)
                 .with_context(|| format!("{address}; another address is set with listen in [status]"))?;
             let name = configuration.bus.clone();
@@ -117,51 +127,42 @@ impl Run {
                 log: self.output.clone(),
             };
             let watch = |running: &Running| {
-                tell_ports(running);
+                tell_ports(running, journal);
                 let end = self.end();
-                run::attend(running, &running.limits, Some(listener), &remark, || stop_at(end, is_stopped));
+                run::attend(running, &running.limits, Some(listener), &note, || {
+                    tell_faults(running, journal);
+                    stop_at(end, is_stopped);
+                });
             };
-            let summary = run::run(options, is_stopped, &remark, watch)?;
+            let summary = run::run(options, is_stopped, &note, watch)?;
             Ok(Summary { restarts, ..summary })
         })
     }
 
-    fn demonstrate(&self, is_stopped: &Arc<AtomicBool>) -> anyhow::Result<Summary> {
+    fn demonstrate(&self, is_stopped: &Arc<AtomicBool>, journal: Journal) -> anyhow::Result<Summary> {
         let page = if self.json || self.no_page { None } else { Some(self.bind_page()?) };
         let demonstration = Demonstration::new()?;
         let temporary = std::env::temp_dir().join(format!("agv-run-{}", std::process::id()));
         let folder = self.store.clone().unwrap_or_else(|| temporary.clone());
         let watch = |running: &Running| {
-            tell_ports(running);
-            let Some(listener) = page else { return self.wait(running, is_stopped) };
+            tell_ports(running, journal);
+            let Some(listener) = page else { return self.wait(running, is_stopped, journal) };
             let log = running.log;
             std::thread::scope(|scope| {
-                let served = scope.spawn(|| serve_page(listener, log, is_stopped));
-                self.wait(running, is_stopped);
+                let served = scope.spawn(|| serve_page(listener, log, is_stopped, journal));
+                self.wait(running, is_stopped, journal);
                 if let Ok(Err(error)) = served.join() {
-                    note(&format!("agv: the page cannot be served: {error}"));
+                    journal.tell(&format!("the page cannot be served: {error}"));
                 }
             });
         };
-        let outcome = demonstration.run(&folder, RealTime::USUAL, self.output.as_deref(), is_stopped, &remark, watch);
+        let note = |text: &str| journal.tell(text);
+        let outcome = demonstration.run(&folder, RealTime::USUAL, self.output.as_deref(), is_stopped, &note, watch);
         if self.store.is_none() {
             // What cannot be removed is left to the system.
             let _ = std::fs::remove_dir_all(&temporary);
         }
         Ok(outcome?)
-    }
-
-    /// Runs again as often as somebody wants that.
-    fn again(&self, mut once: impl FnMut(u32) -> anyhow::Result<Summary>) -> anyhow::Result<Summary> {
-        let mut restarts = 0;
-        loop {
-            let summary = once(restarts)?;
-            if !summary.is_restart_wanted {
-                return Ok(summary);
-            }
-            restarts += 1;
-            note("agv: starts again, as the service port was asked to");
-        }
     }
 
     fn bind_page(&self) -> anyhow::Result<TcpListener> {
@@ -173,10 +174,11 @@ impl Run {
     }
 
     /// Waits for the end, and makes it when the time is over.
-    fn wait(&self, running: &Running, is_stopped: &Arc<AtomicBool>) {
+    fn wait(&self, running: &Running, is_stopped: &Arc<AtomicBool>, journal: Journal) {
         let end = self.end();
         while !running.is_over() {
             std::thread::sleep(Duration::from_millis(10));
+            tell_faults(running, journal);
             stop_at(end, is_stopped);
         }
     }
@@ -214,24 +216,43 @@ fn stop_at(end: Option<Instant>, is_stopped: &AtomicBool) {
     }
 }
 
-/// Says what happens.
-fn remark(text: &str) {
-    note(&format!("agv: {text}"));
+/// Runs again as often as somebody wants that.
+fn again(journal: Journal, mut once: impl FnMut(u32) -> anyhow::Result<Summary>) -> anyhow::Result<Summary> {
+    let mut restarts = 0;
+    loop {
+        let summary = once(restarts)?;
+        if !summary.is_restart_wanted {
+            return Ok(summary);
+        }
+        restarts += 1;
+        journal.tell("starts again, as the service port was asked to");
+    }
 }
 
-fn tell_ports(running: &Running) {
+fn tell_faults(running: &Running, journal: Journal) {
+    while let Some(fault) = running.next_fault() {
+        journal.tell_fault(&fault);
+    }
+}
+
+fn tell_ports(running: &Running, journal: Journal) {
     let Running { log, service, starts, .. } = running;
-    note(&format!("agv: start {starts}; agv view --live {log}; agv ctl {service} list"));
+    journal.tell(&format!("start {starts}; agv view --live {log}; agv ctl {service} list"));
 }
 
 /// Shows what the controller says at its log stream.
-fn serve_page(listener: TcpListener, log: SocketAddr, is_stopped: &Arc<AtomicBool>) -> std::io::Result<()> {
+fn serve_page(
+    listener: TcpListener,
+    log: SocketAddr,
+    is_stopped: &Arc<AtomicBool>,
+    journal: Journal,
+) -> std::io::Result<()> {
     let host = log.to_string();
     let shared = Shared::new(Timeline::of_controller(&host));
     std::thread::scope(|scope| {
         scope.spawn(|| {
             if let Err(error) = follow(&host, None, &shared, is_stopped, |_| ()) {
-                note(&format!("agv: the page shows no more: {error}"));
+                journal.tell(&format!("the page shows no more: {error}"));
             }
         });
         serve(listener, &shared, is_stopped)
