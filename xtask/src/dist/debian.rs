@@ -6,7 +6,13 @@ use std::process::Command;
 use anyhow::{Context, bail};
 use object::{Object as _, ObjectSection as _};
 
-use super::{VERSION, output, run, write};
+use super::{VERSION, copy, output, run, write};
+use crate::repository;
+
+const MAINTAINER: &str = "The project's builders <agv@localhost>";
+
+/// What the package does beside its files: the service's user comes, and the service ends with its program.
+const SCRIPTS: [&str; 3] = ["postinst", "prerm", "postrm"];
 
 /// Packs the tree of the archive as a package that installs below `/usr`.
 pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
@@ -24,13 +30,19 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
     std::fs::remove_file(&sums).with_context(|| sums.display().to_string())?;
     let doc = usr.join("share/doc/agv");
     write(&doc.join("copyright"), copyright(&doc)?.as_bytes())?;
+    write(&doc.join("changelog"), changelog(epoch)?.as_bytes())?;
+    run(Command::new("gzip").args(["-9", "--no-name"]).arg(doc.join("changelog")))?;
     let libc = libc(&usr.join("bin/agv"))?;
     let folder = root.with_file_name("package");
     let size = output(Command::new("du").args(["--summarize", "--apparent-size", "--block-size=1024"]).arg(&usr))?;
     let size = String::from_utf8(size)?.split_whitespace().next().unwrap_or("0").to_owned();
     write(&folder.join("DEBIAN/control"), control(architecture, &size, &libc).as_bytes())?;
+    for script in SCRIPTS {
+        copy(&repository().join("agv/service").join(script), &folder.join("DEBIAN").join(script))?;
+    }
     let package = root.with_file_name(format!("agv_{VERSION}_{architecture}.deb"));
     run(Command::new("chmod").args(["--recursive", "u+rwX,go+rX,go-w"]).arg(&folder))?;
+    run(Command::new("chmod").arg("0755").args(SCRIPTS.map(|script| folder.join("DEBIAN").join(script))))?;
     run(Command::new("dpkg-deb")
         .args(["--root-owner-group", "-Zgzip", "-z6", "--build"])
         .arg(&folder)
@@ -38,6 +50,16 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
         .env("SOURCE_DATE_EPOCH", epoch))?;
     std::fs::remove_dir_all(&folder).context("target/dist/package cannot be removed")?;
     Ok(package)
+}
+
+/// What Debian's tools read of the versions; people read `CHANGELOG.md`.
+fn changelog(epoch: &str) -> anyhow::Result<String> {
+    let date = output(Command::new("date").args(["--utc", "--rfc-email", "--date"]).arg(format!("@{epoch}")))?;
+    let date = String::from_utf8(date)?;
+    Ok(format!(
+        "agv ({VERSION}) unstable; urgency=medium\n\n  * What has changed is in CHANGELOG.md.\n\n -- {MAINTAINER}  {}\n",
+        date.trim()
+    ))
 }
 
 /// Who may do what with the package.
@@ -65,7 +87,7 @@ fn libc(program: &Path) -> anyhow::Result<String> {
 
 fn control(architecture: &str, size: &str, libc: &str) -> String {
     format!(
-        "Package: agv\nVersion: {VERSION}\nArchitecture: {architecture}\nMaintainer: The project's builders <agv@localhost>\n\
+        "Package: agv\nVersion: {VERSION}\nArchitecture: {architecture}\nMaintainer: {MAINTAINER}\n\
          Installed-Size: {size}\nDepends: libc6 (>= {libc}), libgcc-s1\nSection: science\nPriority: optional\n\
          Description: Localisation of automated guided vehicles\n \
          Replays, simulates, calibrates and measures the localisation controller of an\n \

@@ -128,7 +128,7 @@ fn check_package(package: &Path, root: &Path) {
     let files = said(Command::new("find").arg(".").args(["-type", "f", "-printf", "%P\n"]).current_dir(root));
     let mut expected: BTreeSet<String> = files.lines().map(str::to_owned).collect();
     expected.remove("SHA256SUMS");
-    expected.insert("share/doc/agv/copyright".to_owned());
+    expected.extend(["copyright", "changelog.gz"].map(|name| format!("share/doc/agv/{name}")));
     assert_eq!(listed, expected);
     assert!(contents.lines().all(|line| line.contains(" root/root ")), "{contents}");
     // What the program loads is in the packages that this one depends on.
@@ -143,14 +143,23 @@ fn check_package(package: &Path, root: &Path) {
 /// It installs into a root that has nothing but the libraries, and runs there.
 fn install(test: &str, package: &Path, root: &Path) {
     let state = root.join("var/lib/dpkg");
-    for name in ["info", "updates"] {
-        std::fs::create_dir_all(state.join(name)).unwrap();
+    for name in ["var/lib/dpkg/info", "var/lib/dpkg/updates", "etc"] {
+        std::fs::create_dir_all(root.join(name)).unwrap();
+    }
+    for file in ["passwd", "group", "shadow", "gshadow"] {
+        std::fs::write(root.join("etc").join(file), "").unwrap();
     }
     std::fs::write(state.join("status"), "").unwrap();
-    let mut dpkg = Command::new("dpkg");
-    // The libraries are put there below, without their packages.
-    dpkg.arg("--root").arg(root).args(["--force-not-root", "--force-depends", "--force-bad-path", "--log=/dev/null"]);
-    said(dpkg.arg("--install").arg(package));
+    let dpkg = || {
+        let mut dpkg = Command::new("dpkg");
+        // The libraries are put there below, without their packages; there is no shell, so that scripts run outside.
+        dpkg.arg("--root").arg(root).args(["--force-not-root", "--force-depends", "--force-bad-path"]);
+        dpkg.args(["--force-script-chrootless", "--log=/dev/null"]);
+        dpkg
+    };
+    said(dpkg().arg("--install").arg(package));
+    let user = std::fs::read_to_string(root.join("etc/passwd")).unwrap();
+    assert!(user.starts_with("agv:") && user.contains(":/var/lib/agv:"), "{user}");
     let agv = root.join("usr/bin/agv");
     for line in said(Command::new("ldd").arg(&agv)).lines() {
         let Some(library) = line.split_whitespace().find(|word| word.starts_with('/')) else { continue };
@@ -175,4 +184,12 @@ fn install(test: &str, package: &Path, root: &Path) {
             other => panic!("{arguments:?}: {other:?}"),
         }
     }
+    // The store stays with the package's configuration, and goes with it.
+    let store = root.join("var/lib/agv/flash.bin");
+    std::fs::create_dir_all(store.parent().unwrap()).unwrap();
+    std::fs::write(&store, "").unwrap();
+    said(dpkg().args(["--remove", "agv"]));
+    assert!(store.exists() && !root.join("usr/bin/agv").exists());
+    said(dpkg().args(["--purge", "agv"]));
+    assert!(!store.exists());
 }
