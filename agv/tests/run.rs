@@ -18,6 +18,8 @@ struct Running {
     child: Child,
     /// What it says, line by line.
     said: BufReader<std::process::ChildStderr>,
+    /// Lines that nobody has waited for yet: its threads speak in no order.
+    unclaimed: Vec<String>,
 }
 
 impl Running {
@@ -29,18 +31,21 @@ impl Running {
             .spawn()
             .unwrap();
         let said = BufReader::new(child.stderr.take().unwrap());
-        Self { child, said }
+        Self { child, said, unclaimed: Vec::new() }
     }
 
-    /// The next line that has a word in it.
+    /// The first line that has a word in it, and was not given before.
     fn hear(&mut self, word: &str) -> String {
-        let mut line = String::new();
+        if let Some(place) = self.unclaimed.iter().position(|line| line.contains(word)) {
+            return self.unclaimed.remove(place);
+        }
         loop {
-            line.clear();
-            assert!(self.said.read_line(&mut line).unwrap() > 0, "it ended without a word of {word}");
+            let mut line = String::new();
+            assert!(self.said.read_line(&mut line).unwrap() > 0, "no word of {word}: {:?}", self.unclaimed);
             if line.contains(word) {
                 return line;
             }
+            self.unclaimed.push(line);
         }
     }
 
@@ -205,11 +210,11 @@ fn what_cannot_be_run_is_refused_in_one_line() {
     let refused = |text: &str| refusal(&["run", "--config", &files.write("vehicle.toml", text.as_bytes())]);
     assert!(refusal(&["run", "--config", &files.path("none.toml")]).contains("none.toml"));
     let wrong = refused("store = \"s\"\nbuss = \"can0\"\n");
-    assert!(wrong.contains("vehicle.toml, line 2") && wrong.contains("buss"), "{wrong}");
+    assert!(wrong.contains("vehicle.toml:2: ") && wrong.contains("buss"), "{wrong}");
     let wrong = refused("store = \"s\"\nbus = \"can:0\"\n");
     assert!(wrong.contains("slcan:/dev/ttyACM0"), "{wrong}");
     let wrong = refused("store = \"s\"\nbus = \"can0\"\n[real_time]\nbus_priority = 100\n");
-    assert!(wrong.contains("line 4") && wrong.contains("from 1 to 99"), "{wrong}");
+    assert!(wrong.contains("vehicle.toml:4: ") && wrong.contains("from 1 to 99"), "{wrong}");
     let wrong = refused("store = \"/dev/null/s\"\nbus = \"can0\"\n[status]\nlisten = \"127.0.0.1:0\"\n");
     assert!(wrong.contains("/dev/null/s"), "{wrong}");
     let taken = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
