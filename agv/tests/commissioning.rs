@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use agv_core::geometry::Pose;
 use agv_host_sim::log;
 use agv_host_sim::mapping::{Clustering, map_features};
+use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::replay;
 use agv_host_sim::simulate::scenario::{Scenario, WorldOptions};
 use agv_host_sim::simulate::simulate;
@@ -13,6 +15,7 @@ use agv_tests::recordings;
 use crate::support::{Files, agv, refusal, text};
 
 const HALL: &str = include_str!("../../host-sim/scenarios/warehouse_hall.toml");
+const STORAGE: &str = include_str!("../../host-sim/scenarios/block_storage_mapping.toml");
 
 /// The hall's drive with what the localiser answered.
 fn hall(files: &Files) -> String {
@@ -154,6 +157,56 @@ fn an_acceptance_tells_what_was_not_measured_by_its_code() {
     assert_eq!(verdict(&result, "repeatable"), "pass");
     let bad = files.write("bad.csv", b"along_mm,across_mm,heading_deg\n1,2\n");
     assert!(refusal(&["accept", &log, "--halts", &bad]).contains("bad.csv:2:"));
+}
+
+/// Where a simulated vehicle really stood for more than two seconds, in order.
+fn halts_of(recording: &Recording) -> Vec<Pose> {
+    let mut halts = Vec::new();
+    let mut begin = recording.truth[0];
+    let mut last = begin;
+    for now in &recording.truth[1..] {
+        let way = begin.pose.between(&now.pose);
+        if way.x.hypot(way.y) > 1e-4 {
+            halts.extend((last.time.since(begin.time) > 2.2).then_some(last.pose));
+            begin = *now;
+        }
+        last = *now;
+    }
+    halts.extend((last.time.since(begin.time) > 2.2).then_some(last.pose));
+    halts
+}
+
+#[test]
+fn halts_at_surveyed_marks_tell_a_map_that_is_elsewhere() {
+    let files = Files::new();
+    let mut scenario = Scenario::parse(STORAGE).unwrap();
+    let drive = &mut scenario.drive;
+    (drive.start_standstill, drive.stop_between_legs, drive.end_standstill) = (3.0, 4.0, 3.0);
+    scenario.laser.scans = false;
+    let recording = simulate(&scenario).unwrap().recording;
+    let log = files.path("drive.agvlog");
+    log::write(Path::new(&log), &recording).unwrap();
+    let halts = halts_of(&recording);
+    assert!(halts.len() >= 4, "{halts:?}");
+    // The vehicle halts beside each mark, as a ruler tells.
+    let by_ruler = Pose::new(0.012, -0.005, 0.1_f64.to_radians());
+    let judge = |shift: f64, left_out: usize| {
+        let lines = halts.iter().skip(left_out).zip('A'..).map(|(halt, name)| {
+            let Pose { x, y, theta } = halt.compose(&by_ruler.between(&Pose::default()));
+            format!("{name},{},{y},{},12,-5,0.1\n", x + shift, theta.to_degrees())
+        });
+        let table = format!("mark,x_m,y_m,heading_deg,along_mm,across_mm,turned_deg\n{}", lines.collect::<String>());
+        let marks = files.write("marks.csv", table.as_bytes());
+        json(&["accept", &log, "--marks", &marks, "--json"]).1
+    };
+    let line = "where it says that it is";
+    let result = judge(0.0, 0);
+    assert_eq!(verdict(&result, line), "pass", "{result}");
+    // A survey that is elsewhere than the map, however repeatable the halts are.
+    let result = judge(0.05, 0);
+    assert_eq!(verdict(&result, line), "fail", "{result}");
+    let result = judge(0.0, halts.len() - 2);
+    assert_eq!(verdict(&result, line), "not_measured", "{result}");
 }
 
 #[test]
