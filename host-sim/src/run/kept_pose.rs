@@ -130,7 +130,7 @@ mod tests {
         KeptPose::new(&pose, 7).write(folder.path()).unwrap();
         assert_eq!(KeptPose::read(folder.path(), 7), Some(pose));
         assert_eq!(KeptPose::read(folder.path(), 8), None);
-        output_file::write(&folder.path().join(POSE), "{\"x_m\":1.0").unwrap();
+        crate::output_file::write(&folder.path().join(POSE), "{\"x_m\":1.0").unwrap();
         assert_eq!(KeptPose::read(folder.path(), 7), None);
     }
 }
