@@ -103,23 +103,25 @@ pub(super) fn absolute(track: &Track, halts: &[MarkHalt]) -> Line {
         };
         return line(Verdict::NotMeasured, found);
     }
-    let mut errors: Vec<(f64, f64, &str)> = Vec::new();
-    let stated = halts_of(track);
-    for place in &places {
-        let of_place: Vec<&MarkHalt> = halts.iter().filter(|halt| distance(&halt.surveyed, place) < APART).collect();
-        let said: Vec<&Pose> = stated.iter().filter(|pose| distance(pose, place) < NEAR).collect();
-        if said.len() != of_place.len() {
-            let name = &of_place.first().map_or("", |halt| halt.mark.as_str());
-            let (measured, said) = (count_of(of_place.len(), "halt"), said.len());
-            let found = format!("{measured} at {name} measured, and {said} in the log, of 2 s and within 0.5 m of it");
-            return line(Verdict::NotMeasured, found);
-        }
-        errors.extend(of_place.iter().zip(said).map(|(halt, said)| {
+    // Both are in the order of the drive; marks may be near each other.
+    let is_at_mark = |pose: &Pose| halts.iter().any(|halt| distance(pose, &halt.surveyed) < NEAR);
+    let said: Vec<Pose> = halts_of(track).into_iter().filter(is_at_mark).collect();
+    let other = halts.iter().zip(&said).find(|(halt, said)| distance(said, &halt.surveyed) >= NEAR);
+    if said.len() != halts.len() || other.is_some() {
+        let (measured, said) = (count_of(halts.len(), "halt"), said.len());
+        let place = other.map_or_else(String::new, |(halt, _)| format!("; the one at {} is another", halt.mark));
+        let found = format!("{measured} measured, and {said} in the log, of 2 s and within 0.5 m of a mark{place}");
+        return line(Verdict::NotMeasured, found);
+    }
+    let errors: Vec<(f64, f64, &str)> = halts
+        .iter()
+        .zip(&said)
+        .map(|(halt, said)| {
             let really = halt.surveyed.compose(&halt.by_ruler);
             let turned = difference(said.theta, really.theta).abs().to_degrees();
             (1e3 * distance(said, &really), turned, halt.mark.as_str())
-        }));
-    }
+        })
+        .collect();
     let (farthest, _, name) = errors.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::NAN, 0.0, ""));
     let turned = errors.iter().map(|error| error.1).fold(0.0, f64::max);
     line(
@@ -218,6 +220,14 @@ mod tests {
         let at_two = [marked("A", PLACES[0]), marked("B", PLACES[1]), marked("C", PLACES[1])];
         assert_eq!(absolute(&track(&[PLACES[0], PLACES[1], PLACES[1]]), &at_two).verdict, Verdict::NotMeasured);
         assert_eq!(absolute(&track(&PLACES), &[]).verdict, Verdict::NotMeasured);
+        // Marks that are nearer to each other than two places are.
+        let near = PLACES[0].compose(&Pose::new(0.7, 0.0, 0.0));
+        let four = [("A", PLACES[0]), ("B", near), ("C", PLACES[1]), ("D", PLACES[2])];
+        let halts: Vec<MarkHalt> = four.iter().map(|(name, place)| marked(name, *place)).collect();
+        assert_eq!(absolute(&track(&four.map(|(_, place)| place)), &halts).verdict, Verdict::Pass);
+        // The same halts in another order than the table has.
+        let other = absolute(&track(&[PLACES[1], near, PLACES[0], PLACES[2]]), &halts);
+        assert!(other.verdict == Verdict::NotMeasured && other.found.ends_with("at A is another"), "{other:?}");
         // A halt that the log does not hold.
         let halts: Vec<MarkHalt> =
             ["A", "B", "C"].iter().zip(PLACES).map(|(name, place)| marked(name, place)).collect();
