@@ -107,7 +107,7 @@ fn noise_of_reflectors_alone_is_that_of_the_sensor() {
 }
 
 #[test]
-fn a_vehicle_whose_noise_is_measured_is_accepted() {
+fn a_vehicle_that_drives_straight_on_is_not_fit_to_travel_though_its_noise_is_measured() {
     let files = Files::new();
     let mut scenario = Scenario::parse(HALL).unwrap();
     scenario.laser.scans = false;
