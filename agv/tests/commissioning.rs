@@ -5,7 +5,7 @@ use std::path::Path;
 use agv_core::geometry::Pose;
 use agv_host_sim::log;
 use agv_host_sim::mapping::{Clustering, map_features};
-use agv_host_sim::recording::Recording;
+use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::replay::replay;
 use agv_host_sim::simulate::scenario::{Scenario, WorldOptions};
 use agv_host_sim::simulate::simulate;
@@ -115,7 +115,13 @@ fn a_vehicle_that_drives_straight_on_is_not_fit_to_travel_though_its_noise_is_me
     log::write(Path::new(&drive), &simulate(&scenario).unwrap().recording).unwrap();
     let (measured, _) = measured(&files, &drive, &["reflectors"]);
     let log = files.path("vehicle.agvlog");
-    agv_tests::busy_board::drive(&log::read(Path::new(&measured)).unwrap().0, Path::new(&log));
+    let (mut recording, _) = log::read(Path::new(&measured)).unwrap();
+    for event in &mut recording.events {
+        if let RecordedEvent::SetPose(fix) = event {
+            (fix.position_deviation, fix.heading_deviation) = (0.05, 0.01);
+        }
+    }
+    agv_tests::busy_board::drive(&recording, 10, Path::new(&log));
     let ten = format!("along_mm,across_mm,heading_deg\n{}", "1,2,0.01\n".repeat(10));
     let halts = files.write("halts.csv", ten.as_bytes());
     let (code, result) = json(&["accept", &log, "--halts", &halts, "--json"]);
@@ -176,27 +182,53 @@ fn halts_of(recording: &Recording) -> Vec<Pose> {
     halts
 }
 
+/// A drive with halts through the block storage, each so long, s.
+fn halting(halt: f64) -> Recording {
+    let mut scenario = Scenario::parse(STORAGE).unwrap();
+    let drive = &mut scenario.drive;
+    (drive.start_standstill, drive.stop_between_legs, drive.end_standstill) = (3.0, halt, 3.0);
+    scenario.laser.scans = false;
+    simulate(&scenario).unwrap().recording
+}
+
+/// A table of surveyed marks, `shift` metres along x from where they are: the vehicle halts beside each, as a ruler tells.
+fn marks_beside(halts: &[Pose], shift: f64) -> String {
+    let by_ruler = Pose::new(0.012, -0.005, 0.1_f64.to_radians());
+    let lines = halts.iter().zip('A'..).map(|(halt, name)| {
+        let Pose { x, y, theta } = halt.compose(&by_ruler.between(&Pose::default()));
+        format!("{name},{},{y},{},12,-5,0.1\n", x + shift, theta.to_degrees())
+    });
+    format!("mark,x_m,y_m,heading_deg,along_mm,across_mm,turned_deg\n{}", lines.collect::<String>())
+}
+
+#[test]
+fn a_vehicle_that_passes_every_line_is_accepted() {
+    let files = Files::new();
+    let drive = files.path("drive.agvlog");
+    // The two seconds before it is told where it is are less than a hundredth of the drive.
+    let recording = halting(40.0);
+    log::write(Path::new(&drive), &recording).unwrap();
+    let (measured, _) = measured(&files, &drive, &["reflectors"]);
+    let log = files.path("vehicle.agvlog");
+    let seconds = recording.truth.last().unwrap().time.since(recording.truth[0].time) as u64;
+    agv_tests::busy_board::drive(&log::read(Path::new(&measured)).unwrap().0, seconds, Path::new(&log));
+    let marks = files.write("marks.csv", marks_beside(&halts_of(&recording), 0.0).as_bytes());
+    let ten = format!("along_mm,across_mm,heading_deg\n{}", "1,2,0.01\n".repeat(10));
+    let halts = files.write("halts.csv", ten.as_bytes());
+    let (code, result) = json(&["accept", &log, "--halts", &halts, "--marks", &marks, "--json"]);
+    assert_eq!((code, &result["verdict"]), (Some(0), &"pass".into()), "{result}");
+}
+
 #[test]
 fn halts_at_surveyed_marks_tell_a_map_that_is_elsewhere() {
     let files = Files::new();
-    let mut scenario = Scenario::parse(STORAGE).unwrap();
-    let drive = &mut scenario.drive;
-    (drive.start_standstill, drive.stop_between_legs, drive.end_standstill) = (3.0, 4.0, 3.0);
-    scenario.laser.scans = false;
-    let recording = simulate(&scenario).unwrap().recording;
+    let recording = halting(4.0);
     let log = files.path("drive.agvlog");
     log::write(Path::new(&log), &recording).unwrap();
     let halts = halts_of(&recording);
     assert!(halts.len() >= 4, "{halts:?}");
-    // The vehicle halts beside each mark, as a ruler tells.
-    let by_ruler = Pose::new(0.012, -0.005, 0.1_f64.to_radians());
     let judge = |shift: f64, left_out: usize| {
-        let lines = halts.iter().skip(left_out).zip('A'..).map(|(halt, name)| {
-            let Pose { x, y, theta } = halt.compose(&by_ruler.between(&Pose::default()));
-            format!("{name},{},{y},{},12,-5,0.1\n", x + shift, theta.to_degrees())
-        });
-        let table = format!("mark,x_m,y_m,heading_deg,along_mm,across_mm,turned_deg\n{}", lines.collect::<String>());
-        let marks = files.write("marks.csv", table.as_bytes());
+        let marks = files.write("marks.csv", marks_beside(&halts[left_out..], shift).as_bytes());
         json(&["accept", &log, "--marks", &marks, "--json"]).1
     };
     let line = "where it says that it is";

@@ -1,6 +1,8 @@
 //! `agv run`: the demonstration as people run it, a controller with a configuration, and what is refused.
 #![cfg(unix)]
 
+mod faults;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
@@ -24,12 +26,12 @@ struct Running {
 
 impl Running {
     fn start(arguments: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_agv"))
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        Self::start_as(env!("CARGO_BIN_EXE_agv"), arguments)
+    }
+
+    fn start_as(program: &str, arguments: &[&str]) -> Self {
+        let mut child =
+            Command::new(program).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let said = BufReader::new(child.stderr.take().unwrap());
         Self { child, said, unclaimed: Vec::new() }
     }

@@ -28,7 +28,7 @@ fn assert_published_again(has_gyro: bool) {
     let recording = simulate(&scenario).unwrap().recording;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.agvlog");
-    drive(&recording, &path);
+    drive(&recording, 10, &path);
     let contents = log::read_contents(&path, |_| ()).unwrap();
     let again = replay(&contents.recording, |_| ()).unwrap();
     assert!(compare(&contents.outputs, &again).is_equal());

@@ -20,8 +20,6 @@ use agv_wire::can::frame::Frame;
 
 /// When the vehicle drives off, ms.
 const BEGIN: u64 = 2_000;
-/// When the program ends, ms.
-const END: u64 = 12_000;
 /// How long the localiser takes for a revolution, and for each fourth of them, ms: then there are more samples meanwhile than
 /// the publisher has room for.
 const BUSY: [u64; 2] = [35, 230];
@@ -101,8 +99,8 @@ impl Board {
     }
 }
 
-/// Drives for ten seconds, and writes the log of what was said.
-pub fn drive(recording: &Recording, path: &Path) {
+/// Drives for some seconds from the pose that the recording is told, and writes the log of what was said.
+pub fn drive(recording: &Recording, seconds: u64, path: &Path) {
     let nodes = EncoderNodes::of(&Settings::of(recording.parameters));
     let mut motion = EmulatedMotion::new(recording, &nodes).unwrap().standing();
     let mut gyro = EmulatedGyro::of(recording, &Settings::of(recording.parameters).gyro_frame);
@@ -110,20 +108,18 @@ pub fn drive(recording: &Recording, path: &Path) {
     let begin = Time::from_micros(1_000 * BEGIN);
     let mut seen = recording.events.iter().filter(|event| matches!(event, RecordedEvent::Reflectors(_))).peekable();
     let (mut busy_until, mut revolutions) = (0, 0);
-    for millisecond in 1..END {
+    for millisecond in 1..BEGIN + 1_000 * seconds {
         let now = Time::from_micros(1_000 * millisecond);
         if now == begin {
             motion.begin(now);
             if let Some(gyro) = &mut gyro {
                 gyro.begin(now);
             }
-            let pose = recording.truth.first().unwrap().pose;
-            board.handle(&Event::SetPose(PoseFix {
-                time: now,
-                pose,
-                position_deviation: 0.05,
-                heading_deviation: 0.01,
-            }));
+            let told = recording.events.iter().find_map(|event| match event {
+                RecordedEvent::SetPose(fix) => Some(*fix),
+                _ => None,
+            });
+            board.handle(&Event::SetPose(PoseFix { time: now, ..told.unwrap() }));
         }
         board.step_bus(now, &mut motion, &mut gyro);
         if millisecond < busy_until {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use agv_tests::recordings;
+use nalgebra::{Matrix3, Matrix3x4};
 
 use super::support::Ended;
 use crate::support::{Files, agv};
@@ -166,4 +167,38 @@ fn captures_of_the_corpus_are_right() {
     let metadata = folder.join("../lidar3d/packets/ouster/OS-1-32-G_v2.1.1_1024x10.json");
     let whole = info("ouster_fragments/frag_16_datagrams.pcap", &["--calibration", metadata.to_str().unwrap()]);
     assert!(whole.count("packets") == 16 && whole.warnings().is_empty(), "{whole:?}");
+}
+
+/// From axes of a lidar (x ahead, y left, z up) to those of a camera (x right, y down, z ahead).
+const CAMERA: [[f64; 3]; 3] = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]];
+
+/// A pose of twelve numbers in axes of a camera.
+fn of_camera(line: &str) -> String {
+    let numbers: Vec<f64> = line.split_whitespace().map(|number| number.parse().unwrap()).collect();
+    let (axes, pose) = (Matrix3::from(CAMERA).transpose(), Matrix3x4::from_row_slice(&numbers));
+    let (rotation, place) = (axes * pose.fixed_columns::<3>(0) * axes.transpose(), axes * pose.column(3));
+    let row = |row: usize| {
+        let [first, second, third] = [0, 1, 2].map(|column| rotation[(row, column)]);
+        format!("{first:.6} {second:.6} {third:.6} {:.6}", place[row])
+    };
+    [0, 1, 2].map(row).join(" ")
+}
+
+#[test]
+fn poses_of_a_camera_give_the_places_of_the_lidar() {
+    let Some(folder) = recordings("poses_of_a_camera_give_the_places_of_the_lidar", "lidar3d/moosmann/MuehlburgerTor")
+    else {
+        return;
+    };
+    let (files, scans) = (Files::new(), folder.join("velodyne_dist"));
+    let poses = std::fs::read_to_string(folder.join("kiss_icp_poses_derived.txt")).unwrap();
+    let of_camera: Vec<String> = poses.lines().map(of_camera).collect();
+    for (name, text) in [("lidar", poses.as_str()), ("camera", of_camera.join("\n").as_str())] {
+        let (poses, store) = (files.write(name, text.as_bytes()), files.path("store"));
+        let scans = scans.to_str().unwrap();
+        let index = ["lidar3d", "places", "index", scans, "--poses", &poses, "--shift", "4", "-o", &store, "--json"];
+        let run = agv(&index);
+        let told: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+        assert_eq!((&told["scans"], &told["places"]), (&501.into(), &68.into()), "{name}: {told}");
+    }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use agv_host_sim::layout_file;
+use nalgebra::Complex;
 use proptest::prelude::*;
 
 use super::support::Ended;
@@ -197,6 +198,58 @@ fn tables_are_read_by_the_names_of_their_columns() {
     }
 }
 
+/// A block as it is put into another one.
+#[derive(Clone, Debug)]
+struct Inserted {
+    base: [f64; 2],
+    place: [f64; 2],
+    degrees: f64,
+    scale: f64,
+    is_mirrored: bool,
+    is_from_below: bool,
+    /// Columns and rows, and the way from one to the next.
+    grid: ([u16; 2], [f64; 2]),
+}
+
+impl Inserted {
+    /// The group codes that say so.
+    fn rest(&self) -> String {
+        let Self { degrees, scale, grid: ([columns, rows], [along, up]), .. } = self;
+        let across = if self.is_mirrored { -scale } else { *scale };
+        let below = if self.is_from_below { FROM_BELOW } else { "" };
+        format!("41\n{across}\n42\n{scale}\n43\n{scale}\n50\n{degrees}\n70\n{columns}\n71\n{rows}\n44\n{along}\n45\n{up}\n{below}")
+    }
+
+    fn copies(&self) -> Vec<[f64; 2]> {
+        let ([columns, rows], [along, up]) = self.grid;
+        let place = |column, row| [f64::from(column) * along, f64::from(row) * up];
+        (0..columns).flat_map(|column| (0..rows).map(move |row| place(column, row))).collect()
+    }
+
+    /// Where a point of the block is then.
+    fn put(&self, point: Complex<f64>, [along, up]: [f64; 2]) -> Complex<f64> {
+        let inner = self.scale * (point - Complex::new(self.base[0], self.base[1]));
+        let inner = if self.is_mirrored { -inner.conj() } else { inner };
+        let turn = Complex::from_polar(1.0, self.degrees.to_radians());
+        let put = Complex::new(self.place[0], self.place[1]) + turn * (inner + Complex::new(along, up));
+        if self.is_from_below { -put.conj() } else { put }
+    }
+}
+
+/// Somewhere in a hall, to the millimetre.
+fn place() -> impl Strategy<Value = [f64; 2]> {
+    [-20_000_i32..20_000, -20_000_i32..20_000].prop_map(|place| place.map(f64::from))
+}
+
+fn any_insert() -> impl Strategy<Value = Inserted> {
+    let grid = ([1_u16..3, 1_u16..3], place());
+    (place(), place(), 0..360_i32, prop::sample::select(vec![0.5, 1.0, 2.0]), any::<[bool; 2]>(), grid).prop_map(
+        |(base, place, degrees, scale, [is_mirrored, is_from_below], grid)| {
+            Inserted { base, place, degrees: f64::from(degrees), scale, is_mirrored, is_from_below, grid }
+        },
+    )
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
     #[test]
@@ -227,6 +280,30 @@ proptest! {
         let layout = layout_file::load(path.as_ref()).unwrap();
         let found: Vec<_> = layout.iter().map(|entry| (entry.id, (entry.landmark.x.0, entry.landmark.y.0))).collect();
         prop_assert_eq!(found, rows.into_iter().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn blocks_in_blocks_are_where_complex_numbers_say(
+        inserted in prop::collection::vec(any_insert(), 1..4),
+        points in prop::collection::vec(place(), 2..5),
+    ) {
+        let mut expected: Vec<Complex<f64>> = points.iter().map(|[x, y]| Complex::new(*x, *y)).collect();
+        let mut content: String = points.iter().map(|place| point(*place, "")).collect();
+        let mut blocks = String::new();
+        for (level, one) in inserted.iter().enumerate() {
+            let name = format!("B{level}");
+            blocks += &block(&name, one.base, &content);
+            content = insert(&name, one.place, &one.rest());
+            expected = one.copies().into_iter().flat_map(|copy| expected.iter().map(move |point| one.put(*point, copy))).collect();
+        }
+        let found = places(&drawing(Some(4), "", &blocks, &content));
+        // To the millimetre of a layout.
+        let near = |(x, y): &(i32, i32)| {
+            let is_near = |one: &&Complex<f64>| (one - Complex::new(f64::from(*x), f64::from(*y))).norm() < 0.8;
+            expected.iter().any(|one| is_near(&one))
+        };
+        prop_assert_eq!(found.len(), expected.len());
+        prop_assert!(found.iter().all(near), "{:?} {:?}", found, expected);
     }
 
     #[test]
