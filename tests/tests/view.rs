@@ -73,6 +73,7 @@ fn browse(
     assert!(output.status.success(), "{complaint}");
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["complaints"], Value::Array(Vec::new()));
+    assert_eq!(found["dark"], "rgb(22, 22, 22)");
     for (size, overflow) in found["sizes"].as_object().unwrap() {
         assert_eq!(overflow, &Value::from(0), "{size}");
     }
@@ -270,4 +271,42 @@ fn a_demonstration_is_looked_at() {
     let place = |name: &str| ["x_m", "y_m"].map(|axis| number(&found["found"][name]["pose"][axis]));
     let ([first_x, first_y], [second_x, second_y]) = (place("first"), place("second"));
     assert!((first_x - second_x).hypot(first_y - second_y) > 0.05, "{found}");
+}
+
+/// What people are given as files: drives, layouts, calibrations.
+#[test]
+fn every_page_is_read_light_dark_and_on_a_phone() {
+    let name = "every_page_is_read_light_dark_and_on_a_phone";
+    let Some(agv) = agv_tests::agv(name).filter(|_| has_browser(name)) else { return };
+    let files = tempfile::tempdir().unwrap();
+    let path = |name: &str| files.path().join(name).to_str().unwrap().to_owned();
+    let run = |arguments: &[&str]| {
+        let run = Command::new(&agv).args(arguments).current_dir(files.path()).output().unwrap();
+        assert!(run.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&run.stderr));
+    };
+    run(&["simulate", "block_storage_p1", "--output", "drive.agvlog"]);
+    run(&["report", "drive.agvlog", "--output", "drive.html"]);
+    run(&["report", "drive.agvlog", "drive.agvlog", "--output", "comparison.html"]);
+    std::fs::write(path("hall.imk"), "1 0 0 1 2 80 0\n2 12000 0 1 2 80 0\n3 12000 9000 1 2 80 0\n4 0 8000 1 2 80 0\n")
+        .unwrap();
+    run(&["layout", "check", "hall.imk", "--report", "layout"]);
+    std::fs::rename(path("layout/index.html"), path("layout.html")).unwrap();
+    run(&["calibrate", "plan", "--area", "14x11", "--steering", "18..50", "--time", "200", "--scenario", "plan.toml"]);
+    run(&["simulate", "plan.toml", "--output", "plan.agvlog"]);
+    run(&["calibrate", "plan.agvlog", "--report", "calibration"]);
+    std::fs::rename(path("calibration/index.html"), path("calibration.html")).unwrap();
+    let pages = ["drive.html", "comparison.html", "layout.html", "calibration.html"];
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/view/pages.js");
+    let output = node().arg(script).arg(pictures()).args(pages.map(path)).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found.as_object().unwrap().len(), pages.len());
+    for (page, found) in found.as_object().unwrap() {
+        assert_eq!(found["complaints"], Value::Array(Vec::new()), "{page}");
+        for (look, is_dark) in [("light", false), ("dark", true), ("phone", false)] {
+            let seen = &found[look];
+            assert_eq!(seen["overflow"], 0, "{page}, {look}");
+            assert_eq!(number(&seen["paper"]) < number(&seen["ink"]), is_dark, "{page}, {look}: {seen}");
+        }
+    }
 }

@@ -217,7 +217,9 @@ impl Inserted {
         let Self { degrees, scale, grid: ([columns, rows], [along, up]), .. } = self;
         let across = if self.is_mirrored { -scale } else { *scale };
         let below = if self.is_from_below { FROM_BELOW } else { "" };
-        format!("41\n{across}\n42\n{scale}\n43\n{scale}\n50\n{degrees}\n70\n{columns}\n71\n{rows}\n44\n{along}\n45\n{up}\n{below}")
+        format!(
+            "41\n{across}\n42\n{scale}\n43\n{scale}\n50\n{degrees}\n70\n{columns}\n71\n{rows}\n44\n{along}\n45\n{up}\n{below}"
+        )
     }
 
     fn copies(&self) -> Vec<[f64; 2]> {
@@ -244,8 +246,14 @@ fn place() -> impl Strategy<Value = [f64; 2]> {
 fn any_insert() -> impl Strategy<Value = Inserted> {
     let grid = ([1_u16..3, 1_u16..3], place());
     (place(), place(), 0..360_i32, prop::sample::select(vec![0.5, 1.0, 2.0]), any::<[bool; 2]>(), grid).prop_map(
-        |(base, place, degrees, scale, [is_mirrored, is_from_below], grid)| {
-            Inserted { base, place, degrees: f64::from(degrees), scale, is_mirrored, is_from_below, grid }
+        |(base, place, degrees, scale, [is_mirrored, is_from_below], grid)| Inserted {
+            base,
+            place,
+            degrees: f64::from(degrees),
+            scale,
+            is_mirrored,
+            is_from_below,
+            grid,
         },
     )
 }

@@ -50,6 +50,7 @@ const PAGE: &str = concat!(
     "</style>\n",
     include_str!("page/body.html"),
     "<script>\n\"use strict\";\n",
+    include_str!("page/inks.js"),
     include_str!("page/map.js"),
     include_str!("page/curves.js"),
     include_str!("page/panel.js"),

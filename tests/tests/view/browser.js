@@ -92,6 +92,11 @@ async function useLive(page) {
     report.opened_ms = opened_ms;
     report.found = kind === "live" ? await useLive(page) : await useLog(page);
     if (pictures !== "-") await page.screenshot({ path: `${pictures}/view-${kind}-wide.png` });
+    await page.emulateMedia({ colorScheme: "dark" });
+    await page.waitForFunction(() => INKS.paper === getComputedStyle(document.documentElement).getPropertyValue("--paper").trim());
+    report.dark = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+    if (pictures !== "-") await page.screenshot({ path: `${pictures}/view-${kind}-dark.png` });
+    await page.emulateMedia({ colorScheme: "light" });
     report.sizes.wide = await overflow(page);
     const phone = await open(browser, SIZES.phone, complaints);
     if (kind === "log") {

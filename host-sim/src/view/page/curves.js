@@ -18,7 +18,7 @@ class CurveView {
     this.modes(c, overview, step, strip);
     const top = strip + marks, rows = [
       ["σ position", overview.deviation_m, (v) => (100 * v).toFixed(1) + " cm", "#0072b2"],
-      ["norm. square", overview.normalised_square, (v) => v.toFixed(1), "#7a5200"],
+      ["norm. square", overview.normalised_square, (v) => v.toFixed(1), INKS.ochre],
       ["correction", overview.correction_m, (v) => (100 * v).toFixed(1) + " cm", "#d55e00"],
     ];
     const room = (height - top) / rows.length;
@@ -26,12 +26,12 @@ class CurveView {
     c.font = "12px system-ui, sans-serif"; c.textAlign = "center";
     for (const { time_s, kind } of model.shownEvents) {
       const x = this.place(time_s, width);
-      c.fillStyle = kind === "lost" || kind === "fault" || kind === "damage" ? "#b34700" : "#1a1a1a";
+      c.fillStyle = kind === "lost" || kind === "fault" || kind === "damage" ? INKS.warn : INKS.ink;
       c.fillText(EVENT_MARKS[kind] || "·", x, strip + 12);
     }
     c.textAlign = "left";
     const x = this.place(model.time, width);
-    c.fillStyle = "#1a1a1a"; c.fillRect(x - 1, 0, 2, height);
+    c.fillStyle = INKS.ink; c.fillRect(x - 1, 0, 2, height);
   }
 
   place(time, width) { return ((time - this.from) / Math.max(this.to - this.from, 1e-9)) * width; }
@@ -60,7 +60,7 @@ class CurveView {
     });
     const text = name + ", largest " + format(largest);
     c.font = "12px system-ui, sans-serif";
-    c.fillStyle = "rgba(255,255,255,.8)"; c.fillRect(0, top + 1, c.measureText(text).width + 8, 15);
-    c.fillStyle = "#1a1a1a"; c.fillText(text, 4, top + 13);
+    c.fillStyle = INKS.paper; c.globalAlpha = 0.8; c.fillRect(0, top + 1, c.measureText(text).width + 8, 15); c.globalAlpha = 1;
+    c.fillStyle = INKS.ink; c.fillText(text, 4, top + 13);
   }
 }

@@ -32,7 +32,7 @@ const MARKS = {
   corner(c, x, y, r) { c.fillStyle = "#009e73"; c.fillRect(x - r, y - r, 2 * r, 2 * r); },
   end_point(c, x, y, r) {
     c.beginPath(); c.moveTo(x, y - r * 1.2); c.lineTo(x + r * 1.1, y + r); c.lineTo(x - r * 1.1, y + r); c.closePath();
-    c.fillStyle = "#000"; c.fill();
+    c.fillStyle = INKS.ink; c.fill();
   },
   found(c, x, y, r) { c.strokeStyle = "#009e73"; c.lineWidth = 2; c.strokeRect(x - r, y - r, 2 * r, 2 * r); },
   used(c, x, y, r) { c.beginPath(); c.arc(x, y, r * 1.9, 0, 2 * Math.PI); c.strokeStyle = "#0072b2"; c.lineWidth = 2; c.stroke(); },
@@ -45,7 +45,7 @@ const MARKS = {
     c.beginPath(); c.moveTo(x - r, y); c.lineTo(x + r, y); c.moveTo(x, y - r); c.lineTo(x, y + r);
     c.strokeStyle = "#999"; c.lineWidth = 1.5; c.stroke();
   },
-  scan(c, x, y) { c.fillStyle = "#444"; c.fillRect(x - 1, y - 1, 2, 2); },
+  scan(c, x, y) { c.fillStyle = INKS.point; c.fillRect(x - 1, y - 1, 2, 2); },
 };
 
 const LEGEND = [["reflector", "reflector"], ["corner", "corner"], ["end_point", "end point"], ["found", "found while driving"],
@@ -77,7 +77,7 @@ class MapView {
     this.landmarks(c, model, sx, sy, width, height);
     if (!moment) return;
     this.observations(c, moment.observations, sx, sy);
-    if (moment.truth) this.outline(c, moment.truth, sx, sy, scale, "#000", [5, 4]);
+    if (moment.truth) this.outline(c, moment.truth, sx, sy, scale, INKS.ink, [5, 4]);
     if (moment.pose) {
       this.level(c, moment.pose, sx, sy, scale);
       this.ellipse(c, moment.pose, sx, sy, scale);
@@ -91,7 +91,7 @@ class MapView {
     const steps = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500];
     const step = steps.find((one) => one * this.camera.scale >= 60) || 1000;
     const { x, y, scale } = this.camera;
-    c.strokeStyle = "#eee"; c.lineWidth = 1; c.beginPath();
+    c.strokeStyle = INKS.grid; c.lineWidth = 1; c.beginPath();
     for (let k = Math.ceil((x - width / 2 / scale) / step); k * step < x + width / 2 / scale; k++) {
       c.moveTo(sx(k * step), 0); c.lineTo(sx(k * step), height);
     }
@@ -99,7 +99,7 @@ class MapView {
       c.moveTo(0, sy(k * step)); c.lineTo(width, sy(k * step));
     }
     c.stroke();
-    c.fillStyle = c.strokeStyle = "#1a1a1a"; c.lineWidth = 2; c.font = "13px system-ui, sans-serif";
+    c.fillStyle = c.strokeStyle = INKS.ink; c.lineWidth = 2; c.font = "13px system-ui, sans-serif";
     c.beginPath(); c.moveTo(width - 12 - step * scale, height - 12); c.lineTo(width - 12, height - 12); c.stroke();
     c.textAlign = "right"; c.fillText(step + " m", width - 12, height - 18); c.textAlign = "left";
   }
@@ -121,7 +121,7 @@ class MapView {
   }
 
   scan(c, points, sx, sy) {
-    c.fillStyle = "#444";
+    c.fillStyle = INKS.point;
     for (let k = 0; k < points.length; k += 2) c.fillRect(sx(points[k] / 1000) - 1, sy(points[k + 1] / 1000) - 1, 2, 2);
     this.drawn.scanPoints = points.length / 2;
   }
@@ -134,7 +134,7 @@ class MapView {
       c.globalAlpha = hits ? 1 : 0.45;
       MARKS[mark](c, x, y, mark === "reflector" ? 5 : 4);
       c.globalAlpha = 1;
-      if (isNear && name !== undefined) { c.fillStyle = "#595959"; c.fillText(name, x + 8, y + 4); }
+      if (isNear && name !== undefined) { c.fillStyle = INKS.soft; c.fillText(name, x + 8, y + 4); }
       this.drawn.landmarks += 1;
     };
     const hits = model.moment ? model.moment.hits : [];
@@ -167,9 +167,9 @@ class MapView {
     const angle = 0.5 * Math.atan2(2 * xy, xx - yy);
     c.beginPath();
     c.ellipse(sx(x), sy(y), Math.max(a * magnification * scale, 1), Math.max(b * magnification * scale, 1), -angle, 0, 2 * Math.PI);
-    c.fillStyle = "rgba(230,159,0,.25)"; c.fill(); c.strokeStyle = "#7a5200"; c.lineWidth = 1.5; c.stroke();
+    c.fillStyle = "rgba(230,159,0,.25)"; c.fill(); c.strokeStyle = INKS.ochre; c.lineWidth = 1.5; c.stroke();
     if (magnification > 1) {
-      c.fillStyle = "#7a5200"; c.font = "12px system-ui, sans-serif";
+      c.fillStyle = INKS.ochre; c.font = "12px system-ui, sans-serif";
       c.fillText("3σ × " + magnification, sx(x) + a * magnification * scale + 4, sy(y) - 6);
     }
   }
@@ -184,8 +184,8 @@ class MapView {
   vehicle(c, pose, sx, sy, scale, colour) {
     this.shape(c, pose, sx, sy, scale);
     c.fillStyle = colour || "#999"; c.globalAlpha = 0.75; c.fill(); c.globalAlpha = 1;
-    c.strokeStyle = "#1a1a1a"; c.lineWidth = 2; c.stroke();
-    c.beginPath(); c.arc(sx(pose[0]), sy(pose[1]), 2.5, 0, 2 * Math.PI); c.fillStyle = "#000"; c.fill();
+    c.strokeStyle = INKS.ink; c.lineWidth = 2; c.stroke();
+    c.beginPath(); c.arc(sx(pose[0]), sy(pose[1]), 2.5, 0, 2 * Math.PI); c.fillStyle = INKS.ink; c.fill();
   }
 
   outline(c, pose, sx, sy, scale, colour, dash) {

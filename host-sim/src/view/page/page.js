@@ -312,7 +312,11 @@ function listenToControls() {
 
 window.agv = { state, seek: (time) => { setLive(false); return seek(time); }, jump, play: () => setPlaying(true), pause: () => setPlaying(false),
   setSpeed, showKind: (kind) => { element("kinds").value = kind; page.event = null; showEvents(); return state(); } };
-showLegend(element("key"));
+
+function takeScheme() { readInks(); showLegend(element("key")); drawSoon(); }
+
+takeScheme();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", takeScheme);
 listenToKeys();
 listenToMap();
 listenToControls();

@@ -71,6 +71,7 @@ function observationRow({ kind, landmark, verdict, residual, test_ratio }) {
 }
 
 function showLegend(list) {
+  list.replaceChildren();
   for (const [mark, name] of LEGEND) {
     const canvas = document.createElement("canvas");
     canvas.width = canvas.height = 22;
