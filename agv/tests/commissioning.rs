@@ -206,7 +206,7 @@ fn a_vehicle_that_passes_every_line_is_accepted() {
     let files = Files::new();
     let drive = files.path("drive.agvlog");
     // The two seconds before it is told where it is are less than a hundredth of the drive.
-    let recording = halting(40.0);
+    let recording = halting(60.0);
     log::write(Path::new(&drive), &recording).unwrap();
     let (measured, _) = measured(&files, &drive, &["reflectors"]);
     let log = files.path("vehicle.agvlog");

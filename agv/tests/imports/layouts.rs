@@ -306,12 +306,12 @@ proptest! {
         }
         let found = places(&drawing(Some(4), "", &blocks, &content));
         // To the millimetre of a layout.
-        let near = |(x, y): &(i32, i32)| {
-            let is_near = |one: &&Complex<f64>| (one - Complex::new(f64::from(*x), f64::from(*y))).norm() < 0.8;
-            expected.iter().any(|one| is_near(&one))
+        let is_near = |(x, y): &(i32, i32)| {
+            let found = Complex::new(f64::from(*x), f64::from(*y));
+            expected.iter().any(|one| (one - found).norm() < 0.8)
         };
         prop_assert_eq!(found.len(), expected.len());
-        prop_assert!(found.iter().all(near), "{:?} {:?}", found, expected);
+        prop_assert!(found.iter().all(is_near), "{:?} {:?}", found, expected);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use agv_host_sim::calibrate::model::PARAMETERS;
 use agv_host_sim::calibrate::refusal::Refusal;
 use agv_host_sim::calibrate::report::{add_calibration, parameter_rows, remark_rows};
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
-use agv_host_sim::calibrate::wheeled::mistakes::explain_wheels;
+use agv_host_sim::calibrate::wheeled::mistakes::{WheelExplanation, explain_wheels};
 use agv_host_sim::drive_check::with_laser_motion;
 use agv_host_sim::mapping::map_file;
 use agv_host_sim::report::Page;
@@ -225,6 +225,14 @@ fn explained(refusal: &Refusal, explanations: &[Explanation]) -> anyhow::Error {
     anyhow::anyhow!("{begin}; the drive makes sense if {causes}{mend}; agv check says what to do")
 }
 
+/// What calibrates a tricycle.
+enum Calibrated {
+    /// Arcs between stops, or along reflectors.
+    ByArcs(Found, Drive),
+    /// Mistakes that wheels and laser show, of a drive that tells no more.
+    ByWheels(Box<WheelExplanation>),
+}
+
 impl Calibrate {
     /// Whether nothing is asked for that the joint fit of several wheels does not have.
     fn is_plain(&self) -> bool {
@@ -266,7 +274,13 @@ impl Calibrate {
         };
         let name = || log.display().to_string();
         let preparation = Preparation { map: map.as_deref(), mend: self.mend };
-        let (found, mut drive) = self.calibrated(&input, &preparation).with_context(name)?;
+        let (found, mut drive) = match self.calibrated(&input, &preparation).with_context(name)? {
+            Calibrated::ByArcs(found, drive) => (found, drive),
+            Calibrated::ByWheels(explanation) => {
+                let fit = wheels::Fit { mend: true, apply: self.apply.as_deref(), is_json: self.json };
+                return wheels::mend(*explanation, &fit).with_context(name);
+            }
+        };
         drive.remarks.extend(damages.iter().map(|damage| format!("the log is damaged: {damage}")));
         drive.remarks.extend(self.differences(&drive, &found));
         if let Some(path) = &self.apply {
@@ -309,7 +323,7 @@ impl Calibrate {
     }
 
     /// The parameters; with what explains the drive mended, if that is wanted.
-    fn calibrated(&self, input: &LogInput, preparation: &Preparation) -> anyhow::Result<(Found, Drive)> {
+    fn calibrated(&self, input: &LogInput, preparation: &Preparation) -> anyhow::Result<Calibrated> {
         let attempt = |input: &LogInput, preparation: &Preparation| {
             let drive = Drive::new(input, preparation)?;
             Ok((find(&drive, &self.question())?, drive))
@@ -321,9 +335,12 @@ impl Calibrate {
             _ => attempt(input, preparation),
         };
         let refusal: Refusal = match first {
-            Ok(found) if !self.mend => return Ok(found),
+            Ok((found, drive)) if !self.mend => return Ok(Calibrated::ByArcs(found, drive)),
             // A wheelbase that was held is to be mended, too.
-            Ok((found, drive)) => return Ok(with_wheelbase(input, preparation).unwrap_or((found, drive))),
+            Ok(held) => {
+                let (found, drive) = with_wheelbase(input, preparation).unwrap_or(held);
+                return Ok(Calibrated::ByArcs(found, drive));
+            }
             Err(refusal) => refusal,
         };
         let explanations = explanations(input);
@@ -331,14 +348,15 @@ impl Calibrate {
         let are_few = |cause: &Cause| matches!(cause, Cause::FewReflectors(_));
         let is_named = explanations.iter().any(|found| !found.causes.iter().all(are_few));
         let by_reflectors = explanations.iter().find_map(|found| Some((found.to_string(), mended(input, found)?)));
-        let by_wheels = || {
-            let (recording, _) = agv_host_sim::log::read(self.log.as_deref()?).ok()?;
-            let input = with_laser_motion(input, &recording)?;
-            let found = explain_wheels(&input, |_, _| ()).into_iter().find(|found| found.is_mendable())?;
-            Some((found.to_string(), found.mended))
-        };
-        let mended = by_reflectors.or_else(|| if self.mend && !is_named { by_wheels() } else { None });
-        let Some((explanation, right)) = mended.filter(|_| self.mend) else {
+        if by_reflectors.is_none()
+            && self.mend
+            && !is_named
+            && self.is_plain()
+            && let Some(explanation) = self.explained_by_wheels(input)
+        {
+            return Ok(Calibrated::ByWheels(Box::new(explanation)));
+        }
+        let Some((explanation, right)) = by_reflectors.filter(|_| self.mend) else {
             return Err(explained(&refusal, &explanations));
         };
         // What explains the drive was found by one of these questions.
@@ -348,7 +366,14 @@ impl Calibrate {
             .or_else(|_| Drive::among_few(&right).and_then(|drive| find_any(drive, &asked)));
         let (found, mut drive) = again.map_err(|again| explained(&again, &explanations))?;
         drive.remarks.push(format!("{explanation}: mended"));
-        Ok((found, drive))
+        Ok(Calibrated::ByArcs(found, drive))
+    }
+
+    /// What the laser's motion, by whatever it sees, says of the wheels.
+    fn explained_by_wheels(&self, input: &LogInput) -> Option<WheelExplanation> {
+        let (recording, _) = agv_host_sim::log::read(self.log.as_deref()?).ok()?;
+        let input = with_laser_motion(input, &recording)?;
+        explain_wheels(&input, |_, _| ()).into_iter().find(WheelExplanation::is_mendable)
     }
 
     /// What a result says that is no adjustment any more.

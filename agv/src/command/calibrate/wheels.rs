@@ -9,7 +9,7 @@ use agv_host_sim::calibrate::wheeled::clock::Clock;
 use agv_host_sim::calibrate::wheeled::fit::{self, Fitted};
 use agv_host_sim::calibrate::wheeled::fitted_vehicle::{fitted_vehicle, has_setting};
 use agv_host_sim::calibrate::wheeled::log_drive::LogDrive;
-use agv_host_sim::calibrate::wheeled::mistakes::explain_wheels;
+use agv_host_sim::calibrate::wheeled::mistakes::{WheelExplanation, explain_wheels};
 use agv_host_sim::calibrate::wheeled::unknowns::Unknown;
 use anyhow::Context as _;
 use serde::Serialize;
@@ -35,29 +35,41 @@ pub struct Fit<'a> {
     pub is_json: bool,
 }
 
-/// What makes sense of the drive: with one explanation, the vehicle that it says; with none or with a sound one, the vehicle as it is.
-fn mended(input: LogInput) -> anyhow::Result<LogInput> {
+/// What makes sense of the drive; nothing where none is there, or one by which nothing is wrong.
+fn explanation(input: &LogInput) -> anyhow::Result<Option<WheelExplanation>> {
     let bar = progress::spinner().with_message("looking for mistakes");
-    let found = explain_wheels(&input, |_, _| bar.tick());
+    let found = explain_wheels(input, |_, _| bar.tick());
     bar.finish_and_clear();
     if found.is_empty() || found.iter().any(|one| one.mistakes.is_empty()) {
-        return Ok(input);
+        return Ok(None);
     }
     let mendable = found.iter().find(|one| one.is_mendable());
     let explanation = mendable.with_context(|| {
         let words: Vec<String> = found.iter().map(ToString::to_string).collect();
         format!("{}: no setting mends that; agv check says what to do", words.join(", or "))
     })?;
-    note(&format!("agv: {explanation}: mended"));
-    Ok(explanation.mended.clone())
+    Ok(Some(explanation.clone()))
 }
 
-/// Fits the vehicle of the log, prints what was found, and writes it to a file if one is given.
+/// Fits the vehicle of the log, prints what was found, and writes it to a file if one is given. Of a vehicle with mistakes that are to be
+/// mended, only what they name is fitted.
 pub fn run(input: LogInput, asked: &Fit) -> anyhow::Result<()> {
-    let input = if asked.mend { mended(input)? } else { input };
+    match if asked.mend { explanation(&input)? } else { None } {
+        Some(explanation) => mend(explanation, asked),
+        None => fit_to(input, None, asked),
+    }
+}
+
+/// The same of a vehicle whose mistakes are known.
+pub fn mend(explanation: WheelExplanation, asked: &Fit) -> anyhow::Result<()> {
+    note(&format!("agv: {explanation}: mended; the rest of the vehicle is held"));
+    fit_to(explanation.mended, Some(explanation.unknowns), asked)
+}
+
+fn fit_to(input: LogInput, named: Option<Vec<Unknown>>, asked: &Fit) -> anyhow::Result<()> {
     let (apply, is_json) = (asked.apply, asked.is_json);
     let LogDrive { kind, nominal, drive } = LogDrive::new(&input)?;
-    let mut unknowns = Unknown::of(kind, &nominal.wheels, true);
+    let mut unknowns = named.unwrap_or_else(|| Unknown::of(kind, &nominal.wheels, true));
     if apply.is_some() {
         // What has no setting stays as it is, and the rest is fitted to go with it.
         let (kept, held): (Vec<_>, Vec<_>) = unknowns.into_iter().partition(has_setting);

@@ -8,7 +8,7 @@ use std::fmt;
 
 use agv_core::geometry::wrap;
 use agv_core::measurement::Time;
-use agv_core::odometry::Counted;
+use agv_core::odometry::{Counted, WheelParameter};
 use nalgebra::Vector3;
 
 use super::super::log_input::LogInput;
@@ -18,7 +18,7 @@ use super::fit::fit;
 use super::fitted_vehicle::{fitted_vehicle, has_setting};
 use super::log_drive::LogDrive;
 use super::path::LinearisedPath;
-use super::unknowns::{Unknown, WheeledModel};
+use super::unknowns::{Moves, Unknown, WheeledModel};
 use super::windows::{self, Window};
 use measured::measured;
 use undone::{Undone, hypotheses};
@@ -89,6 +89,27 @@ impl fmt::Display for Mistake {
     }
 }
 
+impl Mistake {
+    /// Whether that number is what mends it.
+    fn is_mended_by(&self, unknown: &Unknown) -> bool {
+        let of_wheel = |wanted: WheelParameter, wheel: Option<usize>| match &unknown.moves {
+            Moves::Wheels(moves) => moves
+                .iter()
+                .any(|(number, parameter, _)| *parameter == wanted && wheel.is_none_or(|wheel| wheel == *number)),
+            Moves::Sensor(_) => false,
+        };
+        match self {
+            Self::SteeringOffset(wheel, _) => of_wheel(WheelParameter::Heading, Some(*wheel)),
+            Self::Scale(_) => of_wheel(WheelParameter::Radius, None),
+            Self::WheelScale(wheel, _) => of_wheel(WheelParameter::Radius, Some(*wheel)),
+            Self::Length(name, _) => unknown.name.trim_end_matches(" m") == name,
+            Self::LaserHeading(_) => unknown.moves == Moves::Sensor(2),
+            Self::LaserPlace(..) => matches!(unknown.moves, Moves::Sensor(0 | 1)),
+            Self::Reversed { .. } | Self::AllReversed | Self::Swapped(..) | Self::Late(_) => false,
+        }
+    }
+}
+
 /// Mistakes that make sense of a drive together; none if it makes sense as it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WheelExplanation {
@@ -98,6 +119,9 @@ pub struct WheelExplanation {
     pub residual: f64,
     /// The log of a vehicle of which they are mended, but for a clock.
     pub mended: LogInput,
+    /// What was measured for that; the rest is as it was believed, if that will do: a drive that shows a mistake need not tell all of
+    /// the vehicle.
+    pub unknowns: Vec<Unknown>,
 }
 
 impl WheelExplanation {
@@ -260,10 +284,20 @@ fn explanation(undone: Undone) -> Option<WheelExplanation> {
     let mut mistakes = undone.mistakes.clone();
     let measured = measured(&nominal, &found, &unknowns);
     add(&mut mistakes, measured);
+    let named: Vec<Unknown> = unknowns
+        .iter()
+        .filter(|unknown| mistakes.iter().any(|mistake| mistake.is_mended_by(unknown)))
+        .cloned()
+        .collect();
+    let only = fit(std::slice::from_ref(&drive), &start, &named, true).ok();
+    let (model, unknowns) = match only.filter(|only| only.residual <= WORSE * found.residual.max(FINE)) {
+        Some(only) => (only.model, named),
+        None => (found.model, unknowns),
+    };
     let mut mended = undone.input.clone();
-    mended.parameters.vehicle = fitted_vehicle(&mended.parameters.vehicle, &found.model)?;
-    *mended.parameters.lasers.first_mut() = found.model.sensor;
-    Some(WheelExplanation { mistakes, residual: found.residual, mended })
+    mended.parameters.vehicle = fitted_vehicle(&mended.parameters.vehicle, &model)?;
+    *mended.parameters.lasers.first_mut() = model.sensor;
+    Some(WheelExplanation { mistakes, residual: found.residual, mended, unknowns })
 }
 
 /// What was measured beside what was undone: an offset of one steering is one.
