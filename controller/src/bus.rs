@@ -17,6 +17,7 @@ use agv_wire::can::sdo::{AbortCode, ObjectDictionary};
 use agv_wire::nav350::SensorSpeed;
 use heapless::Vec;
 
+use super::discrete::{DiscreteInputs, DiscreteReport};
 use super::encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, add};
 use super::gyro::Gyro;
 use super::localization::Estimate;
@@ -90,6 +91,8 @@ pub struct Bus {
     gyro: Gyro,
     node: ControllerNode,
     limits: AlertLimits,
+    /// How long a pose is used by wires, s.
+    deadline: f64,
     accepts_pose: bool,
     accepts_settings: bool,
     predictor: OutputPredictor<MOTIONS>,
@@ -129,6 +132,7 @@ impl Bus {
             gyro: Gyro::of(settings),
             node,
             limits: settings.parameters.alert_limits,
+            deadline: DiscreteReport::deadline(settings),
             accepts_pose: settings.nodes.accepts_pose,
             accepts_settings: settings.nodes.accepts_settings,
             predictor: OutputPredictor::new(&settings.parameters),
@@ -299,6 +303,26 @@ impl Bus {
             if is_there {
                 self.node.report_of(kind, which, now);
             }
+        }
+    }
+
+    /// What wires are to say at `now`.
+    #[must_use]
+    pub fn discrete_report(&self, now: Time) -> DiscreteReport {
+        let pose = self.predictor.output();
+        DiscreteReport::of(pose.as_ref(), &self.limits, self.node.error_register(), self.deadline, now)
+    }
+
+    /// Takes what wires say at `now`. A reset forgets the errors that were, as 0 written to 1003h does; those that are there stay.
+    pub fn hear_lines(&mut self, inputs: &DiscreteInputs, now: Time) {
+        if inputs.is_standing {
+            self.encoders.hear_standstill(now);
+        }
+        if inputs.is_reset {
+            self.node.forget_errors();
+        }
+        if inputs.failed != 0 {
+            self.node.report_of(ErrorKind::DiscreteLine, inputs.failed, now);
         }
     }
 

@@ -6,6 +6,7 @@
 //! | [`Encoders`] | sets the encoders up, watches them, and makes events of what they, or the vehicle's own controller, and other controllers say | in the bus's task |
 //! | [`Gyro`] | makes events of what a gyro says | in the bus's task |
 //! | [`Bus`] | all that the bus hears and says: [`Encoders`], [`Gyro`], the controller's own node, the pose for now | the bus's task |
+//! | [`DiscreteLines`] | wires that say whether the pose may be used, and that tell of standstill and reset | in the bus's task, or beside it |
 //! | [`Laser`] | the session with the laser, and whether it can be used | the network's task |
 //! | [`Localization`] | the localiser, and the search for a pose that it does not have | the main loop |
 //! | [`Controller`] | all of them as one value, one after the other | a desktop, in simulated time |
@@ -18,6 +19,7 @@
 mod bus;
 mod carried_map;
 mod controller;
+mod discrete;
 mod encoders;
 mod gyro;
 mod laser;
@@ -29,6 +31,7 @@ mod standstill;
 pub use bus::{Bus, BusOutput, ControllerIdentity, MOTIONS, Troubles};
 pub use carried_map::carried_map;
 pub use controller::{Controller, LaserOrder, TELEGRAM};
+pub use discrete::{DEBOUNCE, DiscreteInputs, DiscreteLines, DiscreteOutputs, DiscreteReport, Line, LineSet};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels, counted};
 pub use gyro::Gyro;
 pub use laser::Laser;

@@ -31,7 +31,7 @@ const HOUSES: [House; 8] = [
         folder: "controller",
         floors: &[
             &["carried_map", "encoders", "gyro", "laser", "setting_objects", "standstill"],
-            &["progress"],
+            &["discrete", "progress"],
             &["localization"],
             &["bus"],
             &["controller"],

@@ -288,6 +288,11 @@ impl Encoders {
         }
     }
 
+    /// A wire says at `now` that the vehicle stands still.
+    pub fn hear_standstill(&mut self, now: Time) {
+        self.orders.hear_line(now);
+    }
+
     /// Which of the encoders that count turns, or of those that count angles, have a fault: bit 0 is the first encoder.
     #[must_use]
     pub fn faulty(&self, counted: Counted) -> u8 {

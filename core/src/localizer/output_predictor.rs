@@ -215,8 +215,8 @@ impl<const MOTIONS: usize> OutputPredictor<MOTIONS> {
         let is_localised = !matches!(base.mode, Mode::NotLocalised | Mode::Lost);
         let time = newest.map_or(base.time, |motion| motion.end);
         let distance = base.dead_reckoning_distance + travelled;
-        let is_reckoned = matches!(base.mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
-            && (time.since(base.time) > LONGEST_BUSY || distance > self.dead_reckoning_from);
+        let is_reckoned =
+            base.mode.is_localised() && (time.since(base.time) > LONGEST_BUSY || distance > self.dead_reckoning_from);
         let (mode, reason) = match (is_localised, self.faults.drive, self.faults.steering) {
             (true, Some(_), _) => (Mode::WithoutOdometry, Reason::DriveEncoder),
             (true, None, Some(_)) => (Mode::WithoutOdometry, Reason::SteeringEncoder),

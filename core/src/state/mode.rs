@@ -26,6 +26,14 @@ pub enum Mode {
     Degraded,
 }
 
+impl Mode {
+    /// Whether the pose rests on landmarks that nothing contradicts.
+    #[must_use]
+    pub const fn is_localised(self) -> bool {
+        matches!(self, Self::Reflectors | Self::Features | Self::Mixed)
+    }
+}
+
 /// Why the mode is what it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -9,7 +9,6 @@ use agv_core::geometry::Pose;
 use agv_core::integrity::AlertLimits;
 
 use super::Running;
-use super::exchange::is_localised;
 use super::kept_pose::KeptPose;
 use super::status::{Status, StatusBoard, serve_status};
 
@@ -74,7 +73,7 @@ const SAME: f64 = 0.01;
 
 impl Keeper {
     fn keep(&mut self, running: &Running, note: &(dyn Fn(&str) + Sync)) {
-        let localised = running.condition().pose.filter(|pose| is_localised(pose.mode)).map(|pose| pose.pose);
+        let localised = running.condition().pose.filter(|pose| pose.mode.is_localised()).map(|pose| pose.pose);
         let is_far = |pose: &Pose| {
             self.kept.is_none_or(|kept| {
                 let way = kept.between(pose);

@@ -15,7 +15,6 @@ use agv_wire::can::controller::PoseReceiver;
 use agv_wire::can::frame::Frame;
 use agv_wire::nav350::SensorFrame;
 
-use super::exchange::is_localised;
 use super::{FLASH, Options, Ports, RealTime, RunError, Running, Summary};
 use crate::bus::{Bus, BusError, InProcessBus, InProcessNode};
 use crate::emulate::gyro::EmulatedGyro;
@@ -198,7 +197,7 @@ impl Stage {
             let answers = self.motion.handle(frame);
             self.send(&answers)?;
             let pose = self.receiver.as_mut().and_then(|receiver| receiver.handle(frame));
-            if !self.has_begun && pose.is_some_and(|pose| is_localised(pose.mode)) {
+            if !self.has_begun && pose.is_some_and(|pose| pose.mode.is_localised()) {
                 self.begin(sensor);
             }
         }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use agv_controller::{Estimate, SentPose, Told};
 use agv_core::measurement::Time;
-use agv_core::state::{LaserHealth, Mode, PoseOutput};
+use agv_core::state::{LaserHealth, PoseOutput};
 use agv_wire::can::controller_node::CommunicationParameters;
 use agv_wire::nav350::{Revolution, SensorSpeed, SensorWatch};
 
@@ -101,11 +101,6 @@ pub(super) struct Exchange {
     lost_revolutions: AtomicU32,
     lost_records: AtomicU32,
     seen: AtomicU32,
-}
-
-/// Whether a pose of that mode rests on what the vehicle sees.
-pub(super) const fn is_localised(mode: Mode) -> bool {
-    matches!(mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -245,7 +240,7 @@ impl Exchange {
         let _ = self.published.try_send(*published);
         let _ = self.poses.try_send(published.pose);
         *locked(&self.pose) = Some(published.pose);
-        if is_localised(published.pose.mode) {
+        if published.pose.mode.is_localised() {
             self.was_localised.store(true, Ordering::Relaxed);
         }
     }

@@ -6,7 +6,7 @@ use agv_wire::can::controller_node::ErrorKind;
 use agv_wire::can::emcy::Emergency;
 
 /// What is wrong, in words.
-const WORDS: [(ErrorKind, &str); 13] = [
+const WORDS: [(ErrorKind, &str); 14] = [
     (ErrorKind::Board, "a part of the board does not work"),
     (ErrorKind::Panicked, "the program ended by itself the last time"),
     (ErrorKind::SettingsLost, "not everything that was set was found, or it cannot be stored"),
@@ -20,6 +20,7 @@ const WORDS: [(ErrorKind, &str); 13] = [
     (ErrorKind::Overload, "the controller is too slow for what it is told"),
     (ErrorKind::PoseRefused, "an initial pose was refused"),
     (ErrorKind::Pause, "the processor stands still while a page is erased"),
+    (ErrorKind::DiscreteLine, "a discrete line cannot be set or read"),
 ];
 
 /// An emergency of the controller itself.

@@ -16,7 +16,7 @@ use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::registry::Registry;
 use serde::Serialize;
 
-use super::exchange::{BusState, is_localised};
+use super::exchange::BusState;
 use super::kept::SOFTWARE;
 use super::periods::PeriodFigures;
 use super::pose_line::PoseLine;
@@ -74,7 +74,7 @@ impl Status {
             starts: running.starts,
             uptime_s: running.uptime().as_secs_f64(),
             pose: pose.map(|pose| PoseLine::of(&pose, limits)),
-            is_localised: pose.is_some_and(|pose| is_localised(pose.mode)),
+            is_localised: pose.is_some_and(|pose| pose.mode.is_localised()),
             bus,
             laser: match laser {
                 LaserHealth::Unknown => "unknown",

@@ -43,11 +43,6 @@ pub struct Happening {
 /// Smallest correction that is worth a look, m.
 const CORRECTION: f64 = 0.01;
 
-/// Whether the vehicle knows where it is in that mode.
-fn is_localised(mode: Mode) -> bool {
-    matches!(mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
-}
-
 /// The mode as it was last said.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ModeMemory {
@@ -67,12 +62,12 @@ impl ModeMemory {
         }
         let kind = if now.mode == Mode::Lost && before.is_none_or(|(mode, _)| mode != Mode::Lost) {
             HappeningKind::Lost
-        } else if is_localised(now.mode) && self.was_lost {
+        } else if now.mode.is_localised() && self.was_lost {
             HappeningKind::Relocalised
         } else {
             HappeningKind::Mode
         };
-        self.was_lost = now.mode == Mode::Lost || (self.was_lost && !is_localised(now.mode));
+        self.was_lost = now.mode == Mode::Lost || (self.was_lost && !now.mode.is_localised());
         let reason = reason_name(now.reason);
         let name = mode_name(now.mode);
         Some((kind, if reason.is_empty() { name.to_owned() } else { format!("{name}: {reason}") }))

@@ -17,7 +17,7 @@ use agv_wire::can::frame::{Frame, Id, standard_id};
 use agv_wire::nav350::SensorFrame;
 use serde::{Deserialize, Serialize};
 
-use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose, knows_where_it_is};
+use super::stage::{BETWEEN_ORDERS, FIRST_NODE, LEAD, PATIENCE, initial_pose};
 use super::{Driven, HeardEmergency, HeardPose, VehicleError, own_nodes, settings_like, write_contours, write_flash};
 use crate::contour_map::ContourMap;
 use crate::emulate::board::{ADDRESS, HOST};
@@ -294,7 +294,7 @@ impl Play<'_> {
             }
             return Ok(());
         }
-        if self.mode().is_some_and(knows_where_it_is) {
+        if self.mode().is_some_and(Mode::is_localised) {
             self.drive_off(now);
         } else if self.is_told
             && self.motion.are_operational()

@@ -6,7 +6,6 @@ use agv_core::geometry::{Pose, wrap};
 use serde::Serialize;
 
 use super::Driven;
-use super::stage::knows_where_it_is;
 use crate::recording::{Recording, truth_at};
 
 /// How far the poses on the bus were from the truth.
@@ -57,7 +56,7 @@ pub fn errors(driven: &Driven, recording: &Recording) -> Option<Errors> {
         let Some(truth) = truth_at(&recording.truth, driven.first.offset(since)) else { continue };
         all += 1;
         longest_gap = longest_gap.max(gap);
-        if !knows_where_it_is(heard.pose.mode) {
+        if !heard.pose.mode.is_localised() {
             continue;
         }
         let Pose { x, y, theta } = heard.pose.pose;

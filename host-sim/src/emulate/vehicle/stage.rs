@@ -108,7 +108,7 @@ impl Stage<'_> {
             if play.end.is_some() {
                 continue;
             }
-            if self.mode().is_some_and(knows_where_it_is) {
+            if self.mode().is_some_and(Mode::is_localised) {
                 play.drive_off(seconds);
             } else if self.is_told && play.motion.are_operational() && play.last_order.elapsed() > BETWEEN_ORDERS {
                 play.last_order = Instant::now();
@@ -156,11 +156,6 @@ impl Stage<'_> {
         let driven = self.heard().begin.map_or(0.0, |begin| begin.elapsed().as_secs_f64());
         truth_or_stand_at(&self.recording.truth, self.first.offset(driven))
     }
-}
-
-/// Whether a vehicle in that mode may drive off: its pose rests on what it sees.
-pub(super) const fn knows_where_it_is(mode: Mode) -> bool {
-    matches!(mode, Mode::Reflectors | Mode::Features | Mode::Mixed)
 }
 
 /// What tells the controller that it is at a pose, as well as somebody who looks at it knows.

@@ -21,20 +21,33 @@ pub struct OrderReceiver {
     position: Option<(Time, u8, f64, f64)>,
     heading: Option<(Time, u8, [f64; 3])>,
     last_pose: Option<(Time, u8)>,
-    standstill: Option<Time>,
+    /// Whether the bus has said that it stands, and when.
+    command: Option<(Time, bool)>,
+    /// When a wire has said so.
+    line: Option<Time>,
 }
 
 impl OrderReceiver {
     /// A receiver at `node` that has heard nothing.
     #[must_use]
     pub const fn new(node: NodeId) -> Self {
-        Self { node, position: None, heading: None, last_pose: None, standstill: None }
+        Self { node, position: None, heading: None, last_pose: None, command: None, line: None }
     }
 
-    /// Whether the vehicle has been said to stand still, and lately.
+    /// Whether the vehicle has been said to stand still, and lately. What the bus says goes before what a wire says: one that hangs on
+    /// its supply says the same for ever.
     #[must_use]
     pub fn is_standstill(&self, now: Time) -> bool {
-        self.standstill.is_some_and(|since| now.since(since) <= STANDSTILL_TIME)
+        let is_held = |since: Time| now.since(since) <= STANDSTILL_TIME;
+        match self.command.filter(|(since, _)| is_held(*since)) {
+            Some((_, is_standstill)) => is_standstill,
+            None => self.line.is_some_and(is_held),
+        }
+    }
+
+    /// A wire says at `time` that the vehicle stands still.
+    pub const fn hear_line(&mut self, time: Time) {
+        self.line = Some(time);
     }
 
     /// Takes a frame that was received at `time`; gives the pose to believe that it completes.
@@ -45,7 +58,7 @@ impl OrderReceiver {
                 self.heading = Some((time, counter, [heading, position_deviation, heading_deviation]));
             }
             (Content::Command { is_standstill }, _) => {
-                self.standstill = is_standstill.then_some(time);
+                self.command = Some((time, is_standstill));
                 return None;
             }
             _ => return None,

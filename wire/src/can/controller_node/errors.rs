@@ -39,9 +39,11 @@ pub enum ErrorKind {
     PoseRefused,
     /// The processor stands still from now on, for as long as a page of flash takes to erase: nothing is sent meanwhile.
     Pause,
+    /// A discrete line cannot be set or read.
+    DiscreteLine,
 }
 
-const KINDS: [ErrorKind; 13] = [
+const KINDS: [ErrorKind; 14] = [
     ErrorKind::Board,
     ErrorKind::Panicked,
     ErrorKind::SettingsLost,
@@ -55,6 +57,7 @@ const KINDS: [ErrorKind; 13] = [
     ErrorKind::Overload,
     ErrorKind::PoseRefused,
     ErrorKind::Pause,
+    ErrorKind::DiscreteLine,
 ];
 
 impl ErrorKind {
@@ -75,6 +78,7 @@ impl ErrorKind {
             Self::Overload => 0xFF02,
             Self::PoseRefused => 0xFF03,
             Self::Pause => 0xFF04,
+            Self::DiscreteLine => 0xFF05,
         }
     }
 

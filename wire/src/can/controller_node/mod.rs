@@ -195,6 +195,17 @@ impl ControllerNode {
         self.objects.errors.report(kind, parts, now);
     }
 
+    /// What is wrong, all together (1001h).
+    #[must_use]
+    pub fn error_register(&self) -> u8 {
+        self.objects.errors.register()
+    }
+
+    /// Forgets what was wrong, as 0 written to 1003h does.
+    pub fn forget_errors(&mut self) {
+        self.objects.errors.clear_history();
+    }
+
     /// Nodes whose heartbeats are watched.
     #[must_use]
     pub fn watched(&self) -> Vec<NodeId, CONSUMERS> {
