@@ -126,6 +126,7 @@ fn inside(interface: &str) {
     let options = Options {
         store: folder.path().to_owned(),
         open_bus: Box::new(move || bus::open(&name)),
+        lines: None,
         ports: Ports::Any,
         real_time: RealTime::default(),
         datagrams: Vec::new(),

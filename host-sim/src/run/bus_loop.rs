@@ -141,6 +141,10 @@ impl BusLoop<'_> {
         if let Some(speed) = bus.laser_speed() {
             exchange.set_laser_speed(speed);
         }
+        if let Some(inputs) = exchange.newest_discrete_inputs() {
+            bus.hear_lines(&inputs, exchange.now());
+        }
+        exchange.set_discrete_report(bus.discrete_report(exchange.now()));
         let state = port.state();
         if state != super::exchange::BusState::Open {
             clock.interrupt();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::discrete::DiscreteConfiguration;
 use super::real_time::RealTime;
 use crate::text_file::{self, TextFileError};
 
@@ -22,6 +23,9 @@ pub struct Configuration {
     /// Priorities, cores and memory.
     #[serde(default = "usual")]
     pub real_time: RealTime,
+    /// Its discrete lines.
+    #[serde(default)]
+    pub discrete: DiscreteConfiguration,
     /// Who is told each pose.
     #[serde(default)]
     pub pose: PoseConfiguration,
@@ -80,6 +84,8 @@ impl Configuration {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
             TextFileError::of_line(path, before.matches('\n').count() + 1, error.message().replace('\n', ", "))
         })?;
+        let line_of =
+            |name: &str| text.lines().position(|line| line.trim_start().starts_with(name)).map_or(1, |line| line + 1);
         let RealTime { bus_priority, laser_priority, localizer_priority, .. } = configuration.real_time;
         let priorities = [
             ("bus_priority", bus_priority),
@@ -88,8 +94,14 @@ impl Configuration {
         ];
         let is_wrong = |priority: Option<u8>| priority.is_some_and(|number| !(1..=GREATEST_PRIORITY).contains(&number));
         if let Some((name, _)) = priorities.into_iter().find(|(_, priority)| is_wrong(*priority)) {
-            let line = text.lines().position(|line| line.trim_start().starts_with(name)).map_or(1, |line| line + 1);
-            return Err(TextFileError::of_line(path, line, format!("{name} must be from 1 to {GREATEST_PRIORITY}")));
+            return Err(TextFileError::of_line(
+                path,
+                line_of(name),
+                format!("{name} must be from 1 to {GREATEST_PRIORITY}"),
+            ));
+        }
+        if let Some((name, problem)) = configuration.discrete.problem() {
+            return Err(TextFileError::of_line(path, line_of(name), problem));
         }
         Ok(configuration)
     }

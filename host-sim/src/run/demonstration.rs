@@ -15,7 +15,7 @@ use agv_wire::can::controller::PoseReceiver;
 use agv_wire::can::frame::Frame;
 use agv_wire::nav350::SensorFrame;
 
-use super::{FLASH, Options, Ports, RealTime, RunError, Running, Summary};
+use super::{DiscretePort, FLASH, Options, Ports, RealTime, RunError, Running, Summary};
 use crate::bus::{Bus, BusError, InProcessBus, InProcessNode};
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::{EmulatedMotion, MotionError};
@@ -67,6 +67,7 @@ pub enum DemonstrationError {
 /// A vehicle that will drive.
 pub struct Demonstration {
     recording: Recording,
+    lines: Option<Box<dyn DiscretePort>>,
 }
 
 impl Demonstration {
@@ -76,13 +77,19 @@ impl Demonstration {
     /// If the hall cannot be simulated.
     pub fn new() -> Result<Self, DemonstrationError> {
         let scenario: Scenario = toml::from_str(standard::HALL)?;
-        Ok(Self { recording: simulate(&scenario)?.recording })
+        Ok(Self::of(simulate(&scenario)?.recording))
     }
 
     /// The vehicle of a recorded or simulated drive.
     #[must_use]
     pub const fn of(recording: Recording) -> Self {
-        Self { recording }
+        Self { recording, lines: None }
+    }
+
+    /// The same with discrete lines.
+    #[must_use]
+    pub fn with_lines(self, lines: Box<dyn DiscretePort>) -> Self {
+        Self { lines: Some(lines), ..self }
     }
 
     /// The settings of the controller, whose laser is at that port of this machine.
@@ -100,7 +107,7 @@ impl Demonstration {
     /// # Errors
     /// If something does not begin or breaks down.
     pub fn run(
-        &self,
+        mut self,
         folder: &Path,
         real_time: RealTime,
         log: Option<&Path>,
@@ -120,6 +127,7 @@ impl Demonstration {
         let options = Options {
             store: folder.to_owned(),
             open_bus: Box::new(move || Ok(Box::new(bus.join()) as Box<dyn Bus>)),
+            lines: self.lines.take(),
             ports: Ports::Any,
             real_time,
             datagrams: Vec::new(),

@@ -7,7 +7,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::Thread;
 use std::time::Duration;
 
-use agv_controller::{Estimate, SentPose, Told};
+use agv_controller::{DiscreteInputs, DiscreteReport, Estimate, SentPose, Told};
 use agv_core::measurement::Time;
 use agv_core::state::{LaserHealth, PoseOutput};
 use agv_wire::can::controller_node::CommunicationParameters;
@@ -39,8 +39,11 @@ pub(super) enum Task {
     Laser = 2,
     /// The localiser.
     Localizer = 4,
+    /// The discrete lines, if there are any.
+    Lines = 8,
 }
 
+/// What runs on every vehicle.
 const ALL: u32 = Task::Bus as u32 | Task::Laser as u32 | Task::Localizer as u32;
 
 /// Whether there is a bus.
@@ -100,7 +103,11 @@ pub(super) struct Exchange {
     lost_events: AtomicU32,
     lost_revolutions: AtomicU32,
     lost_records: AtomicU32,
+    discrete_report: Mutex<Option<DiscreteReport>>,
+    discrete_inputs: Mutex<Option<DiscreteInputs>>,
     seen: AtomicU32,
+    /// Tasks that must run.
+    wanted: u32,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -109,7 +116,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Exchange {
     /// An exchange where nothing was said, and the other ends of its queues.
-    pub fn new(clock: Clock, is_stopped: Arc<AtomicBool>) -> (Self, Queues) {
+    pub fn new(clock: Clock, is_stopped: Arc<AtomicBool>, has_lines: bool) -> (Self, Queues) {
         let (events, events_end) = sync_channel(EVENTS);
         let (published, published_end) = sync_channel(PUBLISHED_POSES);
         let (poses, poses_end) = sync_channel(POSES);
@@ -143,7 +150,10 @@ impl Exchange {
             lost_events: AtomicU32::new(0),
             lost_revolutions: AtomicU32::new(0),
             lost_records: AtomicU32::new(0),
+            discrete_report: Mutex::new(None),
+            discrete_inputs: Mutex::new(None),
             seen: AtomicU32::new(0),
+            wanted: if has_lines { ALL | Task::Lines as u32 } else { ALL },
         };
         let localizer = LocalizerQueues {
             events: events_end,
@@ -329,6 +339,32 @@ impl Exchange {
         locked(&self.saved).take()
     }
 
+    /// What wires are to say.
+    pub fn set_discrete_report(&self, report: DiscreteReport) {
+        *locked(&self.discrete_report) = Some(report);
+    }
+
+    /// What wires are to say. None before the bus has begun.
+    pub fn discrete_report(&self) -> Option<DiscreteReport> {
+        *locked(&self.discrete_report)
+    }
+
+    /// What wires say. A reset and a line that has failed stay until the bus has heard of them.
+    pub fn set_discrete_inputs(&self, inputs: DiscreteInputs) {
+        let mut waiting = locked(&self.discrete_inputs);
+        let before = waiting.unwrap_or_default();
+        *waiting = Some(DiscreteInputs {
+            is_reset: inputs.is_reset || before.is_reset,
+            failed: inputs.failed | before.failed,
+            ..inputs
+        });
+    }
+
+    /// What wires have said since the last call.
+    pub fn newest_discrete_inputs(&self) -> Option<DiscreteInputs> {
+        locked(&self.discrete_inputs).take()
+    }
+
     /// A thread has run.
     pub fn check_in(&self, task: Task) {
         self.seen.fetch_or(task as u32, Ordering::Relaxed);
@@ -336,6 +372,6 @@ impl Exchange {
 
     /// Whether all threads have run since the last time that they all had; if so, none has from now on.
     pub fn have_all_run(&self) -> bool {
-        self.seen.compare_exchange(ALL, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok()
+        self.seen.compare_exchange(self.wanted, 0, Ordering::Relaxed, Ordering::Relaxed).is_ok()
     }
 }

@@ -9,6 +9,7 @@ mod bus_loop;
 mod bus_port;
 mod configuration;
 mod demonstration;
+mod discrete;
 mod exchange;
 mod fault;
 mod flash_file;
@@ -43,6 +44,7 @@ pub use attendance::attend;
 pub use bus_port::OpenBus;
 pub use configuration::{Configuration, ConfigurationError};
 pub use demonstration::{Demonstration, DemonstrationError};
+pub use discrete::{DiscreteConfiguration, DiscretePort, LineError, LineName};
 pub use exchange::BusState;
 pub use fault::Fault;
 pub use flash_file::{FlashFile, FlashFileError, Refused};
@@ -122,6 +124,8 @@ pub struct Options {
     pub store: PathBuf,
     /// What opens its bus.
     pub open_bus: OpenBus,
+    /// Its discrete lines, if it has any.
+    pub lines: Option<Box<dyn DiscretePort>>,
     /// Where it listens.
     pub ports: Ports,
     /// Priorities, cores and memory.
@@ -292,7 +296,7 @@ pub fn run(
     let kept_pose = KeptPose::read(&options.store, map);
     let store = options.store;
     let (landmarks, starts) = (controller.landmarks, controller.starts);
-    let (exchange, queues) = Exchange::new(Clock::new(1.0), Arc::clone(is_stopped));
+    let (exchange, queues) = Exchange::new(Clock::new(1.0), Arc::clone(is_stopped), options.lines.is_some());
     let exchange = &exchange;
     let Queues { localizer: localizer_queues, laser: laser_queues, poses } = queues;
     let controller = Mutex::new(controller);
@@ -358,7 +362,15 @@ pub fn run(
             real_time::enter("bus", real_time.bus_priority, real_time.bus_core, lacks);
             bus_loop.run(note);
         });
-        if localizing.is_err() || lasing.is_err() || busing.is_err() {
+        let lining = options.lines.map(|lines| {
+            named("lines", STACK).spawn_scoped(scope, move || {
+                let _alarm = Alarm(exchange);
+                real_time::enter("lines", real_time.bus_priority, None, lacks);
+                discrete::run(lines, exchange);
+            })
+        });
+        let has_lines = !matches!(lining, Some(Err(_)));
+        if localizing.is_err() || lasing.is_err() || busing.is_err() || !has_lines {
             exchange.stop();
         }
         let passing = scope.spawn(move || pass_log(&log_reader, relay, log_file, exchange, note));
@@ -372,7 +384,8 @@ pub fn run(
             lacks.take().iter().for_each(|lack| note(&format!("real time: {lack}")));
         }
         let mut broken = None;
-        for (name, thread) in [("localiser", localizing), ("laser", lasing), ("bus", busing)] {
+        let threads = [("localiser", localizing), ("laser", lasing), ("bus", busing)];
+        for (name, thread) in threads.into_iter().chain(lining.map(|thread| ("discrete lines", thread))) {
             let ended = thread.map(std::thread::ScopedJoinHandle::join);
             broken = match ended {
                 Ok(Ok(())) => broken,

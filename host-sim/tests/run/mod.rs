@@ -1,5 +1,6 @@
 //! The controller on this machine.
 #![cfg(unix)]
 
+mod discrete;
 mod flash_file;
 mod vehicle;

@@ -35,7 +35,7 @@ use agv_wire::nav350::SensorFrame;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Waits for an event.
-fn wait(what: &str, mut has_come: impl FnMut() -> bool) {
+pub(super) fn wait(what: &str, mut has_come: impl FnMut() -> bool) {
     let start = Instant::now();
     while !has_come() {
         assert!(start.elapsed() < PATIENCE, "{what} has not come");
@@ -44,14 +44,14 @@ fn wait(what: &str, mut has_come: impl FnMut() -> bool) {
 }
 
 /// The hall without scans, which take long to simulate.
-fn hall() -> Recording {
+pub(super) fn hall() -> Recording {
     let mut scenario: Scenario = toml::from_str(standard::HALL).unwrap();
     scenario.laser.scans = false;
     simulate(&scenario).unwrap().recording
 }
 
 /// Ends a run, also if what looks at it fails.
-struct End(Arc<AtomicBool>);
+pub(super) struct End(pub Arc<AtomicBool>);
 
 impl Drop for End {
     fn drop(&mut self) {
@@ -153,6 +153,7 @@ fn start(
     let mut options = Options {
         store: folder.to_owned(),
         open_bus: Box::new(move || Ok(Box::new(bus.join()))),
+        lines: None,
         ports: Ports::Any,
         real_time: RealTime::default(),
         datagrams: Vec::new(),
@@ -366,7 +367,6 @@ fn among_equals(pose: Pose) -> Recording {
 fn where_it_was_last_decides_between_equals_only_if_it_fits() {
     let folder = tempfile::tempdir().unwrap();
     let stands = Pose::new(1.0, 0.5, 0.3);
-    let demonstration = Demonstration::of(among_equals(stands));
     let attempt = |kept: Option<Pose>| {
         let is_stopped = Arc::new(AtomicBool::new(false));
         let end = End(Arc::clone(&is_stopped));
@@ -384,6 +384,7 @@ fn where_it_was_last_decides_between_equals_only_if_it_fits() {
             wait("an answer", || running.condition().was_localised || running.poses() > 300);
             pose = running.condition().pose.filter(|_| running.condition().was_localised).map(|pose| pose.pose);
         };
+        let demonstration = Demonstration::of(among_equals(stands));
         demonstration.run(folder.path(), RealTime::default(), None, &is_stopped, &note, watch).unwrap();
         (pose, remarks.into_inner().unwrap())
     };

@@ -31,6 +31,14 @@ A configuration is a file like this; what is left out is as here, but for store 
   laser_priority = 40
   localizer_priority = 35
   lock_memory = true
+  [discrete]                        # no lines if absent; a line is a number of the chip, or a name
+  chip = \"/dev/gpiochip0\"
+  pose_valid = 17
+  within_docking_limits = 27
+  fault = 22                        # low while something is wrong
+  standstill = \"STANDSTILL\"
+  reset = 6
+  inverted = [\"reset\"]             # lines whose hardware inverts
   [pose]
   unix = \"/run/agv/pose\"            # none if absent
   udp = [\"127.0.0.1:5355\"]          # none if absent
@@ -120,6 +128,7 @@ impl Run {
             let options = Options {
                 store: configuration.store.clone(),
                 open_bus: Box::new(move || bus::open(&name)),
+                lines: configuration.discrete.open()?,
                 ports: Ports::Set(configuration.listen),
                 real_time: configuration.real_time,
                 datagrams: configuration.pose.udp.clone(),
