@@ -3,7 +3,7 @@
 use agv_core::geometry::Pose;
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::OutputPredictor;
-use agv_core::measurement::{EncoderFaults, Time};
+use agv_core::measurement::{EncoderFaults, GyroSample, Time};
 use agv_core::odometry::{Counted, MOST_COUNTERS};
 use agv_core::state::{LaserHealth, Mode, PoseOutput, Relocalization};
 use agv_settings::Settings;
@@ -89,6 +89,8 @@ pub struct Bus {
     nodes: EncoderNodes,
     encoders: Encoders,
     gyro: Gyro,
+    /// Whether the controller has a gyro of its own, beside which none on the bus is heard.
+    has_own_gyro: bool,
     node: ControllerNode,
     limits: AlertLimits,
     /// How long a pose is used by wires, s.
@@ -130,6 +132,7 @@ impl Bus {
             nodes,
             encoders: Encoders::new(&nodes, &settings.parameters, start),
             gyro: Gyro::of(settings),
+            has_own_gyro: false,
             node,
             limits: settings.parameters.alert_limits,
             deadline: DiscreteReport::deadline(settings),
@@ -240,10 +243,22 @@ impl Bus {
             }
             take(BusOutput::Event(progress.tell(event)));
         });
-        if let Some(sample) = self.gyro.hear(frame, heard) {
-            self.predictor.gyro(&sample);
-            take(BusOutput::Event(self.progress.tell(BusEvent::Gyro(sample))));
+        if let Some(sample) = self.gyro.hear(frame, heard).filter(|_| !self.has_own_gyro) {
+            take(self.tell_gyro(&sample));
         }
+    }
+
+    fn tell_gyro(&mut self, sample: &GyroSample) -> BusOutput {
+        self.predictor.gyro(sample);
+        BusOutput::Event(self.progress.tell(BusEvent::Gyro(*sample)))
+    }
+
+    /// Takes a reading of the controller's own gyro ([`super::GyroChip`]), if the vehicle is said to have one. From the first one on none on
+    /// the bus is heard: two would be taken for one that contradicts itself.
+    pub fn hear_gyro(&mut self, sample: &GyroSample) -> Option<BusOutput> {
+        self.gyro.id()?;
+        self.has_own_gyro = true;
+        Some(self.tell_gyro(sample))
     }
 
     /// Does what is due at `now`. To be called at least every 5 ms; a pose that is late is left out, the next one is for its

@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | [`Encoders`] | sets the encoders up, watches them, and makes events of what they, or the vehicle's own controller, and other controllers say | in the bus's task |
 //! | [`Gyro`] | makes events of what a gyro says | in the bus's task |
+//! | [`GyroChip`] | makes the same of what a gyro on SPI or I2C says | in a task of its own |
 //! | [`Bus`] | all that the bus hears and says: [`Encoders`], [`Gyro`], the controller's own node, the pose for now | the bus's task |
 //! | [`DiscreteLines`] | wires that say whether the pose may be used, and that tell of standstill and reset | in the bus's task, or beside it |
 //! | [`Laser`] | the session with the laser, and whether it can be used | the network's task |
@@ -22,6 +23,7 @@ mod controller;
 mod discrete;
 mod encoders;
 mod gyro;
+mod gyro_chip;
 mod laser;
 mod localization;
 mod progress;
@@ -34,6 +36,7 @@ pub use controller::{Controller, LaserOrder, TELEGRAM};
 pub use discrete::{DEBOUNCE, DiscreteInputs, DiscreteLines, DiscreteOutputs, DiscreteReport, Line, LineSet};
 pub use encoders::{BusEvent, EncoderNodes, EncoderOutput, Encoders, channels, counted};
 pub use gyro::Gyro;
+pub use gyro_chip::{GyroChip, GyroChipError};
 pub use laser::Laser;
 pub use localization::{Estimate, Localization};
 pub use progress::{Progress, SentPose, Told};

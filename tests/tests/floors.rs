@@ -30,7 +30,7 @@ const HOUSES: [House; 8] = [
     House {
         folder: "controller",
         floors: &[
-            &["carried_map", "encoders", "gyro", "laser", "setting_objects", "standstill"],
+            &["carried_map", "encoders", "gyro", "gyro_chip", "laser", "setting_objects", "standstill"],
             &["discrete", "progress"],
             &["localization"],
             &["bus"],
