@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 pub use programs::{agv, emulator, image, is_on_path, python};
 pub use real_time::{faults, heard_in_time, is_fair, sound_drive};
-pub use skip::{skip, too_busy};
+pub use skip::{no_kernel, skip, too_busy};
 
 /// A path in the repository.
 #[must_use]

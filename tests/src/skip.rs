@@ -18,6 +18,11 @@ pub fn too_busy(test: &str) {
     note(test, "the machine is too busy to emulate a vehicle in real time");
 }
 
+/// Says the same of a test that needs a kernel which no package brings: even a machine that must be able to make every test may lack it.
+pub fn no_kernel(test: &str, missing: &str) {
+    note(test, missing);
+}
+
 /// Whether this machine must be able to make every test.
 fn is_complete() -> bool {
     std::env::var_os("CI").is_some_and(|value| value == "true")

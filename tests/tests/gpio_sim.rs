@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use agv_controller::{DiscreteInputs, DiscreteOutputs, DiscreteReport, Line};
 use agv_core::measurement::Time;
 use agv_host_sim::run::{DiscreteConfiguration, DiscretePort};
-use agv_tests::skip;
+use agv_tests::no_kernel;
 
 const NAME: &str = "the_lines_work_on_a_chip_of_a_kernel";
 const CONFIGFS: &str = "/sys/kernel/config";
@@ -95,7 +95,7 @@ fn open(text: &str) -> Box<dyn DiscretePort> {
 fn the_lines_work_on_a_chip_of_a_kernel() {
     let chip = match Chip::new() {
         Ok(chip) => chip,
-        Err(reason) => return skip(NAME, &reason),
+        Err(reason) => return no_kernel(NAME, &reason),
     };
     let text = format!(
         "chip = \"{}\"\npose_valid = 1\nwithin_docking_limits = 2\nfault = 3\nstandstill = 5\nreset = \"AGV_RESET\"\n\

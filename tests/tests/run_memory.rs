@@ -111,6 +111,7 @@ fn nothing_is_taken_once_it_runs() {
         store: folder.path().to_owned(),
         open_bus: Box::new(move || bus::open(&adapter)),
         lines: None,
+        gyro: None,
         ports: Ports::Any,
         real_time: RealTime::default(),
         datagrams: Vec::new(),

@@ -127,6 +127,7 @@ fn inside(interface: &str) {
         store: folder.path().to_owned(),
         open_bus: Box::new(move || bus::open(&name)),
         lines: None,
+        gyro: None,
         ports: Ports::Any,
         real_time: RealTime::default(),
         datagrams: Vec::new(),

@@ -134,6 +134,9 @@ impl BusLoop<'_> {
         if let Some((frame, heard)) = &heard {
             bus.hear(frame, *heard, objects, &mut take);
         }
+        while let Some(output) = exchange.next_gyro().and_then(|sample| bus.hear_gyro(&sample)) {
+            take(output);
+        }
         bus.poll(exchange.now(), exchange.laser_health(), &mut take);
         if is_late {
             bus.report(ErrorKind::Overload, exchange.now());

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::discrete::DiscreteConfiguration;
+use super::gyro::GyroConfiguration;
 use super::real_time::RealTime;
 use crate::text_file::{self, TextFileError};
 
@@ -26,6 +27,9 @@ pub struct Configuration {
     /// Its discrete lines.
     #[serde(default)]
     pub discrete: DiscreteConfiguration,
+    /// Its own gyro.
+    #[serde(default)]
+    pub gyro: GyroConfiguration,
     /// Who is told each pose.
     #[serde(default)]
     pub pose: PoseConfiguration,
@@ -100,7 +104,7 @@ impl Configuration {
                 format!("{name} must be from 1 to {GREATEST_PRIORITY}"),
             ));
         }
-        if let Some((name, problem)) = configuration.discrete.problem() {
+        if let Some((name, problem)) = configuration.discrete.problem().or_else(|| configuration.gyro.problem()) {
             return Err(TextFileError::of_line(path, line_of(name), problem));
         }
         Ok(configuration)

@@ -128,6 +128,7 @@ impl Demonstration {
             store: folder.to_owned(),
             open_bus: Box::new(move || Ok(Box::new(bus.join()) as Box<dyn Bus>)),
             lines: self.lines.take(),
+            gyro: None,
             ports: Ports::Any,
             real_time,
             datagrams: Vec::new(),

@@ -8,7 +8,7 @@ use std::thread::Thread;
 use std::time::Duration;
 
 use agv_controller::{DiscreteInputs, DiscreteReport, Estimate, SentPose, Told};
-use agv_core::measurement::Time;
+use agv_core::measurement::{GyroSample, Time};
 use agv_core::state::{LaserHealth, PoseOutput};
 use agv_wire::can::controller_node::CommunicationParameters;
 use agv_wire::nav350::{Revolution, SensorSpeed, SensorWatch};
@@ -28,6 +28,8 @@ const POSES: usize = 128;
 
 /// Faults that wait to be told to people.
 const FAULTS: usize = 64;
+/// Readings of the machine's own gyro that wait for the bus, which looks every millisecond.
+const READINGS: usize = 16;
 
 /// What must run, each a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +43,8 @@ pub(super) enum Task {
     Localizer = 4,
     /// The discrete lines, if there are any.
     Lines = 8,
+    /// The machine's own gyro, if it has one.
+    Gyro = 16,
 }
 
 /// What runs on every vehicle.
@@ -89,6 +93,7 @@ pub(super) struct Exchange {
     published: SyncSender<SentPose>,
     poses: SyncSender<PoseOutput>,
     faults: (SyncSender<Fault>, Mutex<Receiver<Fault>>),
+    readings: (SyncSender<GyroSample>, Mutex<Receiver<GyroSample>>),
     localizer: OnceLock<Thread>,
     estimate: Mutex<Option<Estimate>>,
     laser: Mutex<SensorWatch>,
@@ -115,13 +120,14 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Exchange {
-    /// An exchange where nothing was said, and the other ends of its queues.
-    pub fn new(clock: Clock, is_stopped: Arc<AtomicBool>, has_lines: bool) -> (Self, Queues) {
+    /// An exchange where nothing was said, and the other ends of its queues, of a controller that has these tasks besides.
+    pub fn new(clock: Clock, is_stopped: Arc<AtomicBool>, besides: &[Task]) -> (Self, Queues) {
         let (events, events_end) = sync_channel(EVENTS);
         let (published, published_end) = sync_channel(PUBLISHED_POSES);
         let (poses, poses_end) = sync_channel(POSES);
         let (revolutions, revolutions_end) = sync_channel(REVOLUTIONS);
         let (faults, faults_end) = sync_channel(FAULTS);
+        let (readings, readings_end) = sync_channel(READINGS);
         let (free_revolutions, free_revolutions_end) = sync_channel(REVOLUTIONS);
         for _ in 0..REVOLUTIONS {
             // There is room for all.
@@ -136,6 +142,7 @@ impl Exchange {
             published,
             poses,
             faults: (faults, Mutex::new(faults_end)),
+            readings: (readings, Mutex::new(readings_end)),
             localizer: OnceLock::new(),
             estimate: Mutex::new(None),
             laser: Mutex::new(SensorWatch::new()),
@@ -153,7 +160,7 @@ impl Exchange {
             discrete_report: Mutex::new(None),
             discrete_inputs: Mutex::new(None),
             seen: AtomicU32::new(0),
-            wanted: if has_lines { ALL | Task::Lines as u32 } else { ALL },
+            wanted: besides.iter().fold(ALL, |wanted, task| wanted | *task as u32),
         };
         let localizer = LocalizerQueues {
             events: events_end,
@@ -337,6 +344,18 @@ impl Exchange {
     /// Whether what was wanted is stored, once that is known.
     pub fn saved(&self) -> Option<bool> {
         locked(&self.saved).take()
+    }
+
+    /// The machine's own gyro has told a rate. If there is no room for it, it is lost and counted.
+    pub fn pass_gyro(&self, sample: GyroSample) {
+        if self.readings.0.try_send(sample).is_err() {
+            self.lost_events.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// The next rate that it has told.
+    pub fn next_gyro(&self) -> Option<GyroSample> {
+        locked(&self.readings.1).try_recv().ok()
     }
 
     /// What wires are to say.

@@ -13,6 +13,7 @@ mod discrete;
 mod exchange;
 mod fault;
 mod flash_file;
+mod gyro;
 mod kept;
 mod kept_pose;
 mod laser_loop;
@@ -48,6 +49,7 @@ pub use discrete::{DiscreteConfiguration, DiscretePort, LineError, LineName};
 pub use exchange::BusState;
 pub use fault::Fault;
 pub use flash_file::{FlashFile, FlashFileError, Refused};
+pub use gyro::{GyroConfiguration, GyroOpenError, GyroPort, OpenGyro};
 pub use kept::{CONTOURS, FLASH, Kept, SOFTWARE, StoreFolderError, read};
 pub use kept_pose::{KeptPose, POSE};
 pub use periods::{PeriodClock, PeriodFigures, Periods};
@@ -57,7 +59,7 @@ pub use status::{LeftOut, Status, StatusBoard, serve_status};
 
 use self::bus_loop::BusLoop;
 use self::bus_port::BusPort;
-use self::exchange::{Exchange, Queues};
+use self::exchange::{Exchange, Queues, Task};
 use self::localizer_loop::LocalizerLoop;
 use self::log_file::LogFile;
 use self::log_queue::{LogReader, log_queue};
@@ -126,6 +128,8 @@ pub struct Options {
     pub open_bus: OpenBus,
     /// Its discrete lines, if it has any.
     pub lines: Option<Box<dyn DiscretePort>>,
+    /// What opens its own gyro, if it has one.
+    pub gyro: Option<OpenGyro>,
     /// Where it listens.
     pub ports: Ports,
     /// Priorities, cores and memory.
@@ -296,7 +300,9 @@ pub fn run(
     let kept_pose = KeptPose::read(&options.store, map);
     let store = options.store;
     let (landmarks, starts) = (controller.landmarks, controller.starts);
-    let (exchange, queues) = Exchange::new(Clock::new(1.0), Arc::clone(is_stopped), options.lines.is_some());
+    let lining = options.lines.is_some().then_some(Task::Lines);
+    let besides: Vec<Task> = lining.into_iter().chain(options.gyro.is_some().then_some(Task::Gyro)).collect();
+    let (exchange, queues) = Exchange::new(Clock::new(1.0), Arc::clone(is_stopped), &besides);
     let exchange = &exchange;
     let Queues { localizer: localizer_queues, laser: laser_queues, poses } = queues;
     let controller = Mutex::new(controller);
@@ -369,8 +375,16 @@ pub fn run(
                 discrete::run(lines, exchange);
             })
         });
-        let has_lines = !matches!(lining, Some(Err(_)));
-        if localizing.is_err() || lasing.is_err() || busing.is_err() || !has_lines {
+        let turning = options.gyro.map(|open| {
+            let gyro = open(settings);
+            named("gyro", STACK).spawn_scoped(scope, move || {
+                let _alarm = Alarm(exchange);
+                real_time::enter("gyro", real_time.bus_priority, None, lacks);
+                gyro::run(gyro, exchange, note);
+            })
+        });
+        let besides = || lining.iter().chain(&turning);
+        if localizing.is_err() || lasing.is_err() || busing.is_err() || besides().any(Result::is_err) {
             exchange.stop();
         }
         let passing = scope.spawn(move || pass_log(&log_reader, relay, log_file, exchange, note));
@@ -385,7 +399,11 @@ pub fn run(
         }
         let mut broken = None;
         let threads = [("localiser", localizing), ("laser", lasing), ("bus", busing)];
-        for (name, thread) in threads.into_iter().chain(lining.map(|thread| ("discrete lines", thread))) {
+        for (name, thread) in threads
+            .into_iter()
+            .chain(lining.map(|thread| ("discrete lines", thread)))
+            .chain(turning.map(|thread| ("gyro", thread)))
+        {
             let ended = thread.map(std::thread::ScopedJoinHandle::join);
             broken = match ended {
                 Ok(Ok(())) => broken,

@@ -10,9 +10,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use agv_controller::GyroChipError;
 use agv_core::geometry::Pose;
 use agv_core::maps::{Landmark, LandmarkKind};
-use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
+use agv_core::measurement::{EncoderSample, GyroSample, ReflectorObservation, Time};
 use agv_core::state::LaserHealth;
 use agv_host_sim::bus::{Bus, BusError, InProcessBus, InProcessNode};
 use agv_host_sim::link::service::Client;
@@ -20,7 +21,7 @@ use agv_host_sim::live::stream::record_stream;
 use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::run::{
-    BusState, Demonstration, FLASH, KeptPose, Options, Ports, RealTime, RunError, Running, Summary, run,
+    BusState, Demonstration, FLASH, GyroPort, KeptPose, Options, Ports, RealTime, RunError, Running, Summary, run,
 };
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options as SensorOptions};
 use agv_host_sim::simulate::scenario::Scenario;
@@ -154,6 +155,7 @@ fn start(
         store: folder.to_owned(),
         open_bus: Box::new(move || Ok(Box::new(bus.join()))),
         lines: None,
+        gyro: None,
         ports: Ports::Any,
         real_time: RealTime::default(),
         datagrams: Vec::new(),
@@ -397,4 +399,40 @@ fn where_it_was_last_decides_between_equals_only_if_it_fits() {
     let way = stands.between(&pose.unwrap_or_else(|| panic!("{remarks:?}")));
     assert!(way.x.hypot(way.y) < 0.05 && way.theta.abs() < 0.02, "{pose:?}");
     assert!(remarks.iter().any(|remark| remark.contains("two places look alike")), "{remarks:?}");
+}
+
+/// A gyro that turns at 0.125 rad/s from its tenth look on.
+struct SteadyGyro(u32);
+
+impl GyroPort for SteadyGyro {
+    fn poll(&mut self, now: Time) -> Result<Option<GyroSample>, GyroChipError> {
+        self.0 += 1;
+        match self.0 {
+            0..10 => Err(GyroChipError::Bus),
+            _ => Ok(self.0.is_multiple_of(10).then_some(GyroSample { time: now, rate: 0.125 })),
+        }
+    }
+}
+
+#[test]
+fn a_gyro_of_the_machine_is_heard_by_the_localiser() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("drive.agvlog");
+    let mut settings = settings_of_laser(1);
+    settings.parameters.gyro.is_fitted = true;
+    let path = log.clone();
+    let change = move |options: &mut Options| {
+        options.log = Some(path);
+        options.gyro = Some(Box::new(|_| Box::new(SteadyGyro(0))));
+    };
+    let (_, remarks) = start(folder.path(), &settings, change, |running| {
+        wait("poses", || running.poses() > 50);
+        wait("a sign of life of all threads", || running.have_all_run());
+    })
+    .unwrap();
+    let said: Vec<_> = remarks.iter().filter(|remark| remark.starts_with("gyro: ")).collect();
+    assert_eq!(said, ["gyro: it does not answer", "gyro: it tells its rate again"]);
+    let events = log::read_contents(&log, |_| ()).unwrap().recording.events;
+    let is_rate = |event: &&RecordedEvent| matches!(event, RecordedEvent::Gyro(sample) if sample.rate == 0.125);
+    assert!(events.iter().filter(is_rate).count() > 10);
 }

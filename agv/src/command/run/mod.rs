@@ -39,6 +39,10 @@ A configuration is a file like this; what is left out is as here, but for store 
   standstill = \"STANDSTILL\"
   reset = 6
   inverted = [\"reset\"]             # lines whose hardware inverts
+  [gyro]                            # none if absent; a BMI160 on i2c or spi
+  i2c = \"/dev/i2c-1\"
+  is_sdo_high = false               # true: its address is 69h, not 68h
+  # spi = \"/dev/spidev0.0\"
   [pose]
   unix = \"/run/agv/pose\"            # none if absent
   udp = [\"127.0.0.1:5355\"]          # none if absent
@@ -129,6 +133,7 @@ impl Run {
                 store: configuration.store.clone(),
                 open_bus: Box::new(move || bus::open(&name)),
                 lines: configuration.discrete.open()?,
+                gyro: configuration.gyro.open()?,
                 ports: Ports::Set(configuration.listen),
                 real_time: configuration.real_time,
                 datagrams: configuration.pose.udp.clone(),
