@@ -219,7 +219,7 @@ impl Running<'_> {
         self.begin.elapsed()
     }
 
-    /// Whether bus, laser and localiser have all run since this last said so.
+    /// Whether bus, laser and localiser have all run since this last said so, and lines and gyro where there are any.
     #[must_use]
     pub fn have_all_run(&self) -> bool {
         self.exchange.have_all_run()
