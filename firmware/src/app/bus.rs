@@ -2,12 +2,13 @@
 //!
 //! Deadline: a pose every 10 ms, and each sample predicted at most 200 us after its frame.
 
-use agv_controller::{Bus, BusOutput, ControllerIdentity, Troubles};
+use agv_controller::{Bus, BusOutput, ControllerIdentity, DiscreteLines, LineSet, Troubles};
 use agv_settings::Settings;
 use agv_settings::patient_flash::PatientFlash;
 use agv_wire::can::controller_node::ErrorKind;
 use embassy_futures::select::{Either, select};
 use embassy_time::{Duration, Ticker};
+use embedded_hal::digital::{InputPin, OutputPin};
 
 use super::can_port::{BusChange, CanPort};
 use super::exchange::{self, now};
@@ -21,11 +22,13 @@ const STEP: Duration = Duration::from_millis(1);
 pub async fn run<F: PatientFlash>(
     identity: ControllerIdentity,
     mut port: impl CanPort,
+    lines: LineSet<impl OutputPin, impl InputPin>,
     settings: &Settings,
     controller: &SharedController<F>,
     troubles: Troubles,
 ) -> ! {
     let mut bus = Bus::new(settings, identity, troubles, now());
+    let mut lines = DiscreteLines::new(lines);
     let mut nodes = bus.nodes();
     port.listen_to(&nodes, &bus.other_frames());
     let mut objects = SharedSettings { controller };
@@ -70,6 +73,11 @@ pub async fn run<F: PatientFlash>(
         bus.poll(now(), exchange::laser_health(), &mut take);
         if let Some(speed) = bus.laser_speed() {
             exchange::set_laser_speed(speed);
+        }
+        // Wires are no quicker than a step.
+        if let Either::Second(()) = woken {
+            let inputs = lines.poll(Some(&bus.discrete_report(now())), now());
+            bus.hear_lines(&inputs, now());
         }
         exchange::set_standing(bus.is_standing(now()));
         // A master may have others watched.

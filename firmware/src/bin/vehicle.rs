@@ -4,7 +4,7 @@
 
 use core::panic::PanicInfo;
 
-use agv_controller::{ControllerIdentity, Troubles, carried_map};
+use agv_controller::{ControllerIdentity, LineSet, Troubles, carried_map};
 use agv_core::localizer::{self, Parameters};
 use agv_core::maps::Landmark;
 use agv_firmware::app::announced_flash::AnnouncedFlash;
@@ -41,6 +41,7 @@ defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
 const CONNECTIONS: usize = 2;
 
 type Can = <Current as Board>::Can;
+type Lines = LineSet<<Current as Board>::Output, <Current as Board>::Input>;
 type Ethernet = <Current as Board>::Ethernet;
 type Flash = AnnouncedFlash<<Current as Board>::Flash>;
 type Capacities = <Current as Board>::Capacities;
@@ -101,12 +102,13 @@ struct Shared {
 #[embassy_executor::task]
 async fn bus_task(
     can: Can,
+    lines: Lines,
     settings: &'static Settings,
     controller: &'static SharedController<Flash>,
     identity: ControllerIdentity,
     troubles: Troubles,
 ) -> ! {
-    bus::run(identity, can, settings, controller, troubles).await
+    bus::run(identity, can, lines, settings, controller, troubles).await
 }
 
 #[embassy_executor::task]
@@ -262,7 +264,7 @@ fn read_flash(
 #[inline(never)]
 fn start() -> Vehicle {
     let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
+    let Parts { can, lines, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
     let failure = failure(restart_cause);
     let supervisor = Supervisor::start();
     let Kept { settings, controller, landmarks, contours, communication } = read_flash(flash, contour_flash, failure);
@@ -295,7 +297,8 @@ fn start() -> Vehicle {
         map: carried_map(landmarks),
         stored: communication,
     };
-    Current::bus_tasks().spawn(bus_task(can, settings, controller, identity, troubles).expect("the task runs once"));
+    Current::bus_tasks()
+        .spawn(bus_task(can, lines, settings, controller, identity, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks, log: queue };
     Current::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
     Vehicle { localization, revolutions, watchdog, supervisor }

@@ -24,10 +24,12 @@ pub use h723::Nucleo as Current;
 #[cfg(feature = "h743")]
 pub use h743::Nucleo as Current;
 
+use agv_controller::LineSet;
 use agv_core::localizer::Capacities;
 use agv_settings::patient_flash::PatientFlash;
 use embassy_executor::SendSpawner;
 use embassy_net_driver::Driver;
+use embedded_hal::digital::{InputPin, OutputPin};
 
 use crate::app::can_port::CanPort;
 
@@ -48,6 +50,10 @@ pub trait Board: Sized + 'static {
     type CanParts;
     /// The bus.
     type Can: CanPort + 'static;
+    /// A discrete line that it sets.
+    type Output: OutputPin + 'static;
+    /// A discrete line that it reads.
+    type Input: InputPin + 'static;
     /// The network.
     type Ethernet: Driver + 'static;
     /// Where settings are kept, and maps of contours: at least two pages.
@@ -88,6 +94,8 @@ pub trait Watchdog {
 pub struct Parts<B: Board> {
     /// The bus, which begins when its bit rate is known.
     pub can: B::CanParts,
+    /// The discrete lines, whose outputs are low.
+    pub lines: LineSet<B::Output, B::Input>,
     /// The network.
     pub ethernet: B::Ethernet,
     /// Where settings are kept.

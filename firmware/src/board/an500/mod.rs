@@ -5,6 +5,7 @@ pub mod host_file;
 pub mod interrupts;
 pub mod lan9118;
 pub mod log_file;
+pub mod no_lines;
 pub mod panic;
 mod registers;
 pub mod stopwatch;
@@ -14,6 +15,7 @@ pub mod watchdog;
 
 use core::ffi::CStr;
 
+use agv_controller::LineSet;
 use agv_core::localizer::LentCapacities;
 use defmt_semihosting as _;
 use embassy_executor::SendSpawner;
@@ -24,6 +26,7 @@ use super::{Board, Parts, RestartCause, Troubles, large};
 use flash::FileFlash;
 use interrupts::{BUS_TASKS, Interrupt, NETWORK_TASKS};
 use lan9118::Lan9118;
+use no_lines::NoPin;
 use uart::SlcanPort;
 use watchdog::ApbWatchdog;
 
@@ -41,6 +44,8 @@ impl Board for An500 {
     type Capacities = LentCapacities<'static>;
     type CanParts = SlcanPort;
     type Can = SlcanPort;
+    type Output = NoPin;
+    type Input = NoPin;
     type Ethernet = Lan9118;
     type Flash = FileFlash;
     type Watchdog = ApbWatchdog;
@@ -58,6 +63,7 @@ impl Board for An500 {
         interrupts::enable(&mut core.NVIC);
         Parts {
             can: SlcanPort,
+            lines: LineSet::NONE,
             ethernet,
             flash: FileFlash::open(SETTINGS),
             contour_flash: Some(FileFlash::open(CONTOURS)),

@@ -9,6 +9,7 @@ mod clocks;
 mod ethernet;
 mod faults;
 mod flash;
+mod lines;
 mod memory_protection;
 mod option_bytes;
 mod phy;
@@ -27,6 +28,7 @@ use core::mem::MaybeUninit;
 use agv_core::localizer::Capacities;
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_stm32::gpio::Input;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::peripherals::FDCAN1;
 use embassy_stm32::{Config, bind_interrupts, eth, interrupt};
@@ -36,6 +38,7 @@ use can::{CanParts, FdCanPort};
 use clocks::Source;
 use ethernet::{Ethernet, Queue, Wires};
 use flash::Pages;
+use lines::{LinePins, ShownOutput};
 use watchdog::IndependentWatchdog;
 
 /// What a chip has, and its board is called.
@@ -97,6 +100,8 @@ impl<C: Chip> Board for Nucleo<C> {
     type Capacities = C::Capacities;
     type CanParts = CanParts;
     type Can = FdCanPort;
+    type Output = ShownOutput;
+    type Input = Input<'static>;
     type Ethernet = Ethernet;
     type Flash = Pages<C>;
     type Watchdog = IndependentWatchdog;
@@ -124,6 +129,15 @@ impl<C: Chip> Board for Nucleo<C> {
             controller: peripherals.FDCAN1,
             pins: (peripherals.PD0, peripherals.PD1),
             clock_tolerance: source.tolerance(),
+        };
+        let lines = LinePins {
+            pose_valid: peripherals.PD15,
+            pose_valid_led: peripherals.PB0,
+            within_docking_limits: peripherals.PD14,
+            fault: peripherals.PA6,
+            fault_led: peripherals.PB14,
+            standstill: peripherals.PG9,
+            reset: peripherals.PG14,
         };
         // SAFETY: this function is called once, and nobody else knows the queue. All zero is what `PacketQueue::init` makes
         // of it, and a valid one.
@@ -153,7 +167,7 @@ impl<C: Chip> Board for Nucleo<C> {
             has_crystal: source.has_crystal(),
             are_options_right: option_bytes::are_right(),
         };
-        Parts { can, ethernet, flash, contour_flash, watchdog, restart_cause, troubles }
+        Parts { can, lines: lines.start(), ethernet, flash, contour_flash, watchdog, restart_cause, troubles }
     }
 
     fn contour_bytes(offset: u32, length: u32) -> Option<&'static [u8]> {
