@@ -2,22 +2,53 @@
 
 use core::hint::black_box;
 
-use agv_controller::{Bus as ControllerBus, ChangeableSettings, ControllerIdentity, Estimate, Troubles};
+use agv_controller::{
+    Bus as ControllerBus, ChangeableSettings, ControllerIdentity, DiscreteLines, Estimate, LineSet, Troubles,
+};
 use agv_core::localizer::PredictionState;
-use agv_core::measurement::Time;
+use agv_core::measurement::{GyroSample, Time};
 use agv_core::state::{LaserHealth, Relocalization};
 use agv_settings::Settings;
 use agv_wire::can::controller_node::ErrorKind;
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::slcan;
+use embedded_hal::digital::{ErrorKind as PinError, ErrorType, InputPin, OutputPin};
 
 use super::any;
+
+/// A pin that does anything.
+struct AnyPin;
+
+impl ErrorType for AnyPin {
+    type Error = PinError;
+}
+
+impl OutputPin for AnyPin {
+    fn set_low(&mut self) -> Result<(), PinError> {
+        any(Ok(()))
+    }
+
+    fn set_high(&mut self) -> Result<(), PinError> {
+        any(Ok(()))
+    }
+}
+
+impl InputPin for AnyPin {
+    fn is_high(&mut self) -> Result<bool, PinError> {
+        any(Ok(true))
+    }
+
+    fn is_low(&mut self) -> Result<bool, PinError> {
+        any(Ok(true))
+    }
+}
 
 /// What takes part in the bus.
 pub struct Bus {
     bus: ControllerBus,
     settings: Settings,
     slcan: slcan::Decoder,
+    lines: DiscreteLines<AnyPin, AnyPin>,
 }
 
 impl Bus {
@@ -28,6 +59,13 @@ impl Bus {
             bus: ControllerBus::new(&settings, any(ControllerIdentity::default()), troubles, any(Time::default())),
             settings,
             slcan: slcan::Decoder::new(),
+            lines: DiscreteLines::new(LineSet {
+                pose_valid: any(Some(AnyPin)),
+                within_docking_limits: any(Some(AnyPin)),
+                fault: any(Some(AnyPin)),
+                standstill: any(Some(AnyPin)),
+                reset: any(Some(AnyPin)),
+            }),
         }
     }
 
@@ -52,6 +90,10 @@ impl Bus {
         self.bus.poll(time, any(LaserHealth::Unknown), |output| {
             black_box(output);
         });
+        black_box(self.bus.hear_gyro(&GyroSample { time, rate: any(0.0) }));
+        let inputs = self.lines.poll(any(Some(self.bus.discrete_report(time))).as_ref(), any(time));
+        self.bus.hear_lines(&inputs, time);
+        black_box(self.lines.make_safe());
         black_box((self.bus.is_standing(time), self.bus.saved(any(true))));
         self.bus.report(any(ErrorKind::Overload), time);
         black_box((self.bus.nodes(), self.bus.other_frames()));
