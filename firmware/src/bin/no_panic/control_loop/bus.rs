@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use agv_controller::{
-    Bus as ControllerBus, ChangeableSettings, ControllerIdentity, DiscreteLines, Estimate, LineSet, Troubles,
+    Bus as ControllerBus, ChangeableSettings, ControllerIdentity, DiscreteLines, Estimate, GyroChip, LineSet, Troubles,
 };
 use agv_core::localizer::PredictionState;
 use agv_core::measurement::{GyroSample, Time};
@@ -13,6 +13,7 @@ use agv_wire::can::controller_node::ErrorKind;
 use agv_wire::can::frame::{Frame, extended_id, standard_id};
 use agv_wire::can::slcan;
 use embedded_hal::digital::{ErrorKind as PinError, ErrorType, InputPin, OutputPin};
+use embedded_hal::i2c;
 
 use super::any;
 
@@ -40,6 +41,24 @@ impl InputPin for AnyPin {
 
     fn is_low(&mut self) -> Result<bool, PinError> {
         any(Ok(true))
+    }
+}
+
+/// Wires of I2C on which anything is read.
+struct AnyWires;
+
+impl i2c::ErrorType for AnyWires {
+    type Error = i2c::ErrorKind;
+}
+
+impl i2c::I2c for AnyWires {
+    fn transaction(&mut self, _: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), i2c::ErrorKind> {
+        for operation in operations {
+            if let i2c::Operation::Read(bytes) = operation {
+                bytes.fill_with(|| any(0));
+            }
+        }
+        any(Ok(()))
     }
 }
 
@@ -90,7 +109,9 @@ impl Bus {
         self.bus.poll(time, any(LaserHealth::Unknown), |output| {
             black_box(output);
         });
-        black_box(self.bus.hear_gyro(&GyroSample { time, rate: any(0.0) }));
+        let mut gyro = GyroChip::on_i2c(AnyWires, any(false), &self.settings);
+        let sample = black_box(&mut gyro).poll(time).ok().flatten().unwrap_or(GyroSample { time, rate: any(0.0) });
+        black_box(self.bus.hear_gyro(&sample));
         let inputs = self.lines.poll(any(Some(self.bus.discrete_report(time))).as_ref(), any(time));
         self.bus.hear_lines(&inputs, time);
         black_box(self.lines.make_safe());
