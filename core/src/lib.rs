@@ -65,7 +65,7 @@
 //! | 4 | [`calibration`], [`contours`], [`filter`], [`relocalization`], [`state`] |
 //! | 3 | [`maps`], [`odometry`], [`sensing`] |
 //! | 2 | [`measurement`] |
-//! | 1 | [`geometry`], [`order`] |
+//! | 1 | [`arrays`], [`geometry`], [`order`] |
 //!
 //! Frames: W world, R robot (logical point: the projection of the driving wheel's centre on the rear axle), S sensor.
 //! Units: SI and radians. Poses and covariances are f64, scans and features f32.
@@ -74,6 +74,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod arrays;
 pub mod calibration;
 pub mod contours;
 pub mod filter;

@@ -55,6 +55,7 @@ mod start_finder;
 mod start_search;
 mod start_watch;
 mod state_slots;
+mod stored_state;
 mod support;
 mod surface_check;
 mod surroundings;

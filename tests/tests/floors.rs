@@ -40,7 +40,7 @@ const HOUSES: [House; 8] = [
     House {
         folder: "core",
         floors: &[
-            &["geometry", "order"],
+            &["arrays", "geometry", "order"],
             &["measurement"],
             &["maps", "odometry", "sensing"],
             &["calibration", "contours", "filter", "relocalization", "state"],

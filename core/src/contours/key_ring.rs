@@ -1,12 +1,13 @@
 //! The last key scans, each as points in the frame of its own laser.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use super::{PackedPoint, SurfacePoint};
 use crate::geometry::{Pose, difference};
 
 /// A scan of the distance behind.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct KeyScan<const POINTS: usize> {
     /// Pose of the laser.
     pub pose: Pose,
@@ -27,7 +28,7 @@ const SPACING: f64 = 0.4;
 const TURN: f64 = 20.0 * core::f64::consts::PI / 180.0;
 
 /// The last `KEYS` key scans of at most `POINTS` points.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct KeyRing<const KEYS: usize, const POINTS: usize> {
     keys: Vec<KeyScan<POINTS>, KEYS>,
     /// Number of key scans that were made.

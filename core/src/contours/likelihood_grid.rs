@@ -1,6 +1,7 @@
 //! How near surfaces are, in two bits for each cell of a square: what the search looks up.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::ScanPoint;
 
@@ -23,7 +24,7 @@ const NOTHING: [u8; 1024] = [0; 1024];
 const STAMP: [[u8; 5]; 5] = [[0, 1, 1, 1, 0], [1, 1, 2, 1, 1], [1, 2, 3, 2, 1], [1, 1, 2, 1, 1], [0, 1, 1, 1, 0]];
 
 /// A grid around the origin of its frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LikelihoodGrid {
     /// Nothing before the grid is cleared for the first time: what would be built here would be built on the stack.
     cells: Vec<u8, BYTES>,

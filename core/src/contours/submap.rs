@@ -1,6 +1,7 @@
 //! The surfaces around a place: points looked up by cell, and a grid for the search.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use super::likelihood_grid::HALF;
 use super::{KeyRing, LikelihoodGrid, PackedPoint, SurfacePoint};
@@ -22,20 +23,28 @@ const SAME: f32 = 0.025;
 const NONE: u16 = u16::MAX;
 
 /// A point and the next one of its cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Entry {
     point: PackedPoint,
     next: u16,
 }
 
+/// The number of the first point of each cell of a row.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Row(#[serde(with = "crate::arrays")] [u16; SIDE]);
+
+impl Row {
+    const EMPTY: Self = Self([NONE; SIDE]);
+}
+
 /// At most `ROOM` points within 16 m of a place along each axis.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Submap<const ROOM: usize> {
     /// Where its frame is.
     origin: Pose,
     entries: Vec<Entry, ROOM>,
     /// Nothing before the submap is begun for the first time: what would be built here would be built on the stack.
-    first: Vec<[u16; SIDE], SIDE>,
+    first: Vec<Row, SIDE>,
     grid: LikelihoodGrid,
     /// The points from this number on lie over the others: they count where none of those is near.
     overlay: usize,
@@ -65,9 +74,9 @@ impl<const ROOM: usize> Submap<ROOM> {
     pub fn begin(&mut self, place: &Pose) {
         self.origin = Pose { theta: 0.0, ..*place };
         self.entries.clear();
-        self.first.fill([NONE; SIDE]);
+        self.first.fill(Row::EMPTY);
         // As many as there is room for.
-        let _ = self.first.resize(SIDE, [NONE; SIDE]);
+        let _ = self.first.resize(SIDE, Row::EMPTY);
         self.grid.clear();
         (self.overlay, self.room) = (ROOM, ROOM);
         self.has_cut = false;
@@ -188,7 +197,7 @@ impl<const ROOM: usize> Submap<ROOM> {
         let (low, high) = (Self::column(point.position.x - reach), Self::column(point.position.x + reach));
         let (bottom, top) = (Self::column(point.position.y - reach), Self::column(point.position.y + reach));
         for row in self.first.get(bottom..=top)? {
-            for first in row.get(low..=high)? {
+            for first in row.0.get(low..=high)? {
                 let mut number = *first;
                 // A chain is no longer than there are points.
                 for _ in 0..ROOM {
@@ -213,7 +222,7 @@ impl<const ROOM: usize> Submap<ROOM> {
     }
 
     fn first_mut(&mut self, position: &ScanPoint) -> Option<&mut u16> {
-        self.first.get_mut(Self::column(position.y))?.get_mut(Self::column(position.x))
+        self.first.get_mut(Self::column(position.y))?.0.get_mut(Self::column(position.x))
     }
 }
 

@@ -1,5 +1,7 @@
 //! A point of a surface with the direction in which the surface faces, as it is computed with and as it is kept.
 
+use serde::{Deserialize, Serialize};
+
 use crate::geometry::{ScanPoint, Transform};
 
 /// A point of a surface.
@@ -40,7 +42,7 @@ const UNIT: f32 = 127.0;
 const ALIKE: i32 = 13_677;
 
 /// A point in 6 bytes: millimetres, and a normal to half a degree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PackedPoint {
     x: i16,
     y: i16,

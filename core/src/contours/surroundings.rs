@@ -3,12 +3,14 @@
 //! Over the map lies what has been seen of late where it has nothing: things that were moved, or that nobody has mapped. It is learnt in key
 //! scans, and forgotten with them; the map stays as it is.
 
+use serde::{Deserialize, Serialize};
+
 use super::matcher::settle;
 use super::{ContourMatch, KeptMap, KeyRing, LARGEST_REACH, Prediction, Submap, SurfacePoint, TILE, Tile, align};
 use crate::geometry::{Pose, Transform};
 
 /// What is around the vehicle of a map that is larger, in a submap with room for `ROOM` points.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Surroundings<const ROOM: usize = 6144> {
     submap: Submap<ROOM>,
     place: Option<(i16, i16)>,
@@ -95,7 +97,7 @@ impl<const ROOM: usize> Surroundings<ROOM> {
             return;
         }
         keys.keep(pose, deviation, unmapped());
-        self.learnt += 1;
+        self.learnt = self.learnt.saturating_add(1);
         if self.learnt >= KEYS {
             // What has been forgotten is to go.
             self.load_anew();

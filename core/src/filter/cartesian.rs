@@ -1,12 +1,13 @@
 //! Position of a landmark.
 
 use nalgebra::Matrix2;
+use serde::{Deserialize, Serialize};
 
 use super::viewpoint::{Believed, Model, Viewpoint, left};
 use crate::geometry::Point;
 
 /// Position of a landmark in S.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cartesian {
     /// Position, m.
     pub position: Point,

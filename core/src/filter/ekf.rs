@@ -7,11 +7,12 @@
 //! Mourikis and Roumeliotis, "Observability-based rules for designing consistent EKF SLAM estimators", IJRR 2010).
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::biases::{BiasModel, SCALE, STEERING, YAW};
 use super::cholesky::Root;
 use super::positive_semidefinite::make_positive_semidefinite;
-use super::slots::{PastPose, PoseOnly, Slots, StateLandmark, Storage, pose_state, slot_states};
+use super::slots::{PastPose, PoseOnly, Slots, StateLandmark, Storage, pose_state, slot_states, storage};
 use super::viewpoint::{Believed, Viewpoint};
 use super::{Linearisation, Observation, PackedCovariance};
 use crate::geometry::{Point, Pose, larger_axis, wrap};
@@ -19,13 +20,18 @@ use crate::measurement::LaserId;
 use crate::odometry::{BiasJacobian, Motion, OdometryBias};
 
 /// The extended Kalman filter (K 5.3) with room for `S` beside the pose.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Ekf<S: Slots = PoseOnly> {
     /// Pose of R in W (K 5.1).
     pub pose: Pose,
+    #[serde(with = "storage")]
     pub(super) anchor: S::Anchor,
+    #[serde(with = "storage")]
     pub(super) biases: S::Biases,
+    #[serde(with = "storage")]
     pub(super) poses: S::PerPose<Option<PastPose>>,
+    #[serde(with = "storage")]
     pub(super) landmarks: S::PerLandmark<Option<StateLandmark>>,
     pub(super) covariance: PackedCovariance<S>,
 }

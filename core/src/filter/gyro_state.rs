@@ -6,13 +6,14 @@
 //! not observed themselves. A vehicle without a gyro has no such states, and its filter is as it was.
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Pose, difference};
 use crate::measurement::Time;
 use crate::odometry::{GyroErrors, GyroParameters, GyroTurn, Motion};
 
 /// A pose, and its covariance in W: x, y, heading.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct KnownPose {
     /// Pose of R in W.
     pub pose: Pose,
@@ -34,7 +35,7 @@ impl KnownPose {
 }
 
 /// Bias and scale, their covariance, and that with the pose of now.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct GyroState {
     errors: GyroErrors,
     own: Matrix2<f64>,

@@ -27,6 +27,7 @@ pub use packed_covariance::PackedCovariance;
 pub use pose_observation::PoseObservation;
 pub use range_bearing::RangeBearing;
 pub use relative_pose::RelativePose;
+pub(crate) use slots::storage;
 pub use slots::{Empty, PoseAndSlots, PoseOnly, Slots, Storage, packed_entries, slot_states};
 pub use timeline::{Correction, Timeline, TimelineError};
 pub use viewpoint::Viewpoint;

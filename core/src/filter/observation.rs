@@ -1,11 +1,13 @@
 //! What a landmark looks like from the vehicle.
 
+use serde::{Deserialize, Serialize};
+
 use super::viewpoint::{Believed, Model, Viewpoint};
 use super::{Cartesian, RangeBearing};
 use crate::geometry::{Point, Pose};
 
 /// One landmark, seen from S.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Observation {
     /// Distance and direction (K 5.14).
     RangeBearing(RangeBearing),

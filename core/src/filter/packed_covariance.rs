@@ -1,13 +1,16 @@
 //! A covariance of many states, of which the lower triangle is kept.
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use super::Linearisation;
-use super::slots::{PoseOnly, Slots, Storage};
+use super::slots::{PoseOnly, Slots, Storage, storage};
 
 /// The covariance of all states of a filter with room for `S`, row by row up to the diagonal.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct PackedCovariance<S: Slots> {
+    #[serde(with = "storage")]
     entries: S::Covariance,
 }
 

@@ -1,13 +1,14 @@
 //! A pose that is told as a whole, as by surfaces that a scan is laid onto.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::cholesky::Root;
 use super::{Ekf, Linearisation, Slots};
 use crate::geometry::{Pose, difference};
 
 /// A pose of R in W as somebody has seen it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseObservation {
     /// The pose.
     pub pose: Pose,

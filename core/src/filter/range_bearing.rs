@@ -1,6 +1,7 @@
 //! Distance and direction of a landmark.
 
 use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
 
 use super::Cartesian;
 use super::viewpoint::{Believed, Model, Viewpoint};
@@ -10,7 +11,7 @@ use crate::geometry::{Point, difference};
 const NEAREST: f64 = 1e-3;
 
 /// Distance and direction of a landmark from S.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RangeBearing {
     /// Distance, m.
     pub range: f64,

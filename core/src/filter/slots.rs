@@ -3,7 +3,9 @@
 use core::fmt::Debug;
 
 use nalgebra::{ArrayStorage, SVector};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::arrays;
 use crate::geometry::{Point, Pose};
 
 /// A value with which memory begins.
@@ -28,6 +30,14 @@ impl<const SIZE: usize> Empty for SVector<f64, SIZE> {
 pub trait Storage<T>: Clone + Debug + AsRef<[T]> + AsMut<[T]> {
     /// Memory in which nothing is yet.
     fn empty() -> Self;
+
+    /// Memory as it was serialized.
+    ///
+    /// # Errors
+    /// Those of the deserializer, and one where there is another number of values.
+    fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error>
+    where
+        T: Deserialize<'de>;
 }
 
 impl<T: Empty, const SIZE: usize> Storage<T> for [T; SIZE] {
@@ -35,10 +45,32 @@ impl<T: Empty, const SIZE: usize> Storage<T> for [T; SIZE] {
     fn empty() -> Self {
         [const { T::EMPTY }; SIZE]
     }
+
+    fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error>
+    where
+        T: Deserialize<'de>,
+    {
+        arrays::deserialize(deserializer)
+    }
+}
+
+/// [`Storage`] as a field that is serialized.
+pub(crate) mod storage {
+    use super::{Deserialize, Deserializer, Serialize, Serializer, Storage, arrays};
+
+    pub fn serialize<T: Serialize, S: Serializer>(values: &impl Storage<T>, serializer: S) -> Result<S::Ok, S::Error> {
+        arrays::serialize(values, serializer)
+    }
+
+    pub fn deserialize<'de, T: Deserialize<'de>, A: Storage<T>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<A, D::Error> {
+        A::deserialize(deserializer)
+    }
 }
 
 /// A pose that was copied when it was the present one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PastPose {
     /// Pose of R in W.
     pub pose: Pose,
@@ -47,7 +79,7 @@ pub struct PastPose {
 }
 
 /// A landmark in the state.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StateLandmark {
     /// Position in W, m.
     pub position: Point,

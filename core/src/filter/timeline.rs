@@ -11,6 +11,7 @@
 //! 1 m/s^2 that is less than 0.03 mm, by which the order of measurements counts at such rates.
 
 use heapless::Deque;
+use serde::{Deserialize, Serialize};
 
 use super::{Ekf, Landmark, Observation, PoseObservation};
 use crate::geometry::{Point, Pose};
@@ -21,7 +22,7 @@ use crate::odometry::{Coasting, MeanMotion, Motion, UnknownAcceleration};
 const LONGEST_JOINED: u64 = 14_000;
 
 /// An observation that was taken for one landmark.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correction {
     /// What was seen.
     pub observation: Observation,
@@ -42,7 +43,7 @@ pub enum TimelineError {
     TooEarly,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Entry {
     motion: Motion,
     fusion: Fusion,
@@ -50,7 +51,7 @@ struct Entry {
 }
 
 /// What happened at the end of a motion.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 enum Fusion {
     Nothing,
     Correction(Correction),
@@ -98,7 +99,7 @@ impl Correction {
 }
 
 /// The last `ENTRIES` motions and corrections.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Timeline<const ENTRIES: usize> {
     entries: Deque<Entry, ENTRIES>,
     /// How many entries, from the oldest, have a state that is up to date; at least one.

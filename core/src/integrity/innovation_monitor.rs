@@ -32,7 +32,7 @@ impl Default for InnovationMonitorParameters {
 }
 
 /// Evidence of the last scans, with exponential forgetting.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct InnovationMonitor {
     parameters: InnovationMonitorParameters,
     expected: f64,

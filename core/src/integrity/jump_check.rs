@@ -1,6 +1,7 @@
 //! Whether the laser was knocked: landmarks put the pose right by more than the odometry can be wrong by.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use crate::filter::Ekf;
 use crate::geometry::Pose;
@@ -33,7 +34,7 @@ impl Estimate {
 }
 
 /// The last revolution that has corrected the pose.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Corrected {
     odometry_pose: Pose,
     /// Whether the pose was known so well that what corrects it later says something of the distance since.
@@ -85,7 +86,7 @@ pub struct Jump {
 }
 
 /// Remembers what the last correction left.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct JumpCheck {
     corrected: Option<Corrected>,
 }

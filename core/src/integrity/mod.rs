@@ -27,6 +27,8 @@ mod surface_check;
 mod traction_check;
 mod turn_check;
 
+use serde::{Deserialize, Serialize};
+
 pub use alert_limits::{Alarm, AlertLimit, AlertLimits};
 pub use innovation_monitor::{InnovationMonitor, InnovationMonitorParameters};
 pub use jump_check::{Estimate, Jump, JumpCheck, is_sure};
@@ -45,7 +47,7 @@ pub use crate::state::ProtectionLevel;
 use crate::state::{LandmarkSource, LandmarkUse};
 
 /// All checks of one vehicle.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Integrity {
     /// What observations say of the pose.
     pub innovations: InnovationMonitor,

@@ -4,11 +4,13 @@
 //! wrong by whatever. So the bound is wider from the first revolution on that has lost sight of the landmarks before it, if surfaces are
 //! elsewhere as well, or if what is seen instead is none of the map.
 
+use serde::{Deserialize, Serialize};
+
 /// Landmarks of the map that end it, in a revolution that has not lost sight of those before it.
 const ENDING: usize = 2;
 
 /// What was found in the last revolution, and in those before it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct MotionDoubt {
     has_lost_sight: bool,
     do_all_fit: bool,

@@ -7,6 +7,7 @@
 //! side = yaw distance + lever turn, along = scale distance + lever turn, heading = bend distance + gain turn.
 
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
 
@@ -36,7 +37,7 @@ const BEND: f64 = 0.01;
 const BEND_LAG: f64 = 0.5;
 
 /// Which of the two is wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Suspect {
     /// The odometry: its scale or its steering.
     Odometry,
@@ -45,7 +46,7 @@ pub enum Suspect {
 }
 
 /// Sums over the corrections, with exponential forgetting.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MountingCheck {
     /// Of the distance, of both, of the turn.
     information: [f64; 3],

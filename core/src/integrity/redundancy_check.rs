@@ -4,6 +4,8 @@
 //! which is not more than that stated, and what lasts of the errors of wheels and steering. More than that is a wheel that slips. The sum has a sign, so that what wanders to and
 //! fro is not taken for what goes one way.
 
+use serde::{Deserialize, Serialize};
+
 use crate::measurement::Time;
 use crate::odometry::Motion;
 
@@ -22,7 +24,7 @@ const LEAST_SHARE: f64 = 0.5;
 const TOLD_FOR: f64 = 1.0;
 
 /// What was summed since a place.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Window {
     slip: f64,
     way: f64,
@@ -44,7 +46,7 @@ pub struct WheelErrors {
 }
 
 /// The sums, and until when a slip is told.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RedundancyCheck {
     windows: [Window; WINDOWS],
     /// The window that begins next, and the way since the last one began, m.
@@ -74,7 +76,7 @@ impl RedundancyCheck {
             if let Some(oldest) = self.windows.get_mut(self.next) {
                 *oldest = Window::EMPTY;
             }
-            (self.next, self.since) = ((self.next + 1) % WINDOWS, 0.0);
+            (self.next, self.since) = (self.next.wrapping_add(1) % WINDOWS, 0.0);
         }
         self.since += motion.distance;
         let variance = self.learn(motion.distance, slip, errors.slip * errors.slip);

@@ -8,6 +8,7 @@
 //! No map is needed, so that a wrong place that looks right does not hide it.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Point, Pose, ScanPoint};
 use crate::measurement::{Scan, Time};
@@ -45,7 +46,7 @@ const MANY: u8 = 7;
 /// Fewer of which none is seen again are nothing unusual.
 const SEVERAL: u8 = 4;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Remembered {
     position: ScanPoint,
     /// Revolutions since it was seen.
@@ -67,7 +68,7 @@ impl Remembered {
 }
 
 /// The memory, and how often it was contradicted.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SlipCheck {
     remembered: Vec<Remembered, REMEMBERED>,
     last: Time,

@@ -6,6 +6,7 @@
 //! what moves there is not told.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Point, Pose, ScanPoint};
 use crate::measurement::{Scan, Time};
@@ -31,7 +32,7 @@ const IN_A_ROW: u8 = 2;
 const PARTS: usize = 8;
 
 /// The points of an earlier scan, and how often they were contradicted.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SurfaceCheck {
     points: Vec<ScanPoint, POINTS>,
     last: Time,

@@ -6,6 +6,7 @@
 //! one sign, and a share of the way that no calibration leaves is slip.
 
 use heapless::Deque;
+use serde::{Deserialize, Serialize};
 
 use super::Estimate;
 use crate::measurement::Time;
@@ -31,7 +32,7 @@ const LONGEST_SLIP: f64 = 3.0;
 pub const LEAST: usize = 2;
 
 /// What was put right on a part of the way: m and rad, and their variances.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Part {
     way: f64,
     along: f64,
@@ -69,7 +70,7 @@ impl Part {
 }
 
 /// The last parts of the way, and until when a slip is told.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TractionCheck {
     parts: Deque<Part, PARTS>,
     /// Since when and until when a slip is told.

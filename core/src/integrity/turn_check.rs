@@ -4,6 +4,8 @@
 //! lasts of their errors. More than that is slip of a wheel, if the gyro is not found to be wrong by itself: one that tells the same
 //! number again and again, is at the end of its range, is silent, or tells another bias at rest.
 
+use serde::{Deserialize, Serialize};
+
 use crate::measurement::{GyroSample, Time};
 use crate::odometry::Motion;
 
@@ -24,7 +26,7 @@ const MISSING_AFTER: f64 = 0.11;
 const CLOCK: f64 = 0.01;
 
 /// What is wrong with a gyro.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum GyroFault {
     /// Nothing is heard.
     Missing,
@@ -50,7 +52,7 @@ pub struct LastingErrors {
 }
 
 /// Differences since a time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Window {
     difference: f64,
     variance: f64,
@@ -89,7 +91,7 @@ impl Window {
 }
 
 /// The sums, and what was found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TurnCheck {
     windows: [Window; 2],
     rate: f64,

@@ -1,5 +1,7 @@
 //! What the sightings of one event say of the pose.
 
+use serde::{Deserialize, Serialize};
+
 use super::{LandmarkUse, Outputs, Reason};
 use crate::integrity::InnovationMonitor;
 use crate::maps::{LandmarkKind, Verdict};
@@ -7,7 +9,7 @@ use crate::sources::{Outcome, Sighting, Source};
 use crate::state::LandmarkSource;
 
 /// Distance since something last happened, m.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct DistanceSince {
     pub reflector: f64,
     pub feature: f64,

@@ -1,6 +1,6 @@
 //! A localiser of any capacities.
 
-use super::{Event, Outputs, PredictionState};
+use super::{Event, Outputs, PredictionState, StateError};
 use crate::maps::MapView;
 use crate::sources::{FindContours, FindPlaces};
 
@@ -30,6 +30,12 @@ pub trait Localize {
 
     /// See [`super::Localizer::for_search`].
     fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, Self::Contours>);
+
+    /// See [`super::Localizer::save_state`].
+    ///
+    /// # Errors
+    /// If the room is too small.
+    fn save_state(&self, room: &mut [u8]) -> Result<usize, StateError>;
 }
 
 impl<L: Localize> Localize for &mut L {
@@ -57,5 +63,9 @@ impl<L: Localize> Localize for &mut L {
 
     fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, L::Contours>) {
         (**self).for_search()
+    }
+
+    fn save_state(&self, room: &mut [u8]) -> Result<usize, StateError> {
+        (**self).save_state(room)
     }
 }

@@ -10,7 +10,7 @@ use super::supervisor::{Support, remark_on_motion, supervise};
 use super::travel::Outage;
 use super::{
     Capacities, ContourCapacities, ContourSearch, Event, Localize, Misuse, Mode, Outputs, Parameters, PoseOutput,
-    PredictionState, Reason, StatedCapacities,
+    PredictionState, Reason, StateError, StatedCapacities,
 };
 use crate::filter::Timeline;
 use crate::geometry::{Point, Pose};
@@ -529,6 +529,10 @@ impl<C: Capacities> Localize for Localizer<C> {
 
     fn for_search(&mut self) -> (MapView<'_>, ContourSearch<'_, C::Contours>) {
         self.for_search()
+    }
+
+    fn save_state(&self, room: &mut [u8]) -> Result<usize, StateError> {
+        self.save_state(room)
     }
 }
 

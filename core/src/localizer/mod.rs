@@ -26,6 +26,7 @@ mod start_finder;
 mod start_odometry;
 mod start_search;
 mod start_watch;
+mod stored_state;
 mod supervisor;
 mod travel;
 
@@ -47,6 +48,7 @@ pub use prediction_state::PredictionState;
 pub use start_confirmation::StartRule;
 pub use start_finder::{StartFinder, StartState};
 pub use start_search::{CONTOUR_EFFORT_A_REVOLUTION, CONTOUR_SLICE, EFFORT_A_REVOLUTION, StartSearch};
+pub use stored_state::{STATE_VERSION, StateError};
 
 pub use crate::measurement::PoseFix;
 pub use crate::sources::{

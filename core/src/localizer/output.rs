@@ -1,13 +1,14 @@
 //! What the localiser says.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 pub use crate::sources::OBSERVATIONS;
 use crate::sources::Statuses;
 use crate::state::{LandmarkUse, PoseOutput};
 
 /// Why an event was not used, or not as it stands: a fault of whoever feeds the localiser, not of the vehicle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Misuse {
     /// The vehicle, as the parameters describe it, does not send such samples of its odometry.
     WrongVehicle,
@@ -22,7 +23,7 @@ pub enum Misuse {
 }
 
 /// Everything that one event gave.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outputs {
     /// The pose after the event.
     pub pose: PoseOutput,

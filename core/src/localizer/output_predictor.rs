@@ -6,6 +6,7 @@
 
 use heapless::Vec;
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use super::{Parameters, PredictionState};
 use crate::filter::Ekf;
@@ -23,7 +24,7 @@ const LONGEST_BUSY: f64 = 0.25;
 /// Carries the localiser's last pose on to the newest encoder sample. Remembers all motion since, in `MOTIONS` parts: if
 /// there are more samples, neighbours become one, and a pose of the localiser that falls between them is met as if the
 /// vehicle had kept its velocity for that time.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct OutputPredictor<const MOTIONS: usize = 40> {
     odometer: VehicleOdometer,
     lever: Option<f64>,

@@ -1,10 +1,12 @@
 //! What carries a pose on, beside the pose.
 
+use serde::{Deserialize, Serialize};
+
 use crate::odometry::{GyroErrors, OdometryBias};
 use crate::state::LevelGrowth;
 
 /// What the localiser has learnt of the motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PredictionState {
     /// Lasting errors of the odometry, which are taken from its motions.
     pub bias: OdometryBias,

@@ -4,6 +4,8 @@
 //! by the odometry. Landmarks that are given beforehand enter the state when they are seen, with the variance that the map
 //! states, so that seeing one often does not make its place certain.
 
+use serde::{Deserialize, Serialize};
+
 use super::Parameters;
 use crate::filter::{BiasModel, Ekf, Slots, Timeline};
 use crate::geometry::{Point, Pose, difference};
@@ -14,7 +16,8 @@ use crate::sensing::PointView;
 use crate::sources::{Believed, Comparison, KeyScans, LandmarkSlots, Sighting, SlamParameters, SourceStatus};
 
 /// The map in the state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub(super) struct Slam<S: Slots> {
     filter: Ekf<S>,
     slots: LandmarkSlots<S>,

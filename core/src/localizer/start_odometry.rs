@@ -1,5 +1,7 @@
 //! How a vehicle has moved that does not know where it is: what it has seen is carried along, as long as the odometry may be believed.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Event, Parameters};
 use crate::geometry::{Point, Pose};
 use crate::measurement::{ReflectorObservation, Time};
@@ -31,7 +33,7 @@ pub(super) enum Sight {
 }
 
 /// The motion since the vehicle began to look around.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct StartOdometry {
     odometer: VehicleOdometer,
     recent: RecentMotion,

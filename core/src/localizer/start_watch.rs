@@ -3,6 +3,8 @@
 //! A laser that is knocked then gives afterwards what a vehicle in order gives that stands elsewhere. Only at that moment do reflectors and
 //! surfaces around it show it.
 
+use serde::{Deserialize, Serialize};
+
 use super::start_odometry::{Moved, Sight, StartOdometry};
 use super::{Event, Parameters};
 use crate::geometry::Pose;
@@ -10,7 +12,7 @@ use crate::integrity::Integrity;
 use crate::measurement::{Reflectors, Scan};
 
 /// The motion before the first pose, and what has contradicted it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct StartWatch {
     odometry: StartOdometry,
     is_contradicted: bool,

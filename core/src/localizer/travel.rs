@@ -1,5 +1,7 @@
 //! What the odometry says of the motion, and how the vehicle goes on where it says nothing.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Capacities, Localizer, Misuse, Parameters, Reason};
 use crate::filter::{KnownPose, Timeline};
 use crate::integrity::WheelErrors;
@@ -8,7 +10,7 @@ use crate::measurement::{EncoderFaults, Time};
 use crate::odometry::{Coasting, Motion, OdometryError, UnknownAcceleration};
 
 /// The odometry is not believed, or not heard.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Outage {
     pub reason: Reason,
     pub coasting: Coasting,

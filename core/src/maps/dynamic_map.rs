@@ -31,7 +31,7 @@ impl Default for DynamicMapParameters {
 }
 
 /// A landmark of the dynamic map.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DynamicLandmark {
     /// Name, not used again before 65,536 others.
     pub id: u16,
@@ -45,7 +45,7 @@ pub struct DynamicLandmark {
 }
 
 /// Up to `LANDMARKS` landmarks, updated by Algorithm 1 of K.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DynamicMap<const LANDMARKS: usize> {
     parameters: DynamicMapParameters,
     landmarks: Vec<DynamicLandmark, LANDMARKS>,

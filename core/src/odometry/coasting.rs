@@ -1,5 +1,7 @@
 //! The motion of a vehicle whose odometry is not believed, or has not reported yet.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Motion, OdometryNoise, Vehicle};
 use crate::measurement::Time;
 
@@ -7,7 +9,7 @@ use crate::measurement::Time;
 const LONGEST: f64 = 1e3;
 
 /// Standard deviations of the accelerations that nobody measures.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnknownAcceleration {
     /// Forward, m/s^2.
     pub along: f64,
@@ -31,7 +33,7 @@ impl UnknownAcceleration {
 /// An unknown constant acceleration `a` gives the velocity an error of `a t` after `t` seconds. From `c` on, when the pose was known
 /// last, until `t` it gives the distance an error of `a (t^2 - c^2) / 2`, and an unknown angular acceleration the heading likewise.
 /// That is one error: its deviation grows, not its variance.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Coasting {
     /// The motion whose mean velocity is kept.
     believed: Motion,

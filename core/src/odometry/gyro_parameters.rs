@@ -42,7 +42,7 @@ impl Default for GyroParameters {
 }
 
 /// Lasting errors of a gyro: the true rate is the told one without the bias, and that share more.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GyroErrors {
     /// What it tells of a vehicle that stands, rad/s.
     pub bias: f64,

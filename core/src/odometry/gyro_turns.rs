@@ -1,6 +1,7 @@
 //! Rates of a gyro into the turn of each motion.
 
 use heapless::Deque;
+use serde::{Deserialize, Serialize};
 
 use super::{GyroErrors, GyroParameters, Motion};
 use crate::geometry::Pose;
@@ -44,7 +45,7 @@ pub enum GyroRefusal {
 
 /// Integrates rates. Behind the last sample its rate is held; what was held wrongly is made up for by the next motion, so that the
 /// sum of all turns is the integral.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GyroTurns {
     parameters: GyroParameters,
     /// Times and angles, rad.

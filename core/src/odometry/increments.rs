@@ -2,11 +2,13 @@
 
 use core::f64::consts::PI;
 
+use serde::{Deserialize, Serialize};
+
 use super::kinematics::{Believed, Kinematics, Step};
 use crate::measurement::{PoseIncrement, Time};
 
 /// It reports the displacement since the report before.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Increments;
 
 impl Kinematics for Increments {

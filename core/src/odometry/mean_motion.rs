@@ -3,6 +3,7 @@
 //! One report holds a tick more or less, and a time that is a little off: at a thousand reports a second its velocity is hardly known.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::{Coasting, Motion};
 use crate::geometry::{Pose, Twist};
@@ -12,7 +13,7 @@ use crate::measurement::Time;
 const SPAN: f64 = Coasting::SPAN;
 
 /// Body velocities of so much time, added in R.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Part {
     moved: Vector3<f64>,
     covariance: Matrix3<f64>,
@@ -39,7 +40,7 @@ impl Part {
 }
 
 /// The mean over the motions of the last twentieth to seventh of a second.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct MeanMotion {
     older: Part,
     newer: Part,

@@ -1,12 +1,13 @@
 //! A displacement with its uncertainty.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
 use crate::measurement::Time;
 
 /// How R moved in an interval, in R at the start of the interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// Start of the interval.
     pub start: Time,

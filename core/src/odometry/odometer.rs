@@ -1,5 +1,7 @@
 //! From reports to motions.
 
+use serde::{Deserialize, Serialize};
+
 use super::kinematics::Believed;
 use super::{Increments, Integration, Kinematics, Motion, OdometryNoise, Vehicle, WheelBased, WheelSet};
 use crate::measurement::{EncoderSample, PoseIncrement, SpeedSample, Time, WheelSample};
@@ -20,7 +22,7 @@ pub enum OdometryError {
 }
 
 /// What an odometer believes, whatever the vehicle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct OdometerParameters {
     /// How wrong the reports may be.
     pub noise: OdometryNoise,
@@ -33,7 +35,11 @@ pub struct OdometerParameters {
 }
 
 /// Turns the reports of a vehicle into motions; remembers the last report only.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound(
+    serialize = "K: Serialize, K::Report: Serialize",
+    deserialize = "K: Deserialize<'de>, K::Report: Deserialize<'de>"
+))]
 pub struct Odometer<K: Kinematics> {
     kinematics: K,
     parameters: OdometerParameters,
@@ -52,7 +58,7 @@ pub struct Odometer<K: Kinematics> {
 const MOST_EARLIER: u8 = 10;
 
 /// The mean time between two reports, of about the last sixteen, s.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct MeanInterval {
     mean: f64,
     count: u8,
@@ -63,7 +69,7 @@ impl MeanInterval {
 
     /// Takes the next one; gives the mean with it.
     fn add(&mut self, duration: f64) -> f64 {
-        self.count = Self::MEMORY.min(self.count + 1);
+        self.count = Self::MEMORY.min(self.count.saturating_add(1));
         self.mean += (duration - self.mean) / f64::from(self.count);
         self.mean
     }
@@ -163,7 +169,7 @@ impl<K: Kinematics> Odometer<K> {
 
 /// The odometer of any vehicle that the parameters can describe.
 #[expect(clippy::large_enum_variant, reason = "there is no heap, and one such value in a localizer")]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum VehicleOdometer {
     /// See [`super::Tricycle`].
     Tricycle(Odometer<super::Tricycle>),

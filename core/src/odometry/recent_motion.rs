@@ -1,5 +1,7 @@
 //! How a vehicle has moved of late, for what was measured between two samples of its odometry or a little before them.
 
+use serde::{Deserialize, Serialize};
+
 use super::Motion;
 use crate::geometry::Pose;
 use crate::measurement::Time;
@@ -11,7 +13,7 @@ const SPAN: f64 = super::Coasting::SPAN;
 const LONGEST: f64 = 0.32;
 
 /// The displacement of one to two tenths of a second.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct RecentMotion {
     start: Time,
     middle: Time,

@@ -1,5 +1,7 @@
 //! Whether the wheels stand.
 
+use serde::{Deserialize, Serialize};
+
 use super::Motion;
 use crate::geometry::Pose;
 use crate::measurement::Time;
@@ -10,7 +12,7 @@ const STANDS_AFTER: f64 = 0.5;
 const TREMBLE: (f64, f64) = (5e-4, 5e-4);
 
 /// Since when the wheels stand.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Rest {
     since: Time,
     /// Where the wheels have led since.
@@ -18,7 +20,7 @@ struct Rest {
 }
 
 /// Tells a vehicle that stands, whose gyro then tells its own bias and no turn.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct StandingWheels {
     rest: Option<Rest>,
     stands: bool,

@@ -1,10 +1,12 @@
 //! The wheels of one rigid vehicle, prepared for many steps.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Contact, Wheel};
 use crate::measurement::MOST_WHEELS;
 
 /// Wheels of one vehicle, with what of their directions is the same in every step.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct WheelSet {
     wheels: [RollingWheel; MOST_WHEELS],
     count: usize,
@@ -37,7 +39,7 @@ const NO_WHEEL: Wheel =
     Wheel { x: 0.0, y: 0.0, heading: 0.0, radius: 0.0, contact: Contact::Tyre, turn: None, steering: None };
 
 /// A wheel with the direction along which its turn tells the motion.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct RollingWheel {
     pub wheel: Wheel,
     /// That direction while its steering encoder reads zero, rad: its own, or that of its rollers' axes.

@@ -7,7 +7,7 @@ use super::line::Moments;
 use crate::geometry::{Pose, ScanPoint, Transform, sector};
 
 /// A piece of surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
     /// A point of it, m; infinitely far where nothing was seen.
     pub point: ScanPoint,
@@ -47,8 +47,9 @@ const BESIDE: usize = 12;
 const FEWEST: f32 = 4.0;
 
 /// The surfaces around a sensor in `DIRECTIONS` equal sectors, the nearest in each.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SurfaceScan<const DIRECTIONS: usize> {
+    #[serde(with = "crate::arrays")]
     surfaces: [Surface; DIRECTIONS],
 }
 

@@ -6,6 +6,8 @@ use core::fmt::Debug;
 
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use super::places::{FindPlaces, NoPlaces, Places};
 use crate::contours::{
@@ -47,6 +49,12 @@ const APART: (f64, f64) = (0.1, 0.05);
 pub struct Contours<'m, const POINTS: usize = 400, const ROOM: usize = 6144, const KEYS: usize = 20> {
     map: Option<KeptMap<'m>>,
     points: Vec<SurfacePoint, POINTS>,
+    around: Around<POINTS, ROOM, KEYS>,
+}
+
+/// What is loaded of a map, and the key scans that lie over it, or are there instead.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Around<const POINTS: usize, const ROOM: usize, const KEYS: usize> {
     surroundings: Surroundings<ROOM>,
     keys: KeyRing<KEYS, POINTS>,
 }
@@ -86,6 +94,9 @@ pub trait FindContours: Clone + Debug {
 
     /// What searches a start in the map.
     type Places: FindPlaces<Map = Self::Map>;
+
+    /// What it knows of what is around, beside the map.
+    type Around: Serialize + DeserializeOwned;
 
     /// Points of the surroundings, at the most.
     const POINTS: usize;
@@ -138,24 +149,32 @@ pub trait FindContours: Clone + Debug {
 
     /// Whether there was no room for all of the surroundings.
     fn has_cut(&self) -> bool;
+
+    /// What is around, as it is stored.
+    fn around(&self) -> &Self::Around;
+
+    /// Takes what is around from where it was stored.
+    fn set_around(&mut self, around: Self::Around);
 }
 
 impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours for Contours<'m, POINTS, ROOM, KEYS> {
     type Map = KeptMap<'m>;
     type Places = Places<'m, POINTS, ROOM>;
+    type Around = Around<POINTS, ROOM, KEYS>;
 
     const POINTS: usize = ROOM;
     const KEYS: usize = KEYS;
 
     #[inline(always)]
     fn new() -> Self {
-        Self { map: None, points: Vec::new(), surroundings: Surroundings::new(), keys: KeyRing::new() }
+        let around = Around { surroundings: Surroundings::new(), keys: KeyRing::new() };
+        Self { map: None, points: Vec::new(), around }
     }
 
     fn set_map(&mut self, map: Option<KeptMap<'m>>) {
         self.map = map;
-        self.surroundings.load_anew();
-        self.keys.clear();
+        self.around.surroundings.load_anew();
+        self.around.keys.clear();
     }
 
     fn map(&self) -> Option<KeptMap<'m>> {
@@ -163,32 +182,32 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
     }
 
     fn for_search(&mut self) -> Option<(KeptMap<'m>, &mut Submap<ROOM>)> {
-        Some((self.map?, self.surroundings.lend()))
+        Some((self.map?, self.around.surroundings.lend()))
     }
 
     fn begin_anew(&mut self) {
-        self.surroundings.load_anew();
+        self.around.surroundings.load_anew();
         if self.map.is_some() {
-            self.keys.clear();
+            self.around.keys.clear();
         }
     }
 
     #[inline(never)]
     fn locate(&mut self, scan: PointView<'_>, predicted: &Prediction) -> Option<ContourMatch> {
         self.see(scan);
-        self.surroundings.align((&self.map?, &self.keys), &self.points, predicted)
+        self.around.surroundings.align((&self.map?, &self.around.keys), &self.points, predicted)
     }
 
     #[inline(never)]
     fn learn(&mut self, pose: &Pose, deviation: (f64, f64)) {
         if let Some(map) = &self.map {
             let deviation = [deviation.0 as f32, deviation.1 as f32];
-            self.surroundings.learn((map, &mut self.keys), &self.points, (pose, deviation));
+            self.around.surroundings.learn((map, &mut self.around.keys), &self.points, (pose, deviation));
         }
     }
 
     fn locate_nearby(&self, predicted: &Pose) -> Option<ContourMatch> {
-        align_nearby(&self.points, self.surroundings.loaded(), predicted)
+        align_nearby(&self.points, self.around.surroundings.loaded(), predicted)
     }
 
     fn see(&mut self, scan: PointView<'_>) {
@@ -197,31 +216,40 @@ impl<'m, const POINTS: usize, const ROOM: usize, const KEYS: usize> FindContours
 
     #[inline(never)]
     fn locate_behind(&self, predicted: &Prediction) -> Option<ContourMatch> {
-        align(&self.points, self.surroundings.loaded(), predicted)
+        align(&self.points, self.around.surroundings.loaded(), predicted)
     }
 
     fn forget_keys(&mut self) {
-        self.keys.clear();
+        self.around.keys.clear();
     }
 
     #[inline(never)]
     fn keep(&mut self, pose: &Pose) -> bool {
-        let is_kept = self.keys.wants(pose);
+        let is_kept = self.around.keys.wants(pose);
         if is_kept {
-            self.keys.keep(pose, [0.0; 2], self.points.iter().copied());
-            self.surroundings.of_keys(pose, &self.keys);
+            self.around.keys.keep(pose, [0.0; 2], self.points.iter().copied());
+            self.around.surroundings.of_keys(pose, &self.around.keys);
         }
         is_kept
     }
 
     fn has_cut(&self) -> bool {
-        self.surroundings.loaded().has_cut()
+        self.around.surroundings.loaded().has_cut()
+    }
+
+    fn around(&self) -> &Around<POINTS, ROOM, KEYS> {
+        &self.around
+    }
+
+    fn set_around(&mut self, around: Around<POINTS, ROOM, KEYS>) {
+        self.around = around;
     }
 }
 
 impl FindContours for NoContours {
     type Map = core::convert::Infallible;
     type Places = NoPlaces;
+    type Around = ();
 
     const POINTS: usize = 0;
     const KEYS: usize = 0;
@@ -267,6 +295,12 @@ impl FindContours for NoContours {
     fn has_cut(&self) -> bool {
         false
     }
+
+    fn around(&self) -> &() {
+        &()
+    }
+
+    fn set_around(&mut self, (): ()) {}
 }
 
 /// Where R is by a match of a scan whose points are in the frame of a laser mounted at `mount` in R. None if its information is no

@@ -6,6 +6,7 @@
 //! submap do not make its place certain.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::contours::{FREE, GATE, INFLATION, LEAST_SHARE};
 use super::{FindContours, SourceStatus};
@@ -42,7 +43,7 @@ const LINE: f64 = 16.0;
 const ONE_SIDED: f32 = 0.3;
 
 /// Where the submap of the way behind is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct ContoursBehind {
     /// Where the first laser was in the submap at the pose that the slot holds.
     anchor: Pose,

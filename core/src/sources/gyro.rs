@@ -3,6 +3,8 @@
 //! The turn that the wheels tell is replaced, not averaged: their walk of the heading is some ten times that of a gyro, and what
 //! lasts of their errors is not independent from motion to motion.
 
+use serde::{Deserialize, Serialize};
+
 use crate::filter::{GyroState, KnownPose};
 use crate::measurement::GyroSample;
 use crate::odometry::{GyroErrors, GyroParameters, GyroRefusal, GyroTurn, GyroTurns, Motion, StandingWheels};
@@ -30,7 +32,7 @@ pub enum AtRest {
 }
 
 /// The bias as it was seen at rest since somebody asked.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RestSum {
     sum: f64,
     weight: f64,
@@ -45,7 +47,7 @@ impl RestSum {
 }
 
 /// A gyro with what is known of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GyroSource {
     parameters: GyroParameters,
     turns: GyroTurns,

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::status::SourceStatus;
-use crate::filter::{Ekf, Empty, RelativePose, Slots, Storage};
+use crate::filter::{Ekf, Empty, RelativePose, Slots, Storage, storage};
 use crate::geometry::{Pose, difference};
 use crate::maps::Verdict;
 use crate::measurement::Time;
@@ -59,8 +59,10 @@ impl Empty for SurfaceScan<DIRECTIONS> {
 }
 
 /// The surfaces that were seen at the past poses of the state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub(crate) struct KeyScans<S: Slots> {
+    #[serde(with = "storage")]
     surfaces: S::PerPose<SurfaceScan<DIRECTIONS>>,
     /// Place of the newest one; places are taken in turn.
     newest: usize,
@@ -133,7 +135,8 @@ impl<S: Slots> KeyScans<S> {
             return;
         }
         let places = self.surfaces.as_mut();
-        let next = if self.newest + 1 < places.len() { self.newest + 1 } else { 0 };
+        let next = self.newest.wrapping_add(1);
+        let next = if next < places.len() { next } else { 0 };
         if let Some(surfaces) = places.get_mut(next) {
             surfaces.set(points, place, &parameters.surfaces);
             filter.remember_pose(next);

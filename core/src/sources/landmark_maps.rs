@@ -3,6 +3,9 @@
 use core::fmt::Debug;
 use core::marker::PhantomData;
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use crate::geometry::Point;
 use crate::maps::{
     DynamicLandmark, DynamicMap, DynamicMapParameters, DynamicMapView, FixedMap, Landmark, LandmarkKind, LendError,
@@ -67,6 +70,9 @@ impl<'m> MapKeeping for Lent<'m> {
 
 /// [`Maps`] of any capacities.
 pub trait LandmarkMaps: Clone + Debug {
+    /// What has been found while driving.
+    type Found: Serialize + DeserializeOwned;
+
     /// Landmarks of the fixed maps, at the most.
     const FIXED: usize;
 
@@ -84,6 +90,12 @@ pub trait LandmarkMaps: Clone + Debug {
 
     /// All landmarks of the dynamic map.
     fn found(&self) -> &[DynamicLandmark];
+
+    /// What was found, as it is stored.
+    fn found_map(&self) -> &Self::Found;
+
+    /// Takes what was found from where it was stored.
+    fn set_found_map(&mut self, found: Self::Found);
 
     /// Forgets what was found.
     fn forget_found(&mut self);
@@ -149,6 +161,8 @@ impl<const LANDMARKS: usize> KeptLandmarks for LentMap<'_, LANDMARKS> {
 }
 
 impl<R: KeptLandmarks, F: KeptLandmarks, const DYNAMIC: usize> LandmarkMaps for Maps<R, F, DYNAMIC> {
+    type Found = DynamicMap<DYNAMIC>;
+
     const FIXED: usize = R::MOST + F::MOST;
 
     #[inline(always)]
@@ -173,6 +187,14 @@ impl<R: KeptLandmarks, F: KeptLandmarks, const DYNAMIC: usize> LandmarkMaps for 
 
     fn found(&self) -> &[DynamicLandmark] {
         self.dynamic.landmarks()
+    }
+
+    fn found_map(&self) -> &DynamicMap<DYNAMIC> {
+        &self.dynamic
+    }
+
+    fn set_found_map(&mut self, found: DynamicMap<DYNAMIC>) {
+        self.dynamic = found;
     }
 
     fn forget_found(&mut self) {

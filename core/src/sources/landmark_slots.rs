@@ -1,6 +1,8 @@
 //! What is known of the landmarks in the state beside their positions.
 
-use crate::filter::{Slots, Storage};
+use serde::{Deserialize, Serialize};
+
+use crate::filter::{Slots, Storage, storage};
 use crate::geometry::difference;
 use crate::maps::LandmarkKind;
 use crate::state::LandmarkSource;
@@ -8,7 +10,7 @@ use crate::state::LandmarkSource;
 use super::slot_parameters::SlamParameters;
 
 /// A landmark in the state.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Slot {
     pub source: LandmarkSource,
     pub id: u16,
@@ -21,8 +23,10 @@ pub(crate) struct Slot {
 }
 
 /// One for each landmark's slot of the state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub(crate) struct LandmarkSlots<S: Slots> {
+    #[serde(with = "storage")]
     slots: S::PerLandmark<Option<Slot>>,
     next_id: u16,
 }

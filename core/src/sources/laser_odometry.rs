@@ -3,6 +3,8 @@
 //! It corrects nothing. Where no landmark is in sight, only it can contradict the odometry of the wheels: each scan is matched to those
 //! behind it, and the wheels tell no more than where to look for it.
 
+use serde::{Deserialize, Serialize};
+
 use super::FindContours;
 use super::contours::LEAST_SHARE;
 use crate::contours::Prediction;
@@ -18,7 +20,7 @@ const FEW: usize = 3;
 const GIVEN_UP: u8 = 2;
 
 /// The laser when its last scan began.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Reached {
     /// By surfaces, in W as landmarks last told it.
     by_surfaces: Pose,
@@ -35,7 +37,7 @@ struct Reached {
 }
 
 /// Where R is by surfaces.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BySurfaces {
     /// In W.
     pub pose: Pose,
@@ -50,7 +52,7 @@ pub struct BySurfaces {
 }
 
 /// What it has reached.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct LaserOdometry {
     /// Landmarks that were used in the present revolution.
     used: usize,

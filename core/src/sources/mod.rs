@@ -98,7 +98,7 @@ macro_rules! sources {
         }
 
         /// What became of each source.
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         pub struct Statuses {
             $($(#[$doc])* pub $field: SourceStatus,)+
             $(#[$late_doc])* pub $late: SourceStatus,

@@ -1,10 +1,12 @@
 //! What became of a source.
 
+use serde::{Deserialize, Serialize};
+
 use crate::maps::Verdict;
 use crate::measurement::Time;
 
 /// What became of a source, in the last event in which it told something. Counts are of observations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceStatus {
     /// When it last told something; none if it never has.
     pub told: Option<Time>,

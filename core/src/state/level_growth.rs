@@ -1,12 +1,14 @@
 //! How a protection level grows while the vehicle goes on as it does.
 
+use serde::{Deserialize, Serialize};
+
 use super::ProtectionLevel;
 
 /// How long the vehicle has gone on, s.
 const SECONDS: [f64; 3] = [0.02, 0.06, 0.2];
 
 /// What a motion at the present velocity adds to a level after 0.02, 0.06 and 0.2 s.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelGrowth {
     added: [ProtectionLevel; SECONDS.len()],
 }

@@ -8,4 +8,5 @@ mod odometry;
 mod outages;
 mod run;
 mod simulator;
+mod stored_state;
 mod turning;

@@ -3,6 +3,7 @@
 pub mod hall;
 pub mod kept_map;
 pub mod reference_drive;
+pub mod replaced;
 pub mod stage;
 pub mod standing_scan;
 pub mod view;

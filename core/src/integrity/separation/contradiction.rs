@@ -2,6 +2,7 @@
 //! minority contradicts in one event alone, and none of the map, is no more than false reflectors are.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use crate::state::ProtectionLevel;
 
@@ -25,7 +26,7 @@ const FADING: f64 = 0.8;
 const MEMORY: f64 = 10.0;
 
 /// What fits the pose and what contradicts it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Evidence {
     fitting: f64,
     contradicting: f64,
@@ -57,7 +58,7 @@ impl Evidence {
 }
 
 /// The evidence of the present event and of the last ones, and what came of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Contradiction {
     event: Evidence,
     /// By how much landmarks of the event are elsewhere in W, m.

@@ -1,5 +1,7 @@
 //! A laser that creeps on its mounting: slowly at any time, or so fast that it is found.
 
+use serde::{Deserialize, Serialize};
+
 use super::assumed::{Factors, ONE_FAULT, ONE_RARE_FAULT};
 use super::envelope::Envelope;
 use super::hypothesis::is_refuted;
@@ -20,7 +22,7 @@ const FOUND: f64 = 5.1;
 const FOUND_TURNING: f64 = 4.5;
 
 /// A fast creep, and whether it was found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Sought {
     solution: Solution,
     found_from: f64,
@@ -48,7 +50,7 @@ impl Sought {
 }
 
 /// The solutions whose laser creeps.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Creeps {
     slow: Solution,
     fast: Sought,

@@ -4,6 +4,7 @@
 //! solutions: the bound of one that knows the pose well grows most. So those are kept that no other one exceeds, now and from now on.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use super::sensor_information::not_negative;
 use super::solution::Drift;
@@ -13,7 +14,7 @@ use crate::state::ProtectionLevel;
 const KEPT: usize = 8;
 
 /// How far a pose may be off if one solution is right.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolutionBound {
     /// Of the position, m.
     pub position: Bound,
@@ -65,7 +66,7 @@ impl SolutionBound {
 }
 
 /// One component of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bound {
     /// What lies between the solution and the pose.
     pub apart: f64,
@@ -90,7 +91,7 @@ impl Bound {
 }
 
 /// A bound, and what comparing it takes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Kept {
     bound: Bound,
     /// What it is now.
@@ -145,7 +146,7 @@ impl Growth {
 }
 
 /// The largest of the bounds of solutions to which a motion adds the same.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Envelope {
     positions: Vec<Kept, KEPT>,
     headings: Vec<Kept, KEPT>,

@@ -2,6 +2,7 @@
 //! more solution rests on the wheels alone.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use super::assumed::AssumedDeviations;
 use super::solution::{Solution, Step};
@@ -12,7 +13,7 @@ use crate::odometry::{BiasJacobian, GyroParameters, Motion};
 const LASTING: f64 = 10.0;
 
 /// What the gyro adds to the solutions.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GyroSeparation {
     /// As for the wheels, but with bias (rad/s) and scale of the gyro for steering and turn.
     assumed: AssumedDeviations,

@@ -1,6 +1,7 @@
 //! What may be wrong, each with the solution that holds if it is.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use super::assumed::Factors;
 use super::envelope::{Envelope, SolutionBound};
@@ -14,7 +15,7 @@ use crate::state::ProtectionLevel;
 pub const TOGETHER: usize = 8;
 
 /// What is left out together: each reflector alone, all natural features, which one map and one detector tell, and all contours.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LandmarkKey {
     /// A reflector of the fixed map.
     Reflector(u16),
@@ -25,7 +26,7 @@ pub enum LandmarkKey {
 }
 
 /// Some landmarks are not where the map has them: a solution that has not used them since they came in sight.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LeftOut {
     /// Which.
     pub keys: Vec<LandmarkKey, TOGETHER>,
@@ -39,7 +40,7 @@ pub struct LeftOut {
 
 /// The laser was knocked, or the vehicle was carried or has slid, in an interval: its mounting is free then, and stays as it
 /// is found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Knock {
     /// When the interval began.
     pub from: Time,
@@ -50,7 +51,7 @@ pub struct Knock {
 }
 
 /// Something was not as believed before a time: it is free then, and nothing that was known is used.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FreeSince {
     /// That time.
     pub since: Time,
@@ -73,7 +74,7 @@ pub struct FreeSince {
 }
 
 /// How well a solution has fitted lately.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Fit {
     /// Mean of the normalised squared innovations of some events; 3 is expected at most.
     mean: f64,

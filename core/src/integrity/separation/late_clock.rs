@@ -2,6 +2,8 @@
 //! metre shows how late it is. Who finds itself while it moves has found where it was, until it stands, or moves otherwise. A clock that is
 //! off later is a matter of the free mounting.
 
+use serde::{Deserialize, Serialize};
+
 use super::UNKNOWN_POSE;
 use super::assumed::AssumedDeviations;
 use super::hypothesis::is_refuted;
@@ -12,7 +14,7 @@ use super::solution::{Laser, Solution};
 const AT_REST: (f64, f64) = (5e-3, 5e-3);
 
 /// The solution with a clock that is free since the vehicle stood, or since its first pose; none before.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LateClock {
     solution: Option<Solution>,
     /// Whether it begins with what is seen next, even if the vehicle moves.

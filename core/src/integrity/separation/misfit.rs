@@ -1,5 +1,7 @@
 //! How badly landmarks have fitted each other of late: what the stated errors of sensor and map do not explain.
 
+use serde::{Deserialize, Serialize};
+
 use super::sensor_information::SensorInformation;
 use crate::state::ProtectionLevel;
 
@@ -16,7 +18,7 @@ const TORN: f64 = 2.5;
 const WHOLE: f64 = 4.0;
 
 /// Means of the last events, each of which counts by less and less.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Misfit {
     square: f64,
     freedom: f64,

@@ -21,6 +21,7 @@ mod unheard;
 
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 pub use assumed::{AssumedDeviations, FAULT_FREE, Factors, ONE_FAULT, ONE_KNOCK, fault_free};
 use contradiction::Contradiction;
@@ -65,7 +66,7 @@ const UNKNOWN_POSE: [f64; 6] = [FREE_POSITION * FREE_POSITION, 0.0, FREE_POSITIO
 const LONGEST_STEP: f64 = 0.3;
 
 /// Motion since the solutions went on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Pending {
     covariance: Matrix3<f64>,
     distance: f64,
@@ -85,7 +86,7 @@ impl Pending {
 }
 
 /// The solutions, and the protection level that they give.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SolutionSeparation {
     assumed: AssumedDeviations,
     steering_lever: Option<f64>,
@@ -132,7 +133,7 @@ pub struct SolutionSeparation {
 }
 
 /// The bounds that make up the protection level.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Bounds {
     /// Of all solutions but the next two.
     envelope: Envelope,

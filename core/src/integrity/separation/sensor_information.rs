@@ -1,6 +1,7 @@
 //! What the landmarks of one event say of the pose of the laser, as information: it can be added, and left out again.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Point, Pose, difference, larger_axis};
 
@@ -8,7 +9,7 @@ use crate::geometry::{Point, Pose, difference, larger_axis};
 const LEAST: f64 = 1e-3;
 
 /// Information about where the laser is beside a pose at which the model is linearised: x and y in W, m, and heading, rad.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorInformation {
     matrix: Matrix3<f64>,
     vector: Vector3<f64>,

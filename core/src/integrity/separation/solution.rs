@@ -1,6 +1,7 @@
 //! One solution: the pose and what lasts, by those measurements and under those assumptions that are its own.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::assumed::{AssumedDeviations, Factors};
 use super::envelope::{Bound, SolutionBound};
@@ -37,7 +38,7 @@ pub struct Laser {
 }
 
 /// Pose and what lasts, with their covariance.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     pose: Pose,
     /// The states behind the pose.
@@ -46,7 +47,7 @@ pub struct Solution {
 }
 
 /// What lasts: as it is believed to be, or beside that.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Lasting {
     /// Place of the laser in R beside that believed, m.
     lever: [f64; 2],
@@ -58,7 +59,7 @@ struct Lasting {
 }
 
 /// Errors of the odometry that last: scale, steering, rad, and turn.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct OdometryErrors {
     errors: Vector3<f64>,
     covariance: Matrix3<f64>,

@@ -4,6 +4,8 @@
 //! circle does nothing to a vehicle that drives along its axle). A turn for each metre is a vector of the body, of which a direction
 //! shows its part along itself: after a change of the direction by `d` the part known is `cos d` of it, and the rest was never seen.
 
+use serde::{Deserialize, Serialize};
+
 use crate::geometry::Pose;
 
 /// A direction is known behind so much, m.
@@ -12,7 +14,7 @@ const KNOWN_AFTER: f64 = 0.05;
 const SAME: f64 = 0.994;
 
 /// The direction, a unit vector in R; backward along it is the same one.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TravelDirection {
     axis: (f64, f64),
     moved: (f64, f64),

@@ -1,5 +1,7 @@
 //! How long nobody has looked: a laser that tells nothing does not tell either that the vehicle is carried or slides.
 
+use serde::{Deserialize, Serialize};
+
 use crate::measurement::Time;
 use crate::state::ProtectionLevel;
 
@@ -10,7 +12,7 @@ const USUAL: f64 = 1.0;
 const MOVED: (f64, f64) = (0.1, 0.02);
 
 /// When the laser was heard last, if it ever was.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Unheard {
     since: Option<Time>,
 }
