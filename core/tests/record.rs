@@ -15,7 +15,7 @@ use agv_core::measurement::{
 use agv_core::odometry::{Ackermann, CounterRange, GyroParameters, Tricycle, Vehicle};
 use agv_core::record::{
     DamageReason, EncodeError, Header, Item, LogReader, MAX_FRAME, Output, Published, Raw, RawSource, Record,
-    Reference, Scratch, Step, Truth, encode,
+    Reference, STATE_A_RECORD, Scratch, StateOwner, StatePiece, Step, Truth, encode,
 };
 use proptest::prelude::*;
 
@@ -40,6 +40,7 @@ enum Owned {
     Reference(Reference),
     Note(String),
     Raw(RawSource, Time, Vec<u8>),
+    State(StateOwner, u32, u32, Vec<u8>),
     End,
 }
 
@@ -75,6 +76,9 @@ impl Owned {
             Self::Truth(truth) => Record::Truth(*truth),
             Self::Reference(reference) => Record::Reference(*reference),
             Self::Note(text) => Record::Note(text),
+            Self::State(owner, length, start, bytes) => {
+                Record::State(StatePiece { owner: *owner, length: *length, start: *start, bytes })
+            }
             Self::Raw(source, time, bytes) => Record::Raw(Raw { source: *source, time: *time, bytes }),
             Self::End => Record::End,
         })
@@ -259,6 +263,12 @@ fn record() -> impl Strategy<Value = Owned> {
         (any::<bool>(), time(), prop::collection::vec(any::<u8>(), 0..300)).prop_map(|(is_received, time, bytes)| {
             Owned::Raw(if is_received { RawSource::FromNav350 } else { RawSource::ToCan }, time, bytes)
         }),
+        (any::<bool>(), any::<u32>(), any::<u32>(), prop::collection::vec(any::<u8>(), 0..300)).prop_map(
+            |(is_predictor, length, start, bytes)| {
+                let owner = if is_predictor { StateOwner::Predictor } else { StateOwner::Localizer };
+                Owned::State(owner, length, start, bytes)
+            }
+        ),
         Just(Owned::End),
     ]
 }
@@ -559,6 +569,11 @@ fn what_does_not_fit_is_refused() {
     raw.bytes = &raw.bytes[..16_384];
     assert!(encode(&Record::Raw(raw), 0, &mut buffer).is_ok());
 
+    let mut piece = StatePiece { owner: StateOwner::Localizer, length: 0, start: 0, bytes: &note.as_bytes()[..16_385] };
+    assert_eq!(encode(&Record::State(piece), 0, &mut buffer), Err(EncodeError::TooLong));
+    piece.bytes = &piece.bytes[..16_384];
+    assert!(encode(&Record::State(piece), 0, &mut buffer).is_ok());
+
     let ranges = [1.0; 5];
     let scan = Scan {
         laser: LaserId::FIRST,
@@ -573,4 +588,18 @@ fn what_does_not_fit_is_refused() {
     let mut scratch = Scratch::<4, 4>::new();
     let (_, step) = LogReader::new().step(&buffer[..length], true, &mut scratch);
     assert!(matches!(step, Step::Item(Item::Damage(damage)) if damage.reason == DamageReason::Payload), "{step:?}");
+}
+
+#[test]
+fn pieces_of_a_state_are_all_of_it_in_order() {
+    for length in [0, 1, STATE_A_RECORD, STATE_A_RECORD + 1, 3 * STATE_A_RECORD + 7] {
+        let state: Vec<u8> = (0..length).map(|place| (place % 251) as u8).collect();
+        let mut joined = Vec::new();
+        for piece in StatePiece::of(StateOwner::Predictor, &state) {
+            assert_eq!((piece.length as usize, piece.start as usize), (length, joined.len()));
+            assert!((1..=STATE_A_RECORD).contains(&piece.bytes.len()));
+            joined.extend_from_slice(piece.bytes);
+        }
+        assert_eq!(joined, state);
+    }
 }

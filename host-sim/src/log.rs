@@ -16,7 +16,7 @@ use agv_core::record::{
 
 use crate::file_kind;
 use crate::output_file::OutputFile;
-use crate::recording::{Publishing, RecordedOutput, RecordedPose, Recording, keep};
+use crate::recording::{Publishing, RecordedOutput, RecordedPose, Recording, StoredState, keep};
 use crate::wording::count_of;
 
 /// Name and version that this program leaves in its logs.
@@ -399,6 +399,9 @@ pub fn write_with_outputs<'a>(
     output: impl Fn(usize) -> Option<Output<'a>>,
 ) -> Result<(), LogError> {
     let mut writer = Writer::begin(path, &recording.parameters, &recording.landmarks)?;
+    for piece in recording.state.iter().flat_map(StoredState::pieces) {
+        writer.write(&Record::State(piece))?;
+    }
     let mut truth = recording.truth.iter().peekable();
     let mut references = recording.references.iter().peekable();
     for (index, event) in recording.events.iter().enumerate() {
@@ -451,6 +454,7 @@ impl Contents {
                 events: Vec::new(),
                 truth: Vec::new(),
                 references: Vec::new(),
+                state: None,
             },
             outputs: Vec::new(),
             publishing: Publishing::default(),
@@ -515,7 +519,7 @@ fn read_pieces(path: &Path, mut progress: impl FnMut(u64)) -> Result<Pieces, Log
     let mut is_complete = false;
     let mut contents = Contents::empty();
     let Contents {
-        recording: Recording { landmarks, events, truth, references, .. },
+        recording: Recording { landmarks, events, truth, references, state, .. },
         outputs,
         publishing,
         damages,
@@ -537,6 +541,7 @@ fn read_pieces(path: &Path, mut progress: impl FnMut(u64)) -> Result<Pieces, Log
                     _ => header = Some((found.software.to_owned(), *found.parameters)),
                 },
                 Record::Landmarks(piece) => landmarks.extend_from_slice(piece),
+                Record::State(piece) => state.get_or_insert_default().add(&piece),
                 Record::Event(event) => {
                     is_answer_expected = true;
                     events.push(keep(&event));

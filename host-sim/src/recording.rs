@@ -4,7 +4,7 @@ use agv_core::geometry::Pose;
 use agv_core::localizer::{AnyEvent, AsReflectors, AsScan, Event, LandmarkUse, Parameters, PoseOutput};
 use agv_core::maps::Landmark;
 use agv_core::measurement::{LaserId, ReflectorObservation, Reflectors, Scan, Time};
-use agv_core::record::{Output, Published};
+use agv_core::record::{Output, Published, StateOwner, StatePiece};
 pub use agv_core::record::{Reference, Truth};
 
 /// A scan that owns its ranges; the fields are those of [`Scan`].
@@ -109,6 +109,36 @@ pub struct Recording {
     pub truth: Vec<Truth>,
     /// Where another instrument has seen the laser, in order of time; empty if there was none.
     pub references: Vec<Reference>,
+    /// What was known before the first event, if the recording begins in the middle of a drive.
+    pub state: Option<StoredState>,
+}
+
+/// What localiser and publisher knew before the first event of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StoredState {
+    /// As [`agv_core::localizer::Localizer::save_state`] gives it.
+    pub localizer: Vec<u8>,
+    /// As [`agv_core::localizer::OutputPredictor::save_state`] gives it; empty if nobody knows.
+    pub predictor: Vec<u8>,
+}
+
+impl StoredState {
+    /// Adds a piece. One that does not follow is left out, and the state will be refused.
+    pub(crate) fn add(&mut self, piece: &StatePiece) {
+        let state = match piece.owner {
+            StateOwner::Localizer => &mut self.localizer,
+            StateOwner::Predictor => &mut self.predictor,
+        };
+        if state.len() == piece.start as usize {
+            state.extend_from_slice(piece.bytes);
+        }
+    }
+
+    /// Its pieces as a log takes them.
+    pub(crate) fn pieces(&self) -> impl Iterator<Item = StatePiece<'_>> {
+        let localizer = StatePiece::of(StateOwner::Localizer, &self.localizer);
+        localizer.chain(StatePiece::of(StateOwner::Predictor, &self.predictor))
+    }
 }
 
 /// What the localiser answered to one event when it was recorded.

@@ -52,6 +52,7 @@ fn small_recording() -> Recording {
             Reference { time: at(100), x: 1.0, y: 2.0, heading: None },
             Reference { time: at(90_000), x: 1.0, y: 2.0, heading: Some(0.3) },
         ],
+        state: None,
     }
 }
 

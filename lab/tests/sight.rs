@@ -32,7 +32,7 @@ fn sight(in_sight: impl Fn(f64) -> usize) -> Sight {
         pose = pose.compose(&by);
     }
     let parameters = Parameters::new(Vehicle::Increments, Pose::default());
-    let recording = Recording { parameters, landmarks: Vec::new(), events, truth, references: Vec::new() };
+    let recording = Recording { parameters, landmarks: Vec::new(), events, truth, references: Vec::new(), state: None };
     Sight::of(&recording, [0.0, 0.0])
 }
 

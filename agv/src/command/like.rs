@@ -17,5 +17,5 @@ pub fn drive_like(path: Option<&Path>) -> anyhow::Result<Recording> {
         }
         None => (Parameters::new(Vehicle::Increments, Pose::default()), Vec::new()),
     };
-    Ok(Recording { parameters, landmarks, events: Vec::new(), truth: Vec::new(), references: Vec::new() })
+    Ok(Recording { parameters, landmarks, events: Vec::new(), truth: Vec::new(), references: Vec::new(), state: None })
 }

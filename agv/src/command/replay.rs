@@ -135,7 +135,9 @@ impl Replay {
         let Contents { software, mut recording, outputs, publishing, damages } = contents;
         let contours = self.prepare(&mut recording, &outputs)?;
         let replay = self.replay(&recording, contours.as_ref())?;
-        let comparisons = if self.is_as_recorded() {
+        // Of a log that begins in the middle of a drive the map of contours is a part.
+        let is_as_recorded = self.is_as_recorded() || (recording.state.is_some() && self.adds_contours_only());
+        let comparisons = if is_as_recorded {
             Comparisons::of(&outputs, &publishing, &recording, &replay)
         } else {
             Comparisons::default()
@@ -173,8 +175,16 @@ impl Replay {
 
     /// Whether nothing is changed of what the log says. What a vehicle knew before a part of a log is not known.
     fn is_as_recorded(&self) -> bool {
-        self.map.is_empty()
-            && self.like.is_none()
+        self.map.is_empty() && self.is_otherwise_as_recorded()
+    }
+
+    /// Whether the one thing that the log does not say is added: the map of contours of its vehicle.
+    fn adds_contours_only(&self) -> bool {
+        self.map.iter().all(|path| contour_file::is_contour_map(path)) && self.is_otherwise_as_recorded()
+    }
+
+    fn is_otherwise_as_recorded(&self) -> bool {
+        self.like.is_none()
             && self.landmarks.is_empty()
             && self.start.is_none()
             && self.vehicle.is_none()
@@ -185,6 +195,10 @@ impl Replay {
     /// Changes what the log says to what is wanted. A map of contours is given back.
     fn prepare(&self, recording: &mut Recording, answers: &[RecordedOutput]) -> anyhow::Result<Option<ContourMap>> {
         let of_log = || self.log.display().to_string();
+        // What was known before the log was so of the vehicle and the map of the log.
+        if !self.is_as_recorded() && !self.adds_contours_only() {
+            recording.state = None;
+        }
         self.settings.apply(&mut recording.parameters)?;
         if let Some(path) = &self.vehicle {
             let vehicle = VehicleFile::read(path)?;
@@ -211,7 +225,8 @@ impl Replay {
             recording.parameters.maps = self.maps()?;
         }
         // Of an odometry that others have recorded nobody has stated the noise.
-        if contours.is_some() && recording.parameters.vehicle == Vehicle::Increments {
+        let is_stated = recording.state.is_some();
+        if contours.is_some() && recording.parameters.vehicle == Vehicle::Increments && !is_stated {
             recording.parameters.odometry_noise = odometry_noise(recording).with_context(of_log)?;
         }
         self.relocalisation.apply(recording, contours.as_ref()).with_context(of_log)?;

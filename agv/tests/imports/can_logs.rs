@@ -304,7 +304,8 @@ fn like(files: &Files) -> String {
     });
     let mut parameters = Parameters::new(vehicle, Pose::default());
     parameters.limits.fastest = 5.0;
-    let recording = Recording { parameters, landmarks: vec![], events: vec![], truth: vec![], references: vec![] };
+    let recording =
+        Recording { parameters, landmarks: vec![], events: vec![], truth: vec![], references: vec![], state: None };
     let path = files.path("like.agvlog");
     log::write(Path::new(&path), &recording).unwrap();
     path

@@ -22,6 +22,7 @@ mod frame;
 mod log;
 mod payload;
 mod published;
+mod state_piece;
 mod truth;
 
 pub use frame::{
@@ -31,4 +32,5 @@ pub use frame::{
 pub use log::{Item, LogReader, Step, encode};
 pub use payload::{EncodeError, Header, LANDMARKS_A_RECORD, Output, RAW_A_RECORD, Raw, RawSource, Record, Scratch};
 pub use published::Published;
+pub use state_piece::{STATE_A_RECORD, StateOwner, StatePiece};
 pub use truth::{Reference, Truth};

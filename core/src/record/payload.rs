@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::frame::{HEADER_LENGTH, MAX_PAYLOAD};
 use super::published::Published;
+use super::state_piece::{STATE_A_RECORD, StatePiece};
 use super::truth::{Reference, Truth};
 use crate::localizer::{Event, LandmarkUse, Outputs, Parameters, PoseOutput, StatedCapacities};
 use crate::maps::Landmark;
@@ -47,6 +48,8 @@ pub enum Record<'a> {
     Header(Header<'a>),
     /// A piece of the map, at most [`LANDMARKS_A_RECORD`] landmarks.
     Landmarks(&'a [Landmark]),
+    /// A piece of what was known before the first event, of a log that begins in the middle of a drive.
+    State(StatePiece<'a>),
     /// What the localiser was told.
     Event(Event<'a>),
     /// What the localiser answered to the event before.
@@ -145,6 +148,7 @@ mod kind {
     pub const RAW: u8 = 13;
     pub const BEHIND: u8 = 15;
     pub const PUBLISHED: u8 = 16;
+    pub const STATE: u8 = 19;
 }
 
 /// What stands before the beams of a scan, and how many there are.
@@ -172,6 +176,7 @@ impl Record<'_> {
         match self {
             Self::Header(_) => kind::HEADER,
             Self::Landmarks(_) => kind::LANDMARKS,
+            Self::State(_) => kind::STATE,
             Self::Event(event) => event.code(),
             Self::Output(_) => kind::OUTPUT,
             Self::Behind(_) => kind::BEHIND,
@@ -194,6 +199,9 @@ impl Record<'_> {
             Self::Header(header) => put_header(header, room),
             Self::Landmarks(landmarks) if landmarks.len() > LANDMARKS_A_RECORD => return Err(EncodeError::TooLong),
             Self::Landmarks(landmarks) => put_all(landmarks, room),
+            Self::State(piece) if piece.bytes.len() > STATE_A_RECORD => return Err(EncodeError::TooLong),
+            Self::State(piece) => put(&(piece.owner, piece.length, piece.start), room)
+                .and_then(|head| put_bytes(piece.bytes, room.get_mut(head..)?).map(|length| head + length)),
             Self::Event(Event::Encoders(sample)) => put(sample, room),
             Self::Event(Event::EncoderFaults(faults)) => put(faults, room),
             Self::Event(Event::Speed(sample)) => put(sample, room),
@@ -232,6 +240,14 @@ impl Record<'_> {
             kind::LANDMARKS => {
                 take_each(payload, &mut scratch.landmarks)?;
                 Record::Landmarks(&scratch.landmarks)
+            }
+            kind::STATE => {
+                let ((owner, length, start), bytes) =
+                    postcard::take_from_bytes(payload).map_err(|_| DecodeError::Content)?;
+                if bytes.len() > STATE_A_RECORD {
+                    return Err(DecodeError::Content);
+                }
+                Record::State(StatePiece { owner, length, start, bytes })
             }
             kind::ENCODERS => Record::Event(Event::Encoders(take(payload)?)),
             kind::ENCODER_FAULTS => Record::Event(Event::EncoderFaults(take(payload)?)),

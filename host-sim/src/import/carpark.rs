@@ -92,6 +92,7 @@ pub fn read(folder: &Path, window: &RangeInclusive<f64>) -> Result<Recording, Te
         events,
         truth: Vec::new(),
         references,
+        state: None,
     })
 }
 

@@ -73,7 +73,7 @@ pub fn read(path: &Path) -> Result<Recording, TextFileError> {
         line: 1,
         problem: "the header does not state the vehicle's parameters".to_owned(),
     })?;
-    Ok(Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references })
+    Ok(Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references, state: None })
 }
 
 impl Header {

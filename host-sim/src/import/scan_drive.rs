@@ -47,6 +47,7 @@ pub fn drive(log: &ScanLog) -> Option<Recording> {
         events,
         truth: Vec::new(),
         references: log.scans.iter().map(reference).collect(),
+        state: None,
     })
 }
 

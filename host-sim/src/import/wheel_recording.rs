@@ -98,7 +98,7 @@ pub fn of(
     });
     let references = references.collect();
     let parameters = Parameters::new(vehicle, sensor);
-    Ok(Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references })
+    Ok(Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references, state: None })
 }
 
 struct Row<'a> {

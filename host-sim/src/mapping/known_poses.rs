@@ -47,6 +47,7 @@ pub fn odometry_poses(recording: &Recording) -> Result<Vec<Truth>, ReplayError> 
 pub(super) fn by_odometry(recording: &Recording, pose: Pose) -> Recording {
     let mut recording = recording.clone();
     recording.landmarks.clear();
+    recording.state = None;
     recording.events.retain(|event| !matches!(event, RecordedEvent::SetPose(_)));
     let start = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
     let fix = PoseFix { time: start, pose, position_deviation: 0.0, heading_deviation: 0.0 };

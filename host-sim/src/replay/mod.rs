@@ -1,17 +1,19 @@
 //! The core against a recording.
 
 mod comparison;
+mod logged_predictor;
 mod publishing;
 mod start_search;
 
 pub use comparison::{Comparison, Comparisons, compare};
+pub use logged_predictor::{Answer, LoggedPredictor};
 pub use publishing::compare_published;
 pub use start_search::{ContourFinder, ContourRoom, StartSearchError, find_start, find_start_by_contours};
 
 use std::time::{Duration, Instant};
 
 use agv_core::contours::KeptMap;
-use agv_core::localizer::{ContourCapacities, LandmarkUse, Localizer, PoseOutput, PredictionState};
+use agv_core::localizer::{ContourCapacities, LandmarkUse, Localizer, PoseOutput, PredictionState, StateError};
 use agv_core::maps::MapError;
 use agv_core::measurement::Time;
 use agv_core::record::Output;
@@ -69,6 +71,9 @@ pub enum ReplayError {
     /// A landmark is not finite.
     #[error("the map of the recording holds a position that is not a number")]
     MapNotFinite,
+    /// It begins in the middle of a drive, and what was before is not understood.
+    #[error("the log begins in the middle of a drive, and {0}; --start replays it without that state")]
+    State(StateError),
 }
 
 /// Feeds all events of a recording to a new localiser. `progress` is called with the number of events done.
@@ -94,6 +99,9 @@ pub fn replay_in(
         MapError::Full => ReplayError::MapTooLarge,
         MapError::NotFinite => ReplayError::MapNotFinite,
     })?;
+    if let Some(state) = &recording.state {
+        localizer.restore_state(&state.localizer).map_err(ReplayError::State)?;
+    }
     let start = Some((localizer.outputs().pose, localizer.prediction_state()));
     let mut replay = Replay { start, poses: Vec::with_capacity(recording.events.len()), ..Replay::default() };
     let mut told: Option<Time> = None;

@@ -1,99 +1,47 @@
 //! What the vehicle was given while the localiser was busy, published again.
 
-use agv_controller::MOTIONS;
-use agv_core::localizer::{Event, OutputPredictor};
 use agv_core::record::{MAX_FRAME, Published, Record, encode};
 
-use super::{Comparison, Replay};
+use super::{Answer, Comparison, LoggedPredictor, Replay};
 use crate::recording::{Publishing, Recording};
 
 /// Publishes again what was published when the recording was made, and compares. `first_difference` is the number of events
-/// before the first pose that is not the recorded one, bit for bit.
+/// before the first pose that is not the recorded one, bit for bit. A recording that begins in the middle of a drive and does not tell
+/// what the publisher knew is not compared.
 #[must_use]
 pub fn compare_published(recording: &Recording, publishing: &Publishing, replay: &Replay) -> Comparison {
-    let mut publisher = Publisher::new(recording, replay);
+    let mut comparison = Comparison { compared: 0, first_difference: None };
+    let Recording { parameters, .. } = recording;
+    let predictor = match &recording.state {
+        None => Ok(LoggedPredictor::new(parameters)),
+        Some(state) => LoggedPredictor::restored(parameters, &state.predictor),
+    };
+    let Ok(mut predictor) = predictor else { return comparison };
+    let answer = |events: i64| answer_to(replay, events);
     let mut behind = publishing.behind.iter().peekable();
     let mut frames = [vec![0; MAX_FRAME], vec![0; MAX_FRAME]];
-    let mut first_difference = None;
     let mut heard = 0;
     for recorded in &publishing.poses {
-        for event in heard..recorded.events {
-            let behind = behind.next_if(|next| next.0 == event).map_or(0, |next| next.1);
-            publisher.hear(event, behind);
+        for (number, event) in recording.events.iter().enumerate().take(recorded.events).skip(heard) {
+            let behind = behind.next_if(|next| next.0 == number).map_or(0, |next| next.1);
+            predictor.hear(&event.view(), number as i64, behind, answer);
         }
         heard = recorded.events;
-        let again = publisher.publish(recorded.events, recorded.published.behind);
+        let behind = recorded.published.behind;
+        let again = predictor.publish(recorded.events as i64, behind, answer).map(|pose| Published { pose, behind });
         let [first, second] = &mut frames;
         let is_equal = again.is_some_and(|again| bytes(recorded.published, first) == bytes(again, second));
-        if !is_equal && first_difference.is_none() {
-            first_difference = Some(recorded.events);
+        if !is_equal && comparison.first_difference.is_none() {
+            comparison.first_difference = Some(recorded.events);
         }
     }
-    Comparison { compared: publishing.poses.len(), first_difference }
+    Comparison { compared: publishing.poses.len(), ..comparison }
 }
 
-/// The controller's predictor between the events of a recording and their answers.
-struct Publisher<'a> {
-    recording: &'a Recording,
-    replay: &'a Replay,
-    predictor: OutputPredictor<MOTIONS>,
-    /// How many events had been answered for the predictor.
-    answered: usize,
-}
-
-impl<'a> Publisher<'a> {
-    fn new(recording: &'a Recording, replay: &'a Replay) -> Self {
-        Self { recording, replay, predictor: OutputPredictor::new(&recording.parameters), answered: 0 }
-    }
-
-    /// Takes the event of that index, when so many before it had not been answered.
-    fn hear(&mut self, event: usize, behind: u32) {
-        match self.recording.events[event].view() {
-            Event::Encoders(sample) => {
-                self.take_answer(event, behind);
-                self.predictor.encoders(&sample);
-            }
-            Event::Wheels(sample) => {
-                self.take_answer(event, behind);
-                self.predictor.wheels(&sample);
-            }
-            Event::Speed(sample) => {
-                self.take_answer(event, behind);
-                self.predictor.speed(&sample);
-            }
-            Event::Increment(increment) => {
-                self.take_answer(event, behind);
-                self.predictor.increment(&increment);
-            }
-            Event::Gyro(sample) => {
-                self.take_answer(event, behind);
-                self.predictor.gyro(&sample);
-            }
-            Event::EncoderFaults(faults) => {
-                self.take_answer(event, behind);
-                self.predictor.doubt_encoders(&faults);
-            }
-            _ => {}
-        }
-    }
-
-    /// The pose behind so many events, when so many of them had not been answered.
-    fn publish(&mut self, events: usize, behind: u32) -> Option<Published> {
-        self.take_answer(events, behind);
-        Some(Published { pose: self.predictor.output()?, behind })
-    }
-
-    fn take_answer(&mut self, events: usize, behind: u32) {
-        let answered = events.saturating_sub(behind as usize);
-        if self.predictor.output().is_some() && answered == self.answered {
-            return;
-        }
-        self.answered = answered;
-        if let Some(answer) = answered.checked_sub(1) {
-            self.predictor.update(&self.replay.poses[answer], &self.replay.predictions[answer]);
-        } else if let Some((pose, prediction)) = &self.replay.start {
-            self.predictor.update(pose, prediction);
-        }
+fn answer_to(replay: &Replay, events: i64) -> Option<Answer> {
+    match usize::try_from(events).ok()?.checked_sub(1) {
+        Some(event) => Some((*replay.poses.get(event)?, *replay.predictions.get(event)?)),
+        None => replay.start,
     }
 }
 

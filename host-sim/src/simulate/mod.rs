@@ -115,6 +115,7 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
         events: arrivals.in_order(),
         truth,
         references: Vec::new(),
+        state: None,
     };
     Ok(Simulation { recording, world, path, true_tricycle, true_laser })
 }

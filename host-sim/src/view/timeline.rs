@@ -225,7 +225,12 @@ impl Timeline {
             }
             Record::Note(text) => self.happen(self.now(), HappeningKind::Note, (*text).to_owned()),
             // The page shows what the localiser says, and the pose that is published follows it.
-            Record::Behind(_) | Record::Published(_) | Record::Reference(_) | Record::Raw(_) | Record::End => {}
+            Record::Behind(_)
+            | Record::Published(_)
+            | Record::Reference(_)
+            | Record::Raw(_)
+            | Record::State(_)
+            | Record::End => {}
         }
     }
 

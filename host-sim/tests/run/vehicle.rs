@@ -362,7 +362,7 @@ fn among_equals(pose: Pose) -> Recording {
         seen.sort_by_key(|one| one.time);
         events.push(RecordedEvent::Reflectors(seen.into()));
     }
-    Recording { parameters, landmarks, events, truth: Vec::new(), references: Vec::new() }
+    Recording { parameters, landmarks, events, truth: Vec::new(), references: Vec::new(), state: None }
 }
 
 #[test]

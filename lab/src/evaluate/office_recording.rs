@@ -35,7 +35,7 @@ impl OfficeDrive {
         let mut parameters = Parameters::new(Vehicle::Increments, Pose::default());
         parameters.odometry_noise = *noise;
         parameters.limits.longest_extrapolation = LONGEST_EXTRAPOLATION;
-        Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references: Vec::new() }
+        Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references: Vec::new(), state: None }
     }
 
     /// The noise of the odometry by what the scans say.

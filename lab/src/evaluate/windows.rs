@@ -231,6 +231,7 @@ fn run(
         events,
         truth: Vec::new(),
         references: Vec::new(),
+        state: None,
     };
     let replay = replay(&recording, |_| {})?;
     let found = replay.poses.last().map_or(Pose::default(), |pose| pose.pose);

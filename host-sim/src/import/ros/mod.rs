@@ -179,7 +179,8 @@ pub fn read(path: &Path, choice: &Choice) -> Result<Imported, RosImportError> {
     if let Some(factor) = sign {
         parameters.gyro = GyroParameters { is_fitted: true, factor, ..GyroParameters::default() };
     }
-    let recording = Recording { events, parameters, landmarks: Vec::new(), truth: Vec::new(), references: Vec::new() };
+    let recording =
+        Recording { events, parameters, landmarks: Vec::new(), truth: Vec::new(), references: Vec::new(), state: None };
     Ok(Imported { recording, account })
 }
 

@@ -223,5 +223,5 @@ fn recording(truth: &[Pose], caster: &RayCaster, seed: u64) -> Recording {
             events.push(RecordedEvent::Scan(revolution(caster, laser_at, (time(first), BEAM_INTERVAL), &mut laser)));
         }
     }
-    Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references: Vec::new() }
+    Recording { parameters, landmarks: Vec::new(), events, truth: Vec::new(), references: Vec::new(), state: None }
 }
