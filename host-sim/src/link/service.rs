@@ -12,6 +12,7 @@ use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::authentication::{Nonce, tag};
 use agv_settings::service::{Change, Frames, LONGEST_MESSAGE, PROTOCOL, Refusal, Request, Response, encode};
 use agv_settings::store::{KEY, PIECE, StoreError};
+use serde::Serialize;
 
 use crate::contour_map::ContourMap;
 
@@ -91,6 +92,9 @@ fn explain(refusal: Refusal) -> String {
             "the CAN bus would be loaded by more than 60 % of its bit rate; it needs a longer can.publishing_period or \
              can.encoder_period, or a higher can.bit_rate"
         }
+        Refusal::NoIncidents => {
+            "the controller keeps no such incident: a board keeps none, and agv run keeps them if its file has [recording]"
+        }
         Refusal::Pose => "the pose or its deviations are no sensible numbers",
         Refusal::Store(StoreError::Full) => "the flash is full",
         Refusal::Store(StoreError::Map) => "the map is too large, or was not sent as a whole",
@@ -109,6 +113,15 @@ pub struct Setting {
     pub unit: String,
     /// What it is set to.
     pub value: Value,
+}
+
+/// An incident that a controller keeps.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct KeptIncident {
+    /// The name of its log.
+    pub name: String,
+    /// Bytes of the log.
+    pub length: u32,
 }
 
 /// What runs on a controller.
@@ -319,6 +332,52 @@ impl Client {
                 return Err(other(KeptMapError::Format));
             }
         }
+    }
+
+    /// The incidents that it keeps, the oldest first.
+    ///
+    /// # Errors
+    /// If it does not answer, or keeps none.
+    pub fn incidents(&mut self) -> Result<Vec<KeptIncident>, ServiceError> {
+        let mut incidents = Vec::new();
+        for place in 0..=u16::MAX {
+            let found = self.ask(&Request::Incident(place), |response| match response {
+                Response::Incident { name, length } => {
+                    Some(Some(KeptIncident { name: (*name).to_owned(), length: *length }))
+                }
+                Response::End => Some(None),
+                _ => None,
+            })?;
+            match found {
+                Some(incident) => incidents.push(incident),
+                None => break,
+            }
+        }
+        Ok(incidents)
+    }
+
+    /// Writes the log of an incident to `log`; `progress` is told each piece's bytes.
+    ///
+    /// # Errors
+    /// If it does not answer, has no such incident any more, or the log cannot be written.
+    pub fn fetch_incident(
+        &mut self,
+        incident: &KeptIncident,
+        log: &mut impl Write,
+        mut progress: impl FnMut(usize),
+    ) -> Result<(), ServiceError> {
+        let mut first = 0;
+        while first < incident.length {
+            let request = Request::IncidentPiece { name: &incident.name, first };
+            let piece = self.ask(&request, |response| match response {
+                Response::IncidentPiece(piece) if !piece.is_empty() => Some((*piece).to_vec()),
+                _ => None,
+            })?;
+            log.write_all(&piece).map_err(|source| self.io(source))?;
+            progress(piece.len());
+            first += piece.len() as u32;
+        }
+        Ok(())
     }
 
     /// What the last panic said; empty if there was none.

@@ -32,6 +32,15 @@ pub enum Request<'a> {
     Change(Change<'a>),
     /// The bytes of the map of contours from that one on.
     Contours(u32),
+    /// The incident at that place in the list of all, the oldest first.
+    Incident(u16),
+    /// The bytes of the log of an incident from that one on.
+    IncidentPiece {
+        /// Its name.
+        name: &'a str,
+        /// Where they begin.
+        first: u32,
+    },
 }
 
 /// What changes something: it has a tag, and the vehicle must stand.
@@ -101,7 +110,7 @@ pub enum Response<'a> {
     },
     /// The setting does not matter for the kind of the vehicle, but the list goes on.
     NoLeaf,
-    /// The list of settings ends before that place.
+    /// The list of settings, or of incidents, ends before that place.
     End,
     /// A piece of the map that the vehicle uses.
     Map {
@@ -123,7 +132,19 @@ pub enum Response<'a> {
         /// Those from the place that was asked for on.
         piece: &'a [u8],
     },
+    /// An incident.
+    Incident {
+        /// The name of its log.
+        name: &'a str,
+        /// Bytes of the log.
+        length: u32,
+    },
+    /// Bytes of the log of an incident, at most [`INCIDENT_PIECE`]; none behind its end.
+    IncidentPiece(&'a [u8]),
 }
+
+/// Most bytes of a piece of an incident.
+pub const INCIDENT_PIECE: usize = 1024;
 
 /// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -148,4 +169,6 @@ pub enum Refusal {
     BusLoad,
     /// With the value the setting of that key is out of its bounds, or does not go with the others.
     Other(u16),
+    /// The controller keeps no incidents, or not that one.
+    NoIncidents,
 }

@@ -10,5 +10,5 @@ mod message;
 mod server;
 
 pub use frame::{Frames, LONGEST_MESSAGE, MessageError, encode};
-pub use message::{Change, PROTOCOL, Refusal, Request, Response};
+pub use message::{Change, INCIDENT_PIECE, PROTOCOL, Refusal, Request, Response};
 pub use server::{Action, Answer, Controller, Kept, Session, answer_kept, keep};

@@ -133,6 +133,8 @@ impl Session {
             Request::Map(first) => map_piece(controller.landmarks, first),
             Request::Panic => Response::Panic(controller.panic),
             Request::Contours(first) => contour_piece(controller.contours.as_mut(), first, &mut piece),
+            // Who keeps some answers before.
+            Request::Incident(_) | Request::IncidentPiece { .. } => Response::Refused(Refusal::NoIncidents),
             Request::Change(change) => {
                 let signed = message.get(..message.len() - TAG).unwrap_or_default();
                 let outcome = self.permit(controller, signed, tag, is_standing);
