@@ -17,7 +17,7 @@ use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::Recording;
-use agv_host_sim::run::{FLASH, Options, Ports, RealTime, Running, run};
+use agv_host_sim::run::{FLASH, Logs, Options, Ports, RealTime, RingOptions, Running, run};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options as SensorOptions};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{simulate, standard};
@@ -107,6 +107,8 @@ fn nothing_is_taken_once_it_runs() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(FLASH), flash_image(&settings, &recording.landmarks, None).unwrap()).unwrap();
     let adapter = format!("slcan-tcp:127.0.0.1:{}", ports[1]);
+    // Its next part begins behind the test: who writes files takes memory then, but nobody who has a deadline.
+    let ring = RingOptions { part: PATIENCE, ..RingOptions::usual(folder.path().join("recording")) };
     let options = Options {
         store: folder.path().to_owned(),
         open_bus: Box::new(move || bus::open(&adapter)),
@@ -116,7 +118,7 @@ fn nothing_is_taken_once_it_runs() {
         real_time: RealTime::default(),
         datagrams: Vec::new(),
         socket: None,
-        log: None,
+        logs: Logs { whole: None, ring: Some(ring) },
     };
     let is_stopped = Arc::new(AtomicBool::new(false));
     let mut taken = None;

@@ -16,7 +16,7 @@ use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::link::clock::Clock;
 use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::Recording;
-use agv_host_sim::run::{BusState, FLASH, Options, Ports, RealTime, Running, run};
+use agv_host_sim::run::{BusState, FLASH, Logs, Options, Ports, RealTime, Running, run};
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options as SensorOptions};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::{simulate, standard};
@@ -132,7 +132,7 @@ fn inside(interface: &str) {
         real_time: RealTime::default(),
         datagrams: Vec::new(),
         socket: None,
-        log: None,
+        logs: Logs::default(),
     };
     let (is_over, is_stopped) = (AtomicBool::new(false), Arc::new(AtomicBool::new(false)));
     let look = |running: &Running| {

@@ -15,7 +15,7 @@ use agv_host_sim::log;
 use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording, truth_at};
 use agv_host_sim::replay::{Replay, replay};
 #[cfg(target_os = "linux")]
-use agv_host_sim::run::{Demonstration, RealTime};
+use agv_host_sim::run::{Demonstration, Logs, RealTime};
 use agv_host_sim::simulate::scenario::Scenario;
 use agv_host_sim::simulate::simulate;
 use agv_host_sim::view::{Shared, Timeline, follow, load, serve};
@@ -254,18 +254,19 @@ fn a_demonstration_is_looked_at() {
     let mut found = Value::Null;
     let demonstration = Demonstration::new().unwrap();
     let remark = |text: &str| println!("{text}");
-    let summary = demonstration.run(folder.path(), RealTime::default(), None, &is_stopped, &remark, |running| {
-        let host = running.log.to_string();
-        let look = || {
-            browse(Timeline::of_controller(&host), "live", pictures.to_str().unwrap(), |shared, is_over| {
-                follow(&host, None, shared, is_over, |_| ()).unwrap();
-            })
-        };
-        // Whatever it shows, the demonstration ends.
-        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(look));
-        is_stopped.store(true, Ordering::Relaxed);
-        found = outcome.unwrap_or_default();
-    });
+    let summary =
+        demonstration.run(folder.path(), RealTime::default(), Logs::default(), &is_stopped, &remark, |running| {
+            let host = running.log.to_string();
+            let look = || {
+                browse(Timeline::of_controller(&host), "live", pictures.to_str().unwrap(), |shared, is_over| {
+                    follow(&host, None, shared, is_over, |_| ()).unwrap();
+                })
+            };
+            // Whatever it shows, the demonstration ends.
+            let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(look));
+            is_stopped.store(true, Ordering::Relaxed);
+            found = outcome.unwrap_or_default();
+        });
     let summary = summary.unwrap();
     assert!(summary.was_localised, "{summary:?}");
     let place = |name: &str| ["x_m", "y_m"].map(|axis| number(&found["found"][name]["pose"][axis]));

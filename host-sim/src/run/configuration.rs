@@ -2,11 +2,13 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde::Deserialize;
 
 use super::discrete::DiscreteConfiguration;
 use super::gyro::GyroConfiguration;
+use super::log_ring::RingOptions;
 use super::real_time::RealTime;
 use crate::text_file::{self, TextFileError};
 
@@ -36,6 +38,38 @@ pub struct Configuration {
     /// Where state and figures are shown.
     #[serde(default)]
     pub status: StatusConfiguration,
+    /// What is kept of what happens; nothing if it is absent.
+    pub recording: Option<RecordingConfiguration>,
+}
+
+/// What is kept of what happens: the last minutes, and incidents.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingConfiguration {
+    /// Folder of both.
+    pub folder: PathBuf,
+    /// Time that is kept, min.
+    #[serde(default = "usual_minutes")]
+    pub minutes: u32,
+    /// Most that it may take of the disk, MiB.
+    #[serde(default = "usual_size")]
+    pub ring_mib: u32,
+    /// Most that all incidents together may take of it, MiB.
+    #[serde(default = "usual_size")]
+    pub incidents_mib: u32,
+}
+
+impl RecordingConfiguration {
+    /// As a run takes it.
+    #[must_use]
+    pub fn options(&self) -> RingOptions {
+        RingOptions {
+            span: Duration::from_secs(60 * u64::from(self.minutes)),
+            ring_bytes: u64::from(self.ring_mib) << 20,
+            incident_bytes: u64::from(self.incidents_mib) << 20,
+            ..RingOptions::usual(self.folder.clone())
+        }
+    }
 }
 
 /// Who is told each pose.
@@ -65,6 +99,14 @@ impl Default for StatusConfiguration {
 
 const fn everywhere() -> IpAddr {
     IpAddr::V4(Ipv4Addr::UNSPECIFIED)
+}
+
+const fn usual_minutes() -> u32 {
+    10
+}
+
+const fn usual_size() -> u32 {
+    512
 }
 
 const fn usual() -> RealTime {

@@ -15,7 +15,7 @@ use agv_wire::can::controller::PoseReceiver;
 use agv_wire::can::frame::Frame;
 use agv_wire::nav350::SensorFrame;
 
-use super::{DiscretePort, FLASH, Options, Ports, RealTime, RunError, Running, Summary};
+use super::{DiscretePort, FLASH, Logs, Options, Ports, RealTime, RunError, Running, Summary};
 use crate::bus::{Bus, BusError, InProcessBus, InProcessNode};
 use crate::emulate::gyro::EmulatedGyro;
 use crate::emulate::motion::{EmulatedMotion, MotionError};
@@ -101,7 +101,7 @@ impl Demonstration {
     }
 
     /// Drives with a controller whose store is in `folder`, until `is_stopped`. The controller finds out by itself where it is; then
-    /// the vehicle drives off, and it stands when the drive is over. `log`, `note` and `watch` are those
+    /// the vehicle drives off, and it stands when the drive is over. `logs`, `note` and `watch` are those
     /// of [`super::run`].
     ///
     /// # Errors
@@ -110,7 +110,7 @@ impl Demonstration {
         mut self,
         folder: &Path,
         real_time: RealTime,
-        log: Option<&Path>,
+        logs: Logs,
         is_stopped: &Arc<AtomicBool>,
         note: &(dyn Fn(&str) + Sync),
         watch: impl FnOnce(&Running) + Send,
@@ -133,7 +133,7 @@ impl Demonstration {
             real_time,
             datagrams: Vec::new(),
             socket: None,
-            log: log.map(Path::to_owned),
+            logs,
         };
         let is_over = AtomicBool::new(false);
         std::thread::scope(|scope| {

@@ -94,6 +94,7 @@ pub(super) struct Exchange {
     poses: SyncSender<PoseOutput>,
     faults: (SyncSender<Fault>, Mutex<Receiver<Fault>>),
     readings: (SyncSender<GyroSample>, Mutex<Receiver<GyroSample>>),
+    has_failed: AtomicBool,
     localizer: OnceLock<Thread>,
     estimate: Mutex<Option<Estimate>>,
     laser: Mutex<SensorWatch>,
@@ -143,6 +144,7 @@ impl Exchange {
             poses,
             faults: (faults, Mutex::new(faults_end)),
             readings: (readings, Mutex::new(readings_end)),
+            has_failed: AtomicBool::new(false),
             localizer: OnceLock::new(),
             estimate: Mutex::new(None),
             laser: Mutex::new(SensorWatch::new()),
@@ -244,7 +246,16 @@ impl Exchange {
 
     /// The bus was told of a fault, or of its end. Without room it is left out: the bus has it nevertheless.
     pub fn tell_fault(&self, fault: Fault) {
+        // What is wrong from the beginning is no incident of a drive.
+        if !fault.is_over && self.was_localised() {
+            self.has_failed.store(true, Ordering::Relaxed);
+        }
         let _ = self.faults.0.try_send(fault);
+    }
+
+    /// Whether the bus was told of a fault since the last call, once the vehicle has known where it is.
+    pub fn has_failed(&self) -> bool {
+        self.has_failed.swap(false, Ordering::Relaxed)
     }
 
     /// The next fault, or end of one, that the bus was told of.

@@ -9,6 +9,7 @@ use agv_core::maps::Landmark;
 use agv_core::state::Relocalization;
 
 use super::exchange::{Exchange, LocalizerQueues, Task};
+use super::incident::Incident;
 use super::kept_pose::verified;
 use super::log_queue::LogWriter;
 
@@ -33,7 +34,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
     /// Handles what comes until everything ends.
     pub fn run(mut self) {
         self.exchange.be_localizer();
-        self.exchange.publish(self.localization.estimate());
+        self.tell();
         while !self.exchange.is_over() {
             if !self.step() {
                 std::thread::park_timeout(NAP);
@@ -46,6 +47,9 @@ impl<L: Localize> LocalizerLoop<'_, L> {
     fn step(&mut self) -> bool {
         self.exchange.check_in(Task::Localizer);
         self.log_published(self.localization.told());
+        if self.exchange.has_failed() {
+            self.log.tell(Incident::Fault);
+        }
         self.take_bus_event() || self.take_revolution() || self.search()
     }
 
@@ -56,8 +60,16 @@ impl<L: Localize> LocalizerLoop<'_, L> {
         }
         let Self { localization, log, .. } = self;
         localization.hear(&told, |record| log.write(record));
-        self.exchange.publish(self.localization.estimate());
+        self.tell();
+        self.log.begin_again(self.localization.localizer());
         true
+    }
+
+    /// Tells the bus what the localiser says.
+    fn tell(&mut self) {
+        let estimate = self.localization.estimate();
+        self.log.answer(&estimate);
+        self.exchange.publish(estimate);
     }
 
     fn take_revolution(&mut self) -> bool {
@@ -74,7 +86,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
             (self.note)("start: two places look alike; what is seen fits where the vehicle was last");
             self.kept = None;
         }
-        self.exchange.publish(self.localization.estimate());
+        self.tell();
         let _ = self.queues.free_revolutions.try_send(revolution);
         true
     }
@@ -88,7 +100,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
             log.write(record);
         });
         if has_spoken || localization.relocalization() != before {
-            self.exchange.publish(self.localization.estimate());
+            self.tell();
         }
         is_busy
     }

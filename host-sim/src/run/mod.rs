@@ -14,16 +14,20 @@ mod exchange;
 mod fault;
 mod flash_file;
 mod gyro;
+mod incident;
+mod incident_service;
 mod kept;
 mod kept_pose;
 mod laser_loop;
 mod localizer_loop;
 mod log_file;
 mod log_queue;
+mod log_ring;
 mod periods;
 mod pose_line;
 mod real_time;
 mod service_port;
+mod state_keeper;
 mod status;
 
 use std::io;
@@ -43,15 +47,17 @@ use serde::Serialize;
 
 pub use attendance::attend;
 pub use bus_port::OpenBus;
-pub use configuration::{Configuration, ConfigurationError};
+pub use configuration::{Configuration, ConfigurationError, RecordingConfiguration};
 pub use demonstration::{Demonstration, DemonstrationError};
 pub use discrete::{DiscreteConfiguration, DiscretePort, LineError, LineName};
 pub use exchange::BusState;
 pub use fault::Fault;
 pub use flash_file::{FlashFile, FlashFileError, Refused};
 pub use gyro::{GyroConfiguration, GyroOpenError, GyroPort, OpenGyro};
+pub use incident::Incident;
 pub use kept::{CONTOURS, FLASH, Kept, SOFTWARE, StoreFolderError, read};
 pub use kept_pose::{KeptPose, POSE};
+pub use log_ring::RingOptions;
 pub use periods::{PeriodClock, PeriodFigures, Periods};
 pub use pose_line::{PoseLine, PoseSinkError};
 pub use real_time::RealTime;
@@ -61,8 +67,9 @@ use self::bus_loop::BusLoop;
 use self::bus_port::BusPort;
 use self::exchange::{Exchange, Queues, Task};
 use self::localizer_loop::LocalizerLoop;
-use self::log_file::LogFile;
-use self::log_queue::{LogReader, log_queue};
+use self::log_file::{Beginning, LogFile};
+use self::log_queue::{LogItem, LogReader, divide, log_queue};
+use self::log_ring::{LogRing, log_ring, write_incidents};
 use self::pose_line::{PoseSinks, bounded};
 use self::real_time::Lacks;
 use crate::drive::mode_name;
@@ -138,8 +145,17 @@ pub struct Options {
     pub datagrams: Vec<SocketAddr>,
     /// The socket of Unix at which poses are told.
     pub socket: Option<PathBuf>,
+    /// What is written of it.
+    pub logs: Logs,
+}
+
+/// What is written of a run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Logs {
     /// The log of the whole run, from the first event on.
-    pub log: Option<PathBuf>,
+    pub whole: Option<PathBuf>,
+    /// The last minutes, and incidents.
+    pub ring: Option<RingOptions>,
 }
 
 /// A controller that runs.
@@ -311,8 +327,17 @@ pub fn run(
     let header = Header { software: SOFTWARE, parameters: &settings.parameters, capacities };
     relay.pass(&Record::Header(header));
     landmarks.chunks(LANDMARKS_A_RECORD).for_each(|piece| relay.pass(&Record::Landmarks(piece)));
-    let (log_writer, log_reader) = log_queue(exchange, landmarks.len());
-    let log_file = options.log.as_deref().map(|path| LogFile::begin(path, &header, landmarks)).transpose()?;
+    let beginning = Beginning { header, landmarks };
+    let (mut log_writer, mut log_reader) = log_queue(exchange, beginning.frames());
+    let log_file = options.logs.whole.as_deref().map(|path| LogFile::begin(path, &beginning)).transpose()?;
+    let ring_options = options.logs.ring;
+    let incidents_folder = ring_options.as_ref().map(RingOptions::incidents);
+    let ring = ring_options.as_ref().map(|ring| log_ring(ring, beginning, starts)).transpose()?;
+    if let Some(ring) = &ring_options {
+        let room = size_of::<Localizer<LentCapacities>>();
+        let ends = (&mut log_writer, &mut log_reader);
+        divide(ends, &settings.parameters, settings.parameters.alert_limits, (ring.part, room));
+    }
     if options.real_time.lock_memory {
         real_time::lock_memory(&lacks);
     }
@@ -387,9 +412,13 @@ pub fn run(
         if localizing.is_err() || lasing.is_err() || busing.is_err() || besides().any(Result::is_err) {
             exchange.stop();
         }
-        let passing = scope.spawn(move || pass_log(&log_reader, relay, log_file, exchange, note));
+        let (ring, incidents) = ring.unzip();
+        let passing = scope.spawn(move || pass_log(&log_reader, relay, (log_file, ring), exchange, note));
+        if let Some((incidents, ring_options)) = incidents.zip(ring_options.as_ref()) {
+            scope.spawn(move || write_incidents(&incidents, ring_options, note));
+        }
         scope.spawn(|| relay.serve(&relay_stop));
-        scope.spawn(|| service_port::serve(&service_listener, &controller, exchange));
+        scope.spawn(|| service_port::serve(&service_listener, &controller, incidents_folder.as_deref(), exchange));
         scope.spawn(|| service_port::keep(&controller, exchange, note));
         scope.spawn(move || sinks.run(poses, &limits, exchange));
         scope.spawn(move || watch(&Running { exchange, log, service, starts, map, store, limits, begin }));
@@ -430,11 +459,11 @@ pub fn run(
     })
 }
 
-/// Passes the log on to those who listen, and to its file, until everything ends and nothing is left.
+/// Passes the log on to those who listen, and to its files, until everything ends and nothing is left.
 fn pass_log(
     log: &LogReader,
     relay: &Relay,
-    mut file: Option<LogFile>,
+    (mut file, mut ring): (Option<LogFile>, Option<LogRing>),
     exchange: &Exchange,
     note: &(dyn Fn(&str) + Sync),
 ) {
@@ -444,17 +473,49 @@ fn pass_log(
             note(&format!("log: {error}; no more is written to it"));
         }
     };
+    // A disk that is full says so each time; people are told once, until it has taken something again.
+    let mut is_told = false;
+    let mut tell = |outcome: Result<(), LogError>| match outcome {
+        Ok(()) => is_told = false,
+        Err(error) if !std::mem::replace(&mut is_told, true) => note(&format!("recording: {error}")),
+        Err(_) => {}
+    };
+    if let Some(ring) = &mut ring {
+        tell(ring.begin());
+    }
     loop {
         match log.full.recv_timeout(LOOK) {
-            Ok(frame) => {
+            Ok(LogItem::Frame(frame)) => {
                 relay.pass_frame(frame.bytes());
                 if let Some(Err(error)) = file.as_mut().map(|file| file.write(frame.bytes())) {
                     finish(file.take(), Some(error));
                 }
+                if let Some(Err(error)) = ring.as_mut().map(|ring| ring.write(frame.bytes())) {
+                    tell(Err(error));
+                }
                 log.give_back(frame);
             }
+            Ok(LogItem::States(states, next)) => {
+                if let Some(ring) = &mut ring {
+                    tell(ring.go_on(&states, next));
+                }
+                log.give_states_back(states);
+            }
+            Ok(LogItem::Incident(incident)) => {
+                if let Some(ring) = &mut ring {
+                    ring.take(incident);
+                }
+            }
             Err(std::sync::mpsc::RecvTimeoutError::Timeout) if !exchange.is_over() => {}
-            Err(_) => return finish(file, None),
+            Err(_) => {
+                if let Some(ring) = ring {
+                    tell(ring.finish());
+                }
+                return finish(file, None);
+            }
+        }
+        if let Some(ring) = ring.as_mut().filter(|ring| ring.is_due()) {
+            tell(ring.keep());
         }
     }
 }

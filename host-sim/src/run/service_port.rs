@@ -3,6 +3,7 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -15,6 +16,7 @@ use agv_wire::can::controller_node::CommunicationParameters;
 
 use super::exchange::Exchange;
 use super::flash_file::FlashFile;
+use super::incident_service;
 
 /// Connections at once.
 const CONNECTIONS: usize = 2;
@@ -45,7 +47,12 @@ where
 }
 
 /// Serves connections until everything ends.
-pub(super) fn serve(listener: &TcpListener, controller: &SharedController, exchange: &Exchange) {
+pub(super) fn serve(
+    listener: &TcpListener,
+    controller: &SharedController,
+    incidents: Option<&Path>,
+    exchange: &Exchange,
+) {
     if listener.set_nonblocking(true).is_err() {
         return;
     }
@@ -61,14 +68,19 @@ pub(super) fn serve(listener: &TcpListener, controller: &SharedController, excha
             let count = &count;
             scope.spawn(move || {
                 // A connection that fails is the client's affair.
-                let _ = converse(stream, controller, exchange);
+                let _ = converse(stream, controller, incidents, exchange);
                 count.fetch_sub(1, Ordering::Relaxed);
             });
         }
     });
 }
 
-fn converse(mut stream: TcpStream, controller: &SharedController, exchange: &Exchange) -> Result<(), Gone> {
+fn converse(
+    mut stream: TcpStream,
+    controller: &SharedController,
+    incidents: Option<&Path>,
+    exchange: &Exchange,
+) -> Result<(), Gone> {
     stream.set_nonblocking(false)?;
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(PATIENCE))?;
@@ -95,12 +107,15 @@ fn converse(mut stream: TcpStream, controller: &SharedController, exchange: &Exc
             if !is_whole {
                 continue;
             }
-            let (length, action) = {
-                let mut controller = locked(controller);
-                let (is_standing, now) = (exchange.is_standing(), exchange.now());
-                let answer = session.answer(frames.message(), &mut controller, is_standing, now, &mut room);
-                block_on(answer).map_err(|_| Gone)?
-            };
+            let (length, action) =
+                if let Some(answer) = incident_service::answer(frames.message(), incidents, &mut room) {
+                    (answer.map_err(|_| Gone)?, Action::None)
+                } else {
+                    let mut controller = locked(controller);
+                    let (is_standing, now) = (exchange.is_standing(), exchange.now());
+                    let answer = session.answer(frames.message(), &mut controller, is_standing, now, &mut room);
+                    block_on(answer).map_err(|_| Gone)?
+                };
             frames.clear();
             stream.write_all(&room[..length])?;
             match action {

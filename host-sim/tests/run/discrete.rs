@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use agv_controller::{DiscreteLines, Line, LineSet};
-use agv_host_sim::run::{Demonstration, Fault, RealTime, Running};
+use agv_host_sim::run::{Demonstration, Fault, Logs, RealTime, Running};
 use agv_wire::can::controller_node::ErrorKind;
 use embedded_hal::digital::{ErrorKind as PinErrorKind, ErrorType, InputPin, OutputPin};
 
@@ -87,7 +87,7 @@ fn wires_say_what_the_bus_says_and_nothing_when_it_ends() {
     };
     let remark = |text: &str| println!("{text}");
     let demonstration = Demonstration::of(hall()).with_lines(Box::new(lines));
-    let summary = demonstration.run(folder.path(), RealTime::default(), None, &is_stopped, &remark, watch).unwrap();
+    let summary = demonstration.run(folder.path(), RealTime::default(), Logs::default(), &is_stopped, &remark, watch).unwrap();
     assert!(summary.was_localised);
     assert_eq!(wires.map(|wire| wire.is_high()), [false; 3]);
 }

@@ -3,4 +3,5 @@
 
 mod discrete;
 mod flash_file;
+mod recording;
 mod vehicle;

@@ -21,7 +21,7 @@ use agv_host_sim::live::stream::record_stream;
 use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::run::{
-    BusState, Demonstration, FLASH, GyroPort, KeptPose, Options, Ports, RealTime, RunError, Running, Summary, run,
+    BusState, Demonstration, FLASH, GyroPort, KeptPose, Logs, Options, Ports, RealTime, RunError, Running, Summary, run,
 };
 use agv_host_sim::serve::nav350::{Drive, Nav350, Options as SensorOptions};
 use agv_host_sim::simulate::scenario::Scenario;
@@ -36,7 +36,7 @@ use agv_wire::nav350::SensorFrame;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Waits for an event.
-pub(super) fn wait(what: &str, mut has_come: impl FnMut() -> bool) {
+pub fn wait(what: &str, mut has_come: impl FnMut() -> bool) {
     let start = Instant::now();
     while !has_come() {
         assert!(start.elapsed() < PATIENCE, "{what} has not come");
@@ -45,14 +45,14 @@ pub(super) fn wait(what: &str, mut has_come: impl FnMut() -> bool) {
 }
 
 /// The hall without scans, which take long to simulate.
-pub(super) fn hall() -> Recording {
+pub fn hall() -> Recording {
     let mut scenario: Scenario = toml::from_str(standard::HALL).unwrap();
     scenario.laser.scans = false;
     simulate(&scenario).unwrap().recording
 }
 
 /// Ends a run, also if what looks at it fails.
-pub(super) struct End(pub Arc<AtomicBool>);
+pub struct End(pub Arc<AtomicBool>);
 
 impl Drop for End {
     fn drop(&mut self) {
@@ -68,7 +68,8 @@ fn drive(folder: &Path, log: &Path, watch: impl FnOnce(&Running) + Send) -> Summ
         watch(running);
     };
     let remark = |text: &str| println!("{text}");
-    Demonstration::of(hall()).run(folder, RealTime::default(), Some(log), &is_stopped, &remark, watch).unwrap()
+    let logs = Logs { whole: Some(log.to_owned()), ring: None };
+    Demonstration::of(hall()).run(folder, RealTime::default(), logs, &is_stopped, &remark, watch).unwrap()
 }
 
 #[test]
@@ -160,7 +161,7 @@ fn start(
         real_time: RealTime::default(),
         datagrams: Vec::new(),
         socket: None,
-        log: None,
+        logs: Logs::default(),
     };
     change(&mut options);
     let is_stopped = Arc::new(AtomicBool::new(false));
@@ -196,6 +197,8 @@ fn what_is_stored_over_the_service_port_survives_a_restart() {
         |running| {
             let mut client = Client::connect(&running.service.to_string(), Some(KEY)).unwrap();
             assert_eq!(client.version().unwrap().starts, 1);
+            let refusal = client.incidents().unwrap_err().to_string();
+            assert!(refusal.contains("[recording]"), "{refusal}");
             client.set("vehicle.wheelbase", Value::Number(1.234)).unwrap();
             client.set("can.publishing_period", Value::Whole(20)).unwrap();
             client.store().unwrap();
@@ -387,7 +390,7 @@ fn where_it_was_last_decides_between_equals_only_if_it_fits() {
             pose = running.condition().pose.filter(|_| running.condition().was_localised).map(|pose| pose.pose);
         };
         let demonstration = Demonstration::of(among_equals(stands));
-        demonstration.run(folder.path(), RealTime::default(), None, &is_stopped, &note, watch).unwrap();
+        demonstration.run(folder.path(), RealTime::default(), Logs::default(), &is_stopped, &note, watch).unwrap();
         (pose, remarks.into_inner().unwrap())
     };
     let (pose, remarks) = attempt(None);

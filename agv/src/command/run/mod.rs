@@ -10,7 +10,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use agv_host_sim::bus::{self, BusError};
-use agv_host_sim::run::{self, Configuration, Demonstration, Options, Ports, RealTime, Running, Summary};
+use agv_host_sim::run::{
+    self, Configuration, Demonstration, Logs, Options, Ports, RealTime, RecordingConfiguration, RingOptions, Running,
+    Summary,
+};
 use agv_host_sim::view::{Shared, Timeline, follow, serve};
 use anyhow::{Context, bail, ensure};
 
@@ -48,6 +51,11 @@ A configuration is a file like this; what is left out is as here, but for store 
   udp = [\"127.0.0.1:5355\"]          # none if absent
   [status]
   listen = \"127.0.0.1:8051\"
+  [recording]                       # nothing is kept if absent
+  folder = \"/var/lib/agv/recording\"
+  minutes = 10                      # the last ones, in ring/; an incident (lost, fault, alarm) is a log in incidents/
+  ring_mib = 512
+  incidents_mib = 512
 
 Ends with Ctrl-C, SIGTERM, or after --seconds; 1 if the vehicle never knew where it is, of a demonstration and with --seconds.
 
@@ -82,6 +90,9 @@ pub struct Run {
     /// Log to write, from the first event on; an older one is renamed to LOG.old.
     #[arg(short, long, value_name = "LOG")]
     output: Option<PathBuf>,
+    /// Folder for the last minutes of the demonstration, and its incidents.
+    #[arg(long, value_name = "FOLDER", requires = "demo")]
+    recording: Option<PathBuf>,
     /// Print what the run has brought as JSON, and serve no page.
     #[arg(long)]
     json: bool,
@@ -138,7 +149,7 @@ impl Run {
                 real_time: configuration.real_time,
                 datagrams: configuration.pose.udp.clone(),
                 socket: configuration.pose.unix.clone(),
-                log: self.output.clone(),
+                logs: self.logs(configuration.recording.as_ref().map(RecordingConfiguration::options)),
             };
             let watch = |running: &Running| {
                 tell_ports(running, journal);
@@ -171,12 +182,23 @@ impl Run {
             });
         };
         let note = |text: &str| journal.tell(text);
-        let outcome = demonstration.run(&folder, RealTime::USUAL, self.output.as_deref(), is_stopped, &note, watch);
+        let outcome = demonstration.run(
+            &folder,
+            RealTime::USUAL,
+            self.logs(self.recording.clone().map(RingOptions::usual)),
+            is_stopped,
+            &note,
+            watch,
+        );
         if self.store.is_none() {
             // What cannot be removed is left to the system.
             let _ = std::fs::remove_dir_all(&temporary);
         }
         Ok(outcome?)
+    }
+
+    fn logs(&self, ring: Option<RingOptions>) -> Logs {
+        Logs { whole: self.output.clone(), ring }
     }
 
     fn bind_page(&self) -> anyhow::Result<TcpListener> {

@@ -1,0 +1,139 @@
+//! What a controller keeps of its run: the last part of it and each incident replay to the same bits, within the bytes that are allowed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use agv_core::measurement::Time;
+use agv_host_sim::link::service::{Client, KeptIncident};
+use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::replay::Comparison;
+use agv_host_sim::run::{Demonstration, Logs, RealTime, RingOptions, Running};
+use agv_host_sim::{log, replay};
+
+use super::vehicle::{End, hall, wait};
+
+/// The hall whose reflectors are covered from that time of the drive on, s.
+fn covered(seconds: f64) -> Recording {
+    let mut recording = hall();
+    // As soon as nothing is seen, the level is too large for travelling.
+    recording.parameters.alert_limits.travel.position = 0.04;
+    let first = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
+    let is_later = |time: Option<Time>| time.is_some_and(|time| time.since(first) > seconds);
+    for event in &mut recording.events {
+        let is_later = is_later(event.time());
+        if let RecordedEvent::Reflectors(seen) = event
+            && is_later
+        {
+            seen.observations.clear();
+        }
+    }
+    recording
+}
+
+fn logs(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut logs: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "agvlog")).collect();
+    logs.sort();
+    logs
+}
+
+/// What was kept, and whether it begins in the middle of the drive.
+fn assert_replayed(path: &Path) -> (Comparison, bool) {
+    let contents = log::read_contents(path, |_| ()).unwrap();
+    assert_eq!(contents.damages, [], "{}", path.display());
+    let again = replay::replay_in(&contents.recording, None, |_| ()).unwrap();
+    let outputs = replay::compare(&contents.outputs, &again);
+    let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
+    assert!(outputs.is_equal() && published.is_equal(), "{}: {outputs:?} {published:?}", path.display());
+    assert_eq!(outputs.compared, contents.recording.events.len());
+    (outputs, contents.recording.state.is_some())
+}
+
+#[test]
+fn an_incident_is_a_log_that_replays_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = RingOptions {
+        span: Duration::from_secs(4),
+        part: Duration::from_secs(1),
+        around: [Duration::from_secs(2), Duration::from_secs(1)],
+        ring_bytes: 8 << 20,
+        incident_bytes: 8 << 20,
+        ..RingOptions::usual(folder.path().join("recording"))
+    };
+    let logs_of_run = Logs { whole: None, ring: Some(options.clone()) };
+    let is_stopped = Arc::new(AtomicBool::new(false));
+    let end = End(Arc::clone(&is_stopped));
+    let (mut is_busy, mut fetched, mut names) = (false, Vec::new(), Vec::new());
+    let watch = |running: &Running| {
+        let _end = end;
+        wait("an incident", || !logs(&options.incidents()).is_empty());
+        let mut client = Client::connect(&running.service.to_string(), None).unwrap();
+        let kept = client.incidents().unwrap();
+        client.fetch_incident(&kept[0], &mut fetched, |_| ()).unwrap();
+        names.extend(kept.into_iter().map(|incident| incident.name));
+        let other = KeptIncident { name: "../ring/000001-000001.agvlog".to_owned(), length: 10 };
+        let refusal = client.fetch_incident(&other, &mut Vec::new(), |_| ()).unwrap_err().to_string();
+        assert!(refusal.contains("keeps no such incident"), "{refusal}");
+        is_busy = running.condition().left_out != [0; 3];
+    };
+    let store = folder.path().join("store");
+    let remark = |text: &str| println!("{text}");
+    let demonstration = Demonstration::of(covered(8.0));
+    let summary = demonstration.run(&store, RealTime::default(), logs_of_run, &is_stopped, &remark, watch).unwrap();
+    assert!(summary.was_localised && is_stopped.load(Ordering::Relaxed), "{summary:?}");
+    // What was left out is in no log.
+    if is_busy {
+        return agv_tests::too_busy("an_incident_is_a_log_that_replays_to_the_same_bits");
+    }
+    let incidents = logs(&options.incidents());
+    assert_eq!(fetched, std::fs::read(&incidents[0]).unwrap());
+    assert!(incidents[0].ends_with(&names[0]), "{names:?}");
+    assert!(incidents[0].to_string_lossy().ends_with("-alarm.agvlog"), "{incidents:?}");
+    let (compared, goes_on) = assert_replayed(&incidents[0]);
+    // At least two seconds before it and one behind it, of encoders at 100 Hz.
+    assert!(goes_on && compared.compared > 250, "{compared:?}");
+    let ring = logs(&options.folder.join("ring"));
+    assert!((3..=7).contains(&ring.len()), "{ring:?}");
+    let begun: Vec<bool> = ring.iter().map(|path| assert_replayed(path).1).collect();
+    assert!(begun.iter().skip(1).all(|goes_on| *goes_on), "{begun:?}");
+}
+
+#[test]
+fn what_is_kept_is_bounded_and_a_folder_that_vanishes_stops_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = RingOptions {
+        part: Duration::from_millis(300),
+        ring_bytes: 1 << 20,
+        ..RingOptions::usual(folder.path().join("recording"))
+    };
+    let logs_of_run = Logs { whole: None, ring: Some(options.clone()) };
+    let is_stopped = Arc::new(AtomicBool::new(false));
+    let end = End(Arc::clone(&is_stopped));
+    let ring = options.folder.join("ring");
+    let watch = |running: &Running| {
+        let _end = end;
+        wait("parts", || logs(&ring).len() > 3);
+        let bytes = |path: &PathBuf| std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+        let mut most = 0;
+        let before = running.poses();
+        wait("400 poses", || {
+            most = most.max(logs(&ring).iter().map(bytes).sum());
+            running.poses() > before + 400
+        });
+        assert!((1..=options.ring_bytes).contains(&most), "{most}");
+        std::fs::remove_dir_all(&options.folder).unwrap();
+        std::fs::write(&options.folder, "no folder").unwrap();
+        let before = running.poses();
+        wait("200 poses", || running.poses() > before + 200);
+    };
+    let (store, remarks) = (folder.path().join("store"), std::sync::Mutex::new(Vec::new()));
+    let remark = |text: &str| remarks.lock().unwrap().push(text.to_owned());
+    let demonstration = Demonstration::of(hall());
+    let summary = demonstration.run(&store, RealTime::default(), logs_of_run, &is_stopped, &remark, watch).unwrap();
+    assert!(summary.was_localised, "{summary:?}");
+    let remarks = remarks.into_inner().unwrap();
+    let told = remarks.iter().filter(|remark| remark.starts_with("recording: ")).count();
+    assert!((1..=3).contains(&told), "{remarks:?}");
+}
