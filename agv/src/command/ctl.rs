@@ -6,9 +6,10 @@ use agv_core::geometry::Pose;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::layout_file;
-use agv_host_sim::link::service::{Client, PORT, ServiceError, Setting};
+use agv_host_sim::link::service::{Client, KeptIncident, PORT, ServiceError, Setting};
 use agv_host_sim::link::with_port;
 use agv_host_sim::mapping::contour_file;
+use agv_host_sim::output_file::OutputFile;
 use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::Refusal;
@@ -35,6 +36,7 @@ Examples:
   agv ctl 192.168.1.20 --key agv.key contours upload hall.csv
   agv ctl 192.168.1.20 --key agv.key store
   agv ctl 192.168.1.20 --key agv.key reboot
+  agv ctl 192.168.1.20 incidents --output incidents
   agv ctl 192.168.1.20 --key agv.key set-pose 12.5 3.2 1.57";
 
 /// Set up a controller over its service port
@@ -113,6 +115,12 @@ enum Action {
         /// Forget it.
         #[arg(long)]
         forget: bool,
+    },
+    /// The incidents that it keeps (lost, fault, alarm), each a log for agv replay.
+    Incidents {
+        /// Folder to which they are fetched; one that is there already is not fetched again.
+        #[arg(long, value_name = "DIR")]
+        output: Option<PathBuf>,
     },
     /// Start the controller again.
     Reboot,
@@ -247,6 +255,26 @@ fn apply(client: &mut Client, file: &Path, dry_run: bool) -> anyhow::Result<Vec<
     Ok(rows)
 }
 
+/// Fetches the log of an incident, unless it is there. What a controller calls it must be the name of a file and nothing else.
+fn fetch(client: &mut Client, incident: &KeptIncident, folder: &Path) -> anyhow::Result<()> {
+    let name = Path::new(&incident.name);
+    ensure!(
+        name.file_name() == Some(name.as_os_str()),
+        "the controller has an incident of the name {:?}",
+        incident.name
+    );
+    let path = folder.join(name);
+    if std::fs::metadata(&path).is_ok_and(|metadata| metadata.len() == u64::from(incident.length)) {
+        return Ok(());
+    }
+    let context = || path.display().to_string();
+    let mut log = OutputFile::create(&path).with_context(context)?;
+    let progress = progress::bar("fetching", incident.length.into());
+    client.fetch_incident(incident, &mut log, |count| progress.inc(count as u64))?;
+    progress.finish_and_clear();
+    log.finish().with_context(context)
+}
+
 impl Ctl {
     /// Runs the command.
     pub fn run(self) -> anyhow::Result<()> {
@@ -315,7 +343,27 @@ impl Ctl {
                     client.forget_panic()?;
                 }
             }
+            Action::Incidents { output } => self.incidents(&mut client, output.as_deref())?,
             Action::Reboot => client.reboot()?,
+        }
+        Ok(())
+    }
+
+    fn incidents(&self, client: &mut Client, folder: Option<&Path>) -> anyhow::Result<()> {
+        let incidents = client.incidents()?;
+        if let Some(folder) = folder {
+            std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+            for incident in &incidents {
+                fetch(client, incident, folder)?;
+            }
+        }
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&incidents)?);
+        } else if incidents.is_empty() {
+            note("agv: the controller has no incidents");
+        } else {
+            let row = |incident: &KeptIncident| [incident.name.clone(), format!("{} bytes", incident.length)];
+            print_rows(&incidents.iter().map(row).collect::<Vec<_>>());
         }
         Ok(())
     }
