@@ -80,14 +80,14 @@ pub(super) fn log_queue(exchange: &Exchange, first: u32) -> (LogWriter<'_>, LogR
     (writer, LogReader { free: free_end, free_states: None, full: full_end })
 }
 
-/// Lets logs begin again and again, of a vehicle with a localiser whose state takes at most so many bytes.
+/// Lets logs begin again and again, of a vehicle with a localiser of so many bytes.
 pub(super) fn divide(
     (writer, reader): (&mut LogWriter, &mut LogReader),
     parameters: &Parameters,
     limits: AlertLimits,
-    (every, room): (Duration, usize),
+    (every, size): (Duration, usize),
 ) {
-    let (keeper, free_states) = StateKeeper::new(parameters, room);
+    let (keeper, free_states) = StateKeeper::new(parameters, size);
     let begun = writer.exchange.now();
     writer.parts = Some(Parts { keeper, watch: IncidentWatch::new(limits), every, begun });
     reader.free_states = Some(free_states);

@@ -334,9 +334,9 @@ pub fn run(
     let incidents_folder = ring_options.as_ref().map(RingOptions::incidents);
     let ring = ring_options.as_ref().map(|ring| log_ring(ring, beginning, starts)).transpose()?;
     if let Some(ring) = &ring_options {
-        let room = size_of::<Localizer<LentCapacities>>();
+        let size = size_of::<Localizer<LentCapacities>>();
         let ends = (&mut log_writer, &mut log_reader);
-        divide(ends, &settings.parameters, settings.parameters.alert_limits, (ring.part, room));
+        divide(ends, &settings.parameters, settings.parameters.alert_limits, (ring.part, size));
     }
     if options.real_time.lock_memory {
         real_time::lock_memory(&lacks);

@@ -23,9 +23,10 @@ pub(super) struct States {
 }
 
 impl States {
-    fn new(room: usize) -> Self {
-        let of = |room: usize| vec![0; room].into_boxed_slice();
-        Self { localizer: of(room), predictor: of(size_of::<LoggedPredictor>()), lengths: [0; 2] }
+    fn new(size: usize) -> Self {
+        // No number takes twice as many bytes there as in memory.
+        let of = |size: usize| vec![0; 2 * size].into_boxed_slice();
+        Self { localizer: of(size), predictor: of(size_of::<LoggedPredictor>()), lengths: [0; 2] }
     }
 
     /// That of the localiser, and that of the predictor.
@@ -49,12 +50,12 @@ pub(super) struct StateKeeper {
 }
 
 impl StateKeeper {
-    /// A keeper of a localiser whose state takes no more than so many bytes, and where states go back to.
-    pub fn new(parameters: &Parameters, room: usize) -> (Self, SyncSender<Box<States>>) {
+    /// A keeper of a localiser of so many bytes, and where states go back to.
+    pub fn new(parameters: &Parameters, size: usize) -> (Self, SyncSender<Box<States>>) {
         let (give_back, free) = sync_channel(STATES);
         for _ in 0..STATES {
             // There is room for all.
-            let _ = give_back.try_send(Box::new(States::new(room)));
+            let _ = give_back.try_send(Box::new(States::new(size)));
         }
         let keeper = Self {
             predictor: LoggedPredictor::new(parameters),

@@ -18,7 +18,7 @@ use super::vehicle::{End, hall, wait};
 fn covered(seconds: f64) -> Recording {
     let mut recording = hall();
     // As soon as nothing is seen, the level is too large for travelling.
-    recording.parameters.alert_limits.travel.position = 0.04;
+    recording.parameters.alert_limits.travel.position = 0.1;
     let first = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
     let is_later = |time: Option<Time>| time.is_some_and(|time| time.since(first) > seconds);
     for event in &mut recording.events {
@@ -91,9 +91,9 @@ fn an_incident_is_a_log_that_replays_to_the_same_bits() {
     assert_eq!(fetched, std::fs::read(&incidents[0]).unwrap());
     assert!(incidents[0].ends_with(&names[0]), "{names:?}");
     assert!(incidents[0].to_string_lossy().ends_with("-alarm.agvlog"), "{incidents:?}");
-    let (compared, goes_on) = assert_replayed(&incidents[0]);
+    let (compared, _) = assert_replayed(&incidents[0]);
     // At least two seconds before it and one behind it, of encoders at 100 Hz.
-    assert!(goes_on && compared.compared > 250, "{compared:?}");
+    assert!(compared.compared > 250, "{compared:?}");
     let ring = logs(&options.folder.join("ring"));
     assert!((3..=7).contains(&ring.len()), "{ring:?}");
     let begun: Vec<bool> = ring.iter().map(|path| assert_replayed(path).1).collect();
