@@ -171,7 +171,9 @@ fn run(reports: (&str, MotionReport), by: By, planted: &[&Mistake]) -> Outcome {
     let count = planted.iter().filter(|mistake| is_named(mistake, &found)).count();
     let said: Vec<String> = found.iter().map(|finding| format!("{} -> {}", finding.what, finding.next)).collect();
     let is_few = found.len() <= 2;
-    let after = (by != By::Contours).then(|| found.iter().find(|finding| finding.next.starts_with("agv "))).flatten();
+    // A page that shows the drive mends nothing, and does not end.
+    let mends = |finding: &&Finding| finding.next.starts_with("agv ") && !finding.next.starts_with("agv view");
+    let after = (by != By::Contours).then(|| found.iter().find(mends)).flatten();
     let after = after.map(|finding| mended(&recording, &finding.next));
     let sound = if after.is_some() { accuracy(&drive(reports.1, by)) } else { 0.0 };
     Outcome {

@@ -46,7 +46,7 @@ impl IncidentWatch {
 
     /// Takes a pose that was published. A vehicle that has not known yet where it is has no incident.
     pub fn see(&mut self, pose: &PoseOutput) -> Option<Incident> {
-        self.was_localised |= super::exchange::is_localised(pose.mode);
+        self.was_localised |= pose.mode.is_localised();
         let is_lost = pose.mode == Mode::Lost;
         let is_alarmed = !is_lost && self.limits.alarm(pose.mode, &pose.level) >= Alarm::Travel;
         let [lost, alarm] = &mut self.last;

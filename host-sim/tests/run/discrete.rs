@@ -87,7 +87,8 @@ fn wires_say_what_the_bus_says_and_nothing_when_it_ends() {
     };
     let remark = |text: &str| println!("{text}");
     let demonstration = Demonstration::of(hall()).with_lines(Box::new(lines));
-    let summary = demonstration.run(folder.path(), RealTime::default(), Logs::default(), &is_stopped, &remark, watch).unwrap();
+    let summary =
+        demonstration.run(folder.path(), RealTime::default(), Logs::default(), &is_stopped, &remark, watch).unwrap();
     assert!(summary.was_localised);
     assert_eq!(wires.map(|wire| wire.is_high()), [false; 3]);
 }

@@ -425,7 +425,7 @@ fn a_gyro_of_the_machine_is_heard_by_the_localiser() {
     settings.parameters.gyro.is_fitted = true;
     let path = log.clone();
     let change = move |options: &mut Options| {
-        options.log = Some(path);
+        options.logs.whole = Some(path);
         options.gyro = Some(Box::new(|_| Box::new(SteadyGyro(0))));
     };
     let (_, remarks) = start(folder.path(), &settings, change, |running| {
