@@ -228,7 +228,7 @@ fn explained(refusal: &Refusal, explanations: &[Explanation]) -> anyhow::Error {
 /// What calibrates a tricycle.
 enum Calibrated {
     /// Arcs between stops, or along reflectors.
-    ByArcs(Found, Drive),
+    ByArcs(Box<(Found, Drive)>),
     /// Mistakes that wheels and laser show, of a drive that tells no more.
     ByWheels(Box<WheelExplanation>),
 }
@@ -275,7 +275,7 @@ impl Calibrate {
         let name = || log.display().to_string();
         let preparation = Preparation { map: map.as_deref(), mend: self.mend };
         let (found, mut drive) = match self.calibrated(&input, &preparation).with_context(name)? {
-            Calibrated::ByArcs(found, drive) => (found, drive),
+            Calibrated::ByArcs(calibrated) => *calibrated,
             Calibrated::ByWheels(explanation) => {
                 let fit = wheels::Fit { mend: true, apply: self.apply.as_deref(), is_json: self.json };
                 return wheels::mend(*explanation, &fit).with_context(name);
@@ -335,11 +335,11 @@ impl Calibrate {
             _ => attempt(input, preparation),
         };
         let refusal: Refusal = match first {
-            Ok((found, drive)) if !self.mend => return Ok(Calibrated::ByArcs(found, drive)),
+            Ok(found) if !self.mend => return Ok(Calibrated::ByArcs(Box::new(found))),
             // A wheelbase that was held is to be mended, too.
             Ok(held) => {
-                let (found, drive) = with_wheelbase(input, preparation).unwrap_or(held);
-                return Ok(Calibrated::ByArcs(found, drive));
+                let found = with_wheelbase(input, preparation).unwrap_or(held);
+                return Ok(Calibrated::ByArcs(Box::new(found)));
             }
             Err(refusal) => refusal,
         };
@@ -366,7 +366,7 @@ impl Calibrate {
             .or_else(|_| Drive::among_few(&right).and_then(|drive| find_any(drive, &asked)));
         let (found, mut drive) = again.map_err(|again| explained(&again, &explanations))?;
         drive.remarks.push(format!("{explanation}: mended"));
-        Ok(Calibrated::ByArcs(found, drive))
+        Ok(Calibrated::ByArcs(Box::new((found, drive))))
     }
 
     /// What the laser's motion, by whatever it sees, says of the wheels.
