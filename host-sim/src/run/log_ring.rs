@@ -199,7 +199,7 @@ impl LogRing<'_> {
     /// Has the incident written that is over.
     ///
     /// # Errors
-    /// If the disk takes nothing. Without room for one more that waits it is left out.
+    /// If the disk takes nothing, or others still wait for it: then it is left out.
     pub fn keep(&mut self) -> Result<(), LogError> {
         let Some(Open { incident, begin, .. }) = self.open.take() else { return Ok(()) };
         let [before, _] = self.options.around;
@@ -217,8 +217,9 @@ impl LogRing<'_> {
                 Err(_) => pieces.clear(),
             }
         }
-        let _ = self.jobs.try_send(Job { pieces, sequence, path });
-        Ok(())
+        self.jobs
+            .try_send(Job { pieces, sequence, path: path.clone() })
+            .map_err(|_| LogError::Io { path, source: io::Error::other("it is left out, as others wait for the disk") })
     }
 
     /// Ends with the run.

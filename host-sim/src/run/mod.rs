@@ -21,6 +21,7 @@ mod kept_pose;
 mod laser_loop;
 mod localizer_loop;
 mod log_file;
+mod log_passing;
 mod log_queue;
 mod log_ring;
 mod periods;
@@ -68,8 +69,9 @@ use self::bus_port::BusPort;
 use self::exchange::{Exchange, Queues, Task};
 use self::localizer_loop::LocalizerLoop;
 use self::log_file::{Beginning, LogFile};
-use self::log_queue::{LogItem, LogReader, divide, log_queue};
-use self::log_ring::{LogRing, log_ring, write_incidents};
+use self::log_passing::pass_log;
+use self::log_queue::{divide, log_queue};
+use self::log_ring::{log_ring, write_incidents};
 use self::pose_line::{PoseSinks, bounded};
 use self::real_time::Lacks;
 use crate::drive::mode_name;
@@ -457,65 +459,4 @@ pub fn run(
         was_localised: exchange.was_localised(),
         is_restart_wanted: exchange.is_restart_wanted(),
     })
-}
-
-/// Passes the log on to those who listen, and to its files, until everything ends and nothing is left.
-fn pass_log(
-    log: &LogReader,
-    relay: &Relay,
-    (mut file, mut ring): (Option<LogFile>, Option<LogRing>),
-    exchange: &Exchange,
-    note: &(dyn Fn(&str) + Sync),
-) {
-    let finish = |file: Option<LogFile>, error: Option<LogError>| {
-        let outcome = error.map_or_else(|| file.map_or(Ok(()), LogFile::finish), Err);
-        if let Err(error) = outcome {
-            note(&format!("log: {error}; no more is written to it"));
-        }
-    };
-    // A disk that is full says so each time; people are told once, until it has taken something again.
-    let mut is_told = false;
-    let mut tell = |outcome: Result<(), LogError>| match outcome {
-        Ok(()) => is_told = false,
-        Err(error) if !std::mem::replace(&mut is_told, true) => note(&format!("recording: {error}")),
-        Err(_) => {}
-    };
-    if let Some(ring) = &mut ring {
-        tell(ring.begin());
-    }
-    loop {
-        match log.full.recv_timeout(LOOK) {
-            Ok(LogItem::Frame(frame)) => {
-                relay.pass_frame(frame.bytes());
-                if let Some(Err(error)) = file.as_mut().map(|file| file.write(frame.bytes())) {
-                    finish(file.take(), Some(error));
-                }
-                if let Some(Err(error)) = ring.as_mut().map(|ring| ring.write(frame.bytes())) {
-                    tell(Err(error));
-                }
-                log.give_back(frame);
-            }
-            Ok(LogItem::States(states, next)) => {
-                if let Some(ring) = &mut ring {
-                    tell(ring.go_on(&states, next));
-                }
-                log.give_states_back(states);
-            }
-            Ok(LogItem::Incident(incident)) => {
-                if let Some(ring) = &mut ring {
-                    ring.take(incident);
-                }
-            }
-            Err(std::sync::mpsc::RecvTimeoutError::Timeout) if !exchange.is_over() => {}
-            Err(_) => {
-                if let Some(ring) = ring {
-                    tell(ring.finish());
-                }
-                return finish(file, None);
-            }
-        }
-        if let Some(ring) = ring.as_mut().filter(|ring| ring.is_due()) {
-            tell(ring.keep());
-        }
-    }
 }
