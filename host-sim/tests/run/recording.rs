@@ -47,7 +47,9 @@ fn assert_replayed(path: &Path) -> (Comparison, bool) {
     let outputs = replay::compare(&contents.outputs, &again);
     let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
     assert!(outputs.is_equal() && published.is_equal(), "{}: {outputs:?} {published:?}", path.display());
-    assert_eq!(outputs.compared, contents.recording.events.len());
+    // A log that is cut may end between an event and its answer.
+    let events = contents.recording.events.len();
+    assert!((events - 1..=events).contains(&outputs.compared), "{outputs:?} of {events} events");
     (outputs, contents.recording.state.is_some())
 }
 
