@@ -43,18 +43,17 @@ fn explanation(input: &LogInput) -> anyhow::Result<Option<WheelExplanation>> {
     if found.is_empty() || found.iter().any(|one| one.mistakes.is_empty()) {
         return Ok(None);
     }
-    let mendable = found.iter().find(|one| one.is_mendable());
-    let explanation = mendable.with_context(|| {
-        let words: Vec<String> = found.iter().map(ToString::to_string).collect();
-        format!("{}: no setting mends that; agv check says what to do", words.join(", or "))
-    })?;
-    Ok(Some(explanation.clone()))
+    let words: Vec<String> = found.iter().map(ToString::to_string).collect();
+    let mendable = found.into_iter().find(WheelExplanation::is_mendable);
+    let none = || format!("{}: no setting mends that; agv check says what to do", words.join(", or "));
+    mendable.with_context(none).map(Some)
 }
 
 /// Fits the vehicle of the log, prints what was found, and writes it to a file if one is given. Of a vehicle with mistakes that are to be
 /// mended, only what they name is fitted.
 pub fn run(input: LogInput, asked: &Fit) -> anyhow::Result<()> {
-    match if asked.mend { explanation(&input)? } else { None } {
+    let explanation = if asked.mend { explanation(&input)? } else { None };
+    match explanation {
         Some(explanation) => mend(explanation, asked),
         None => fit_to(input, None, asked),
     }
