@@ -98,12 +98,12 @@ impl<K: Kinematics> Odometer<K> {
 
     /// How far the vehicle can have gone in a step of that duration, m.
     ///
-    /// The times of two reports may each be off by half of the time between them, so that a step may hold the way of twice that time, but
-    /// not one step after the other: what was gone is taken from the margin. A tick more may fall into any step.
+    /// Where the times of two reports are off, the step holds the way of the mean time between reports instead of that between the two,
+    /// but not one step after the other: what was gone is taken from the margin. A tick more may fall into any step.
     fn longest_step(&mut self, duration: f64, interval: f64) -> f64 {
         let fastest = self.parameters.fastest;
         let Some(tick) = self.kinematics.resolution() else { return fastest * duration };
-        let most = fastest * (duration + interval);
+        let most = fastest * duration.max(interval);
         let margin = self.margin.map_or(most, |margin| (margin + fastest * duration).min(most));
         self.margin = Some(margin);
         margin + tick
