@@ -8,11 +8,11 @@ use agv_core::odometry::{
 };
 
 use super::kind::Kind;
-use super::run::course_by;
+use super::run::{Course, course_by};
 use super::simulator::{Drive, Errors, is_counted, ring};
 
 /// Blind at 0.5 m/s, which is half of what the vehicle can do.
-fn blind(kind: Kind, rate: f64, tick: f64, jitter: f64, fastest: f64) -> (f64, f64, usize, usize) {
+fn blind(kind: Kind, rate: f64, tick: f64, jitter: f64, fastest: f64) -> (Course, usize) {
     let drive = Drive {
         tick,
         rate,
@@ -30,8 +30,7 @@ fn blind(kind: Kind, rate: f64, tick: f64, jitter: f64, fastest: f64) -> (f64, f
     let (course, _) = course_by(&drive, Box::new(Localizer::<VehicleCapacities>::new(parameters)), |_, outputs| {
         implausible += usize::from(outputs.pose.reason == Reason::OdometryImplausible);
     });
-    assert_eq!(course.lost, None, "{kind:?} {rate} Hz, {tick} m");
-    (course.last_error, course.last_level, implausible, course.above)
+    (course, implausible)
 }
 
 #[test]
@@ -41,10 +40,12 @@ fn coarse_ticks_at_high_rates_tell_the_whole_way() {
         for rate in [20.0, 50.0, 100.0, 200.0, 500.0, 1000.0] {
             for tick in [5e-5, 1.1e-3, 2.2e-3, 6e-3] {
                 for jitter in [0.0, 0.45] {
-                    let (error, level, implausible, above) = blind(kind, rate, tick, jitter, 1.0);
-                    if error > 5.0 * tick + 1e-3 + jitter / rate * 0.5 || implausible > 0 || above > 0 {
+                    let (course, implausible) = blind(kind, rate, tick, jitter, 1.0);
+                    let Course { last_error: error, last_level: level, above, lost, .. } = course;
+                    if lost.is_some() || error > 5.0 * tick + 1e-3 + jitter / rate * 0.5 || implausible > 0 || above > 0
+                    {
                         wrong.push(format!(
-                            "{kind:?} {rate} Hz tick {tick} jitter {jitter}: {error:.4} m, level {level:.3}, implausible {implausible}, above {above}"
+                            "{kind:?} {rate} Hz tick {tick} jitter {jitter}: {error:.4} m, level {level:.3}, implausible {implausible}, above {above}, lost {lost:?}"
                         ));
                     }
                 }
@@ -54,13 +55,15 @@ fn coarse_ticks_at_high_rates_tell_the_whole_way() {
     assert!(wrong.is_empty(), "{}: {wrong:#?}", wrong.len());
 }
 
-/// A vehicle that is faster than it is said to be: what is refused widens the level.
+/// A vehicle that is faster than it is said to be: what is refused widens the level, until the vehicle says that it is lost.
 #[test]
 fn refused_steps_are_never_silently_lost_way() {
     for rate in [20.0, 100.0, 1000.0] {
         for fastest in [0.45, 0.3] {
-            let (error, level, ..) = blind(Kind::Tricycle, rate, 1e-4, 0.0, fastest);
-            assert!(error <= level, "{rate} Hz, fastest {fastest}: {error} {level}");
+            let (course, refused) = blind(Kind::Tricycle, rate, 1e-4, 0.0, fastest);
+            assert!(refused > 0, "{rate} Hz, fastest {fastest}: nothing was refused");
+            assert_eq!(course.above, 0, "{rate} Hz, fastest {fastest}");
+            assert!(matches!(course.lost, None | Some((_, Reason::Uncertain))), "{:?}", course.lost);
         }
     }
 }
