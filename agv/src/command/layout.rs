@@ -1,12 +1,12 @@
 //! `agv layout`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use agv_core::geometry::Point;
 use agv_core::localizer::ReflectorParameters;
 use agv_core::maps::Landmark;
-use agv_host_sim::layout_check::{CheckOptions, Finding, check, page};
+use agv_host_sim::layout_check::{CheckOptions, Finding, Plan, check, page};
 use agv_host_sim::layout_file::{self, LoadedLayout, Reading, Unit};
 use agv_host_sim::mapping::map_file;
 use agv_settings::map_identity;
@@ -101,7 +101,7 @@ struct Convert {
 impl Convert {
     fn run(self) -> anyhow::Result<ExitCode> {
         let reading = Reading { unit: self.unit, origin: self.origin, layer: self.layer };
-        let LoadedLayout { landmarks: layout, account } = layout_file::load_as(&self.input, &reading)?;
+        let LoadedLayout { landmarks: layout, account, .. } = layout_file::load_as(&self.input, &reading)?;
         if self.map {
             map_file::write(&self.output, &layout_file::landmarks(&layout))?;
         } else {
@@ -180,7 +180,8 @@ struct Check {
 
 impl Check {
     fn run(self) -> anyhow::Result<()> {
-        let (positions, names): (Vec<_>, Vec<_>) = reflectors(&self.layout)?.into_iter().unzip();
+        let LoadedLayout { landmarks, lines, .. } = layout_input::load_whole(&self.layout)?;
+        let (positions, names): (Vec<_>, Vec<_>) = landmarks.iter().map(reflector).unzip();
         anyhow::ensure!(!positions.is_empty(), "{} has no reflectors", self.layout.display());
         let options = CheckOptions {
             spacing: self.spacing,
@@ -193,7 +194,8 @@ impl Check {
         if let Some(folder) = &self.report {
             let name = self.layout.file_name().unwrap_or_default().to_string_lossy();
             let path = folder.join("index.html");
-            let page = page(&name, &positions, &names, &options, &check)?;
+            let plan = Plan { positions: &positions, names: &names, lines: &lines };
+            let page = page(&name, &plan, &options, &check)?;
             page.write(&path).with_context(|| path.display().to_string())?;
         }
         if self.json {
@@ -227,11 +229,9 @@ impl Check {
 /// Places and movements that are printed at the most.
 const SHOWN: usize = 10;
 
-/// Where each is, and its name.
-fn reflectors(path: &Path) -> anyhow::Result<Vec<(Point, String)>> {
-    let layout = layout_input::load(path)?;
-    let place = |entry: &IdentifiedLandmark| Point::new(entry.landmark.x.metres(), entry.landmark.y.metres());
-    Ok(layout.iter().map(|entry| (place(entry), entry.id.to_string())).collect())
+/// Where it is, and its name.
+fn reflector(entry: &IdentifiedLandmark) -> (Point, String) {
+    (Point::new(entry.landmark.x.metres(), entry.landmark.y.metres()), entry.id.to_string())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -10,7 +10,12 @@ use super::import_summary;
 
 /// The landmarks of a layout.
 pub fn load(path: &Path) -> Result<Vec<IdentifiedLandmark>, TextFileError> {
-    let LoadedLayout { landmarks, account } = layout_file::load_as(path, &Reading::default())?;
-    import_summary::complain(path, &account.warnings());
-    Ok(landmarks)
+    load_whole(path).map(|loaded| loaded.landmarks)
+}
+
+/// A layout with what is drawn beside its landmarks.
+pub fn load_whole(path: &Path) -> Result<LoadedLayout, TextFileError> {
+    let loaded = layout_file::load_as(path, &Reading::default())?;
+    import_summary::complain(path, &loaded.account.warnings());
+    Ok(loaded)
 }

@@ -107,3 +107,44 @@ fn a_check_warns_and_draws() {
     let said = text(&run.stdout);
     assert!(said.contains("0.20 m apart") && said.contains("mirror images"), "{said}");
 }
+
+/// Walls of a drawing as a line, a polyline that is closed, and one of a hall that is far away.
+#[test]
+fn walls_of_a_drawing_are_on_the_plans() {
+    let files = Files::new();
+    let pair = |code: u16, value: f64| format!("{code}\n{value}\n");
+    let mut entities = String::new();
+    for number in 0..8 {
+        let (x, y) =
+            (f64::from(number) * 3000.0, if number % 2 == 0 { 0.0 } else { 5000.0 + 200.0 * f64::from(number) });
+        entities += &format!("0\nPOINT\n8\nR\n{}{}", pair(10, x), pair(20, y));
+    }
+    let line = |x: [f64; 2], y: [f64; 2]| {
+        format!("0\nLINE\n8\nW\n{}{}{}{}", pair(10, x[0]), pair(20, y[0]), pair(11, x[1]), pair(21, y[1]))
+    };
+    let corners = [(-1000.0, -1000.0), (22_000.0, -1000.0), (22_000.0, 8000.0)];
+    let corners: String = corners.iter().map(|(x, y)| pair(10, *x) + &pair(20, *y)).collect();
+    entities += &line([0.0, 400_000.0], [2500.0, 2500.0]);
+    entities += &line([900_000.0, 910_000.0], [0.0, 0.0]);
+    entities += &format!("0\nLWPOLYLINE\n100\nAcDbEntity\n8\nW\n100\nAcDbPolyline\n90\n3\n70\n1\n{corners}");
+    let drawing = |entities: &str| {
+        format!(
+            "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1015\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n\
+             {entities}0\nENDSEC\n0\nEOF\n"
+        )
+    };
+    let page = |name: &str, entities: &str| {
+        let (layout, report) = (files.write(name, drawing(entities).as_bytes()), files.path("report"));
+        let run = agv(&["layout", "check", &layout, "--report", &report]);
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        std::fs::read_to_string(Path::new(&report).join("index.html")).unwrap()
+    };
+    let with = page("walls.dxf", &entities);
+    let points = entities.find("0\nLINE").map_or("", |end| &entities[..end]);
+    let without = page("points.dxf", points);
+    let lines = |page: &str| page.matches("<polyline").count();
+    assert!(with.contains("lines of the drawing") && !without.contains("lines of the drawing"));
+    assert!(with.contains("Of 5 lines of the drawing the pictures show the longest 4"));
+    // Four lines in each of three pictures.
+    assert_eq!(lines(&with) - lines(&without), 12);
+}

@@ -7,7 +7,7 @@ mod page;
 
 pub use arrangement::{ClosePair, Mirror, close_pairs, mirrors};
 pub use determination::{Determination, determination};
-pub use page::page;
+pub use page::{Plan, page};
 
 use std::collections::BTreeMap;
 

@@ -30,6 +30,8 @@ pub(super) struct Found {
     pub(super) places: Vec<Place>,
     /// Whole numbers that are written somewhere.
     pub(super) names: Vec<(u16, [f64; 2])>,
+    /// Both ends of each line, as of walls and racks, in units of the drawing; the parts of polylines, whose arcs are their chords.
+    pub(super) lines: Vec<[[f64; 2]; 2]>,
 }
 
 struct Walk<'a> {
@@ -77,6 +79,16 @@ impl Walk<'_> {
                 self.name(&text.value, at(&(placed * plane(&text.normal)), &text.location));
             }
             EntityType::MText(text) => self.name(&plain(text), at(placed, &text.insertion_point)),
+            EntityType::Line(line) => self.lines([at(placed, &line.p1), at(placed, &line.p2)], false),
+            EntityType::LwPolyline(lines) => {
+                let own = placed * plane(&lines.extrusion_direction);
+                let corners = lines.vertices.iter().map(|corner| at(&own, &Point::new(corner.x, corner.y, 0.0)));
+                self.lines(corners, lines.is_closed());
+            }
+            EntityType::Polyline(lines) if !lines.is_3d_polygon_mesh() && !lines.is_polyface_mesh() => {
+                let own = if lines.is_3d_polyline() { *placed } else { placed * plane(&lines.normal) };
+                self.lines(lines.vertices().map(|corner| at(&own, &corner.location)), lines.is_closed());
+            }
             _ => {}
         }
     }
@@ -101,6 +113,16 @@ impl Walk<'_> {
         } else {
             self.account.leave_out("points whose coordinates are no numbers", format!("on layer {layer}"));
         }
+    }
+
+    fn lines(&mut self, corners: impl IntoIterator<Item = [f64; 2]>, is_closed: bool) {
+        let mut corners: Vec<[f64; 2]> = corners.into_iter().collect();
+        if is_closed {
+            corners.extend(corners.first().copied());
+        }
+        let parts =
+            corners.array_windows().filter(|part: &&[_; 2]| part.iter().flatten().all(|value| value.is_finite()));
+        self.found.lines.extend(parts);
     }
 
     fn name(&mut self, text: &str, at: [f64; 2]) {

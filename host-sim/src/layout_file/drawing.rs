@@ -5,6 +5,7 @@ use dxf::entities::{Entity, EntityType, ModelPoint, Text};
 use dxf::enums::Units;
 use dxf::{Drawing, DxfError, Point};
 
+use super::LoadedLayout;
 use super::blocks::{self, Place};
 use super::reading::{Reading, Unit};
 use crate::account::Account;
@@ -45,20 +46,17 @@ pub(super) fn is_binary(bytes: &[u8]) -> bool {
 
 /// The landmarks of a drawing: its points, centres of circles and places of blocks, of what is shown in model space. A whole number that
 /// is written at a landmark, or in an attribute of its block, names it; the others are numbered.
-pub(super) fn parse(
-    bytes: &[u8],
-    reading: &Reading,
-    account: &mut Account,
-) -> Result<Vec<IdentifiedLandmark>, (usize, String)> {
+pub(super) fn parse(bytes: &[u8], reading: &Reading) -> Result<LoadedLayout, (usize, String)> {
+    let mut account = Account::default();
     let drawing = Drawing::load(&mut &*bytes).map_err(|error| (line(&error), error.to_string()))?;
-    let found = blocks::collect(&drawing, &frozen_layers(bytes), reading.layer.as_deref(), account);
+    let found = blocks::collect(&drawing, &frozen_layers(bytes), reading.layer.as_deref(), &mut account);
     if found.places.is_empty() {
         let layer = reading.layer.as_ref().map(|layer| format!(" on the layer {layer}")).unwrap_or_default();
         let hidden: Vec<String> = account.beside().iter().map(ToString::to_string).collect();
         let hidden = if hidden.is_empty() { String::new() } else { format!(" ({})", hidden.join(", ")) };
         return Err((1, format!("there are no points, circles or blocks in the drawing{layer}{hidden}")));
     }
-    let metres = metres(&drawing, &found.places, reading, account).map_err(|problem| (1, problem))?;
+    let metres = metres(&drawing, &found.places, reading, &mut account).map_err(|problem| (1, problem))?;
     let distance = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) * metres;
     let name_of = |place: &Place| {
         let near = found.names.iter().filter(|(_, at)| distance(at, &place.at) < NAME_DISTANCE);
@@ -83,7 +81,8 @@ pub(super) fn parse(
         account
             .note(format!("{unnamed} of {} points have no whole number beside them: they were numbered", named.len()));
     }
-    Ok(landmarks)
+    let lines = found.lines.iter().map(|ends| ends.map(|at| reading.placed(at.map(|value| value * metres)))).collect();
+    Ok(LoadedLayout { landmarks, lines, account })
 }
 
 /// Names of the layers that are frozen, which the reader of drawings does not tell: bit 1 of their flags (DXF reference, LAYER). Those of

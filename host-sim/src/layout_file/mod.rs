@@ -135,6 +135,8 @@ pub fn write(landmarks: &[IdentifiedLandmark], format: Format) -> String {
 pub struct LoadedLayout {
     /// Its landmarks.
     pub landmarks: Vec<IdentifiedLandmark>,
+    /// Both ends of each line that is drawn beside them, as of walls and racks, m.
+    pub lines: Vec<[[f64; 2]; 2]>,
     /// What was left out, assumed and doubtful.
     pub account: Account,
 }
@@ -165,8 +167,7 @@ pub fn load_as(path: &Path, reading: &Reading) -> Result<LoadedLayout, TextFileE
             text = text_file::read(path, "a drawing (DXF)")?;
             text.as_bytes()
         };
-        let landmarks = drawing::parse(drawn, reading, &mut account).map_err(refused)?;
-        return Ok(LoadedLayout { landmarks, account });
+        return drawing::parse(drawn, reading).map_err(refused);
     }
     let text = text_file::read(path, "a layout")?;
     if text.lines().next().is_some_and(|first| first.trim() == map_file::HEADER) && *reading == Reading::default() {
@@ -174,7 +175,7 @@ pub fn load_as(path: &Path, reading: &Reading) -> Result<LoadedLayout, TextFileE
         let landmarks = layout(&map);
         account.take(landmarks.len());
         account.set_aside("landmarks that are no reflectors", map.len() - landmarks.len());
-        return Ok(LoadedLayout { landmarks, account });
+        return Ok(LoadedLayout { landmarks, lines: Vec::new(), account });
     }
     let landmarks = if format == Format::Csv && table::has_names(&text) {
         table::parse(&text, reading, &mut account).map_err(refused)?
@@ -186,7 +187,7 @@ pub fn load_as(path: &Path, reading: &Reading) -> Result<LoadedLayout, TextFileE
     if landmarks.is_empty() {
         return Err(TextFileError::Empty { path: path.to_owned() });
     }
-    Ok(LoadedLayout { landmarks, account })
+    Ok(LoadedLayout { landmarks, lines: Vec::new(), account })
 }
 
 /// The landmarks of a file in millimetres as somebody says that they are to be understood.

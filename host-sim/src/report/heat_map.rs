@@ -3,8 +3,8 @@
 use plotters::prelude::*;
 
 use super::figure::{
-    Extent, Figure, FigureError, MARGIN, MARKS, Mark, PointSet, SHADES, Shape, WIDTH, X_LABELS, Y_LABELS, axes,
-    axis_number, draw,
+    BACKGROUND_INK, Extent, Figure, FigureError, MARGIN, MARKS, Mark, PointSet, SHADES, Shape, WIDTH, X_LABELS,
+    Y_LABELS, axes, axis_number, draw,
 };
 
 /// A square of the floor.
@@ -18,6 +18,15 @@ pub struct Cell {
     pub class: usize,
 }
 
+/// Lines beside the points, as of walls.
+#[derive(Clone, Copy, Debug)]
+pub struct LineSet<'a> {
+    /// What they are.
+    pub name: &'a str,
+    /// Both ends of each in W, m.
+    pub lines: &'a [[[f64; 2]; 2]],
+}
+
 /// What is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct HeatMap<'a> {
@@ -27,6 +36,8 @@ pub struct HeatMap<'a> {
     pub size: f64,
     /// Names of the classes, the best one first; an empty name is not in the legend.
     pub classes: &'a [&'a str],
+    /// Lines above the squares, as far as they are within the picture.
+    pub lines: LineSet<'a>,
     /// Points above the squares.
     pub points: PointSet<'a>,
     /// The name of each point, which is written beside it if they are few; or none.
@@ -60,6 +71,9 @@ pub fn heat_map(map: &HeatMap) -> Result<Figure, FigureError> {
     let shade = |class: usize| SHADES[class.min(SHADES.len() - 1)];
     let named = map.classes.iter().enumerate().filter(|(_, name)| !name.is_empty());
     let mut legend: Vec<_> = named.map(|(class, name)| (Mark::Square, shade(class), (*name).to_owned())).collect();
+    if !map.lines.lines.is_empty() {
+        legend.push((Mark::Line, BACKGROUND_INK, map.lines.name.to_owned()));
+    }
     legend.push((Mark::Point(Shape::Disc), POINT_INK, map.points.name.to_owned()));
     draw(height as u32 + X_LABELS + 2 * MARGIN, legend, |area| {
         let mut chart = ChartBuilder::on(area)
@@ -74,6 +88,8 @@ pub fn heat_map(map: &HeatMap) -> Result<Figure, FigureError> {
             Rectangle::new(corners, shade(cell.class).filled())
         });
         chart.draw_series(cells)?;
+        let lines = map.lines.lines.iter().filter_map(|ends| clipped(*ends, [x, y]));
+        chart.draw_series(lines.map(|ends| PathElement::new(ends, BACKGROUND_INK.stroke_width(2))))?;
         chart.draw_series(map.points.points.iter().map(|point| Circle::new(*point, 5, WHITE.filled())))?;
         chart.draw_series(map.points.points.iter().map(|point| Circle::new(*point, 4, POINT_INK.filled())))?;
         if map.names.len() <= NAMES {
@@ -89,3 +105,21 @@ pub fn heat_map(map: &HeatMap) -> Result<Figure, FigureError> {
 
 /// Colour of the points: that of reflectors everywhere.
 const POINT_INK: RGBColor = RGBColor(0, 114, 178);
+
+/// The part of a line that is within a box (Y.-D. Liang, B. A. Barsky, "A new concept and method for line clipping", 1984).
+fn clipped([from, to]: [[f64; 2]; 2], within: [Extent; 2]) -> Option<[(f64, f64); 2]> {
+    let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
+    for ((start, end), extent) in from.iter().zip(to).zip(within) {
+        let way = end - start;
+        if way == 0.0 {
+            if *start < extent.low || *start > extent.high {
+                return None;
+            }
+            continue;
+        }
+        let (low, high) = ((extent.low - start) / way, (extent.high - start) / way);
+        (enters, leaves) = (enters.max(low.min(high)), leaves.min(low.max(high)));
+    }
+    let at = |share: f64| (from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]));
+    (enters < leaves).then(|| [at(enters), at(leaves)])
+}

@@ -14,7 +14,7 @@ mod trajectories;
 
 pub use charts::{Bounds, LandmarkMark, landmark_timeline, line_chart, scatter_chart};
 pub use figure::{Figure, FigureError, PointSet, Series};
-pub use heat_map::{Cell, HeatMap, heat_map};
+pub use heat_map::{Cell, HeatMap, LineSet, heat_map};
 pub use kinds::{FIT_TO_DOCK, FIT_TO_TRAVEL, NO_POSE, NOT_FIT};
 pub use page::{Page, Table};
 pub use pdf::{PdfError, write_pdf};
