@@ -254,12 +254,15 @@ impl Calibrate {
         let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
         let input = self.with_laser_motion(input, log)?;
+        let tell_damages =
+            || damages.iter().for_each(|damage| output::note(&format!("agv: the log is damaged: {damage}")));
         if matches!(input.parameters.vehicle, Vehicle::Wheels(_)) || self.method == MethodName::Clocks {
             ensure!(
                 self.is_plain(),
                 "{}: the fit of any wheels takes no option but --mend, --apply and --json",
                 log.display()
             );
+            tell_damages();
             let fit = wheels::Fit { mend: self.mend, apply: self.apply.as_deref(), is_json: self.json };
             return wheels::run(input, &fit).with_context(|| log.display().to_string());
         }
@@ -277,6 +280,7 @@ impl Calibrate {
         let (found, mut drive) = match self.calibrated(&input, &preparation).with_context(name)? {
             Calibrated::ByArcs(calibrated) => *calibrated,
             Calibrated::ByWheels(explanation) => {
+                tell_damages();
                 let fit = wheels::Fit { mend: true, apply: self.apply.as_deref(), is_json: self.json };
                 return wheels::mend(*explanation, &fit).with_context(name);
             }
@@ -351,9 +355,12 @@ impl Calibrate {
         if by_reflectors.is_none()
             && self.mend
             && !is_named
-            && self.is_plain()
             && let Some(explanation) = self.explained_by_wheels(input)
         {
+            ensure!(
+                self.is_plain(),
+                "{refusal}; the drive makes sense if {explanation}; --mend with no option but --apply and --json mends that"
+            );
             return Ok(Calibrated::ByWheels(Box::new(explanation)));
         }
         let Some((explanation, right)) = by_reflectors.filter(|_| self.mend) else {
