@@ -87,7 +87,8 @@ pub fn check(
         findings.extend(mistakes);
         return findings;
     }
-    if let Some(finding) = start::finding(recording, replay, log) {
+    let by_reflectors = || start::finding_by_reflectors(recording, replay, log);
+    if let Some(finding) = start::finding(recording, replay, log).or_else(|| by_reflectors().filter(|_| is_poor)) {
         findings.push(finding);
         return findings;
     }

@@ -8,7 +8,7 @@ use agv_core::measurement::{PoseFix, Time};
 use super::Finding;
 use crate::drive::KINDS;
 use crate::recording::Recording;
-use crate::replay::Replay;
+use crate::replay::{Replay, find_start};
 
 /// What is seen in so many seconds after the start is laid onto the map: the odometry does not drift in them.
 const FIRST: f64 = 6.0;
@@ -26,6 +26,8 @@ const TURN: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// Share of the sightings that must fit elsewhere, and by how much more than where the vehicle is said to be.
 const FITTING: f64 = 0.7;
 const BETTER: f64 = 1.6;
+/// A vehicle that finds itself later, s, may have been carried meanwhile.
+const LATEST: f64 = 20.0;
 /// A start that is nearer is no mistake, m.
 const HARMLESS: f64 = 0.5;
 
@@ -68,6 +70,25 @@ pub(super) fn finding(recording: &Recording, replay: &Replay, log: &str) -> Opti
         Finding::new(
             format!("the start pose is off by {off:.1} m: what is seen first fits the map from {x:.2}, {y:.2}, {heading:.0} deg"),
             format!("agv replay {log} --start {x:.2},{y:.2},{heading:.1}"),
+        )
+    })
+}
+
+/// Where the reflectors that are seen first have a vehicle that is lost, if that is elsewhere than the pose that it was told has it.
+pub(super) fn finding_by_reflectors(recording: &Recording, replay: &Replay, log: &str) -> Option<Finding> {
+    let told = recording.events.iter().position(|event| matches!(event, AnyEvent::SetPose(_)))?;
+    let AnyEvent::SetPose(fix) = recording.events.get(told)? else { return None };
+    let (found_at, found) = find_start(recording).ok().filter(|(number, _)| *number > told)?;
+    // A pose that is lost is carried on by the odometry.
+    let [from, to] = [told, found_at].map(|event| replay.poses.get(event).map(|output| output.pose));
+    let way = from?.between(&to?);
+    let start = found.pose.compose(&way.inverse());
+    let off = (start.position() - fix.pose.position()).norm();
+    (off > HARMLESS && found.time.since(fix.time) < LATEST).then(|| {
+        let [x, y, heading] = [start.x, start.y, start.theta.to_degrees()];
+        Finding::new(
+            format!("the start pose is off by {off:.1} m: the reflectors that are seen first have the vehicle at {x:.2}, {y:.2}, {heading:.0} deg"),
+            format!("agv replay {log} --relocalise reflectors"),
         )
     })
 }
