@@ -8,7 +8,8 @@ use object::{Object, ObjectSection, SectionFlags, SectionKind};
 use super::image::{BOARDS, Board};
 
 /// Images that only measure need not fit a vehicle.
-const UNLIMITED: [&str; 7] = ["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart"];
+const UNLIMITED: [&str; 8] =
+    ["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "play", "replay", "restart"];
 
 struct Size {
     flash: u64,
