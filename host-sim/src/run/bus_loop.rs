@@ -53,25 +53,32 @@ impl ObjectDictionary for SharedSettings<'_> {
 
 /// What the loop works with.
 pub(super) struct BusLoop<'a> {
-    pub bus: Bus,
-    pub port: BusPort,
-    pub exchange: &'a Exchange,
-    pub controller: &'a Mutex<Controller<FlashFile>>,
-    /// Time between poses.
-    pub period: Duration,
-    /// When the bus began.
-    pub begin: Instant,
+    bus: Bus,
+    port: BusPort,
+    exchange: &'a Exchange,
+    objects: SharedSettings<'a>,
+    clock: PeriodClock,
+    /// Events that were lost until the last step.
+    lost_events: u32,
 }
 
-impl BusLoop<'_> {
-    /// Takes part in the bus until everything ends. `note` is told what becomes of it.
-    pub fn run(mut self, note: &(dyn Fn(&str) + Sync)) {
-        let mut objects = SharedSettings { controller: self.controller };
-        let mut clock = PeriodClock::new(self.period);
-        let mut lost_events = self.exchange.lost_events();
-        let mut tick = self.begin + BEHIND;
+impl<'a> BusLoop<'a> {
+    /// A loop that has not begun, with so much time between poses.
+    pub fn new(
+        (bus, port): (Bus, BusPort),
+        exchange: &'a Exchange,
+        controller: &'a Mutex<Controller<FlashFile>>,
+        period: Duration,
+    ) -> Self {
+        let (objects, clock) = (SharedSettings { controller }, PeriodClock::new(period));
+        Self { bus, port, exchange, objects, clock, lost_events: exchange.lost_events() }
+    }
+
+    /// Takes part in the bus, which began at `begin`, until everything ends. `note` is told what becomes of it.
+    pub fn run(mut self, begin: Instant, note: &(dyn Fn(&str) + Sync)) {
+        let mut tick = begin + BEHIND;
         while !self.exchange.is_over() {
-            self.step(tick, &mut objects, &mut clock, &mut lost_events, note);
+            self.step(tick, note);
             let now = Instant::now();
             while tick <= now {
                 tick += STEP;
@@ -79,19 +86,13 @@ impl BusLoop<'_> {
         }
     }
 
-    fn step(
-        &mut self,
-        tick: Instant,
-        objects: &mut SharedSettings,
-        clock: &mut PeriodClock,
-        lost_events: &mut u32,
-        note: &(dyn Fn(&str) + Sync),
-    ) {
+    /// Waits for a frame, but not beyond `tick`; hears it, and sends what is due.
+    pub fn step(&mut self, tick: Instant, note: &(dyn Fn(&str) + Sync)) {
         if let Some(remark) = self.port.mend() {
             note(&remark);
         }
         let heard = self.port.hear(tick);
-        let Self { bus, port, exchange, .. } = self;
+        let Self { bus, port, exchange, objects, clock, lost_events } = self;
         exchange.check_in(Task::Bus);
         if let Some(change) = port.take_change() {
             note(&format!("can: {}", word(change)));
@@ -125,7 +126,7 @@ impl BusLoop<'_> {
             BusOutput::Event(told) => exchange.pass_on(told),
             BusOutput::Published(published) => {
                 if is_sent {
-                    is_late |= clock.sent(Instant::now(), &exchange.periods);
+                    is_late |= clock.sent(exchange.now(), &exchange.periods);
                 }
                 exchange.published(&published);
             }

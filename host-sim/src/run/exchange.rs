@@ -76,6 +76,17 @@ pub(super) struct LaserQueues {
     pub free_revolutions: Receiver<Box<Revolution>>,
 }
 
+impl LaserQueues {
+    /// Leaves a revolution to the localiser. If it is so far behind that there is no room, the revolution is lost and counted.
+    pub fn pass_on(&self, revolution: &Revolution, exchange: &Exchange) {
+        let Ok(mut room) = self.free_revolutions.try_recv() else { return exchange.lose_revolution() };
+        Revolution::clone_from(&mut room, revolution);
+        // There are no more of them than there is room for.
+        let _ = self.revolutions.try_send(room);
+        exchange.wake_localizer();
+    }
+}
+
 /// The other ends of the queues.
 pub(super) struct Queues {
     pub localizer: LocalizerQueues,

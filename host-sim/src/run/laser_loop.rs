@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use agv_wire::nav350::{Configuration, Revolution, SensorWatch};
+use agv_wire::nav350::{Configuration, SensorWatch};
 
 use super::exchange::{Exchange, LaserQueues, Task};
 use crate::link::nav350::{Happening, Link};
@@ -38,15 +38,7 @@ pub(super) fn run(
                 Happening::Revolution(revolution) => {
                     is_lost = false;
                     watch.measured(time);
-                    match queues.free_revolutions.try_recv() {
-                        Ok(mut room) => {
-                            Revolution::clone_from(&mut room, revolution);
-                            // There are no more of them than there is room for.
-                            let _ = queues.revolutions.try_send(room);
-                            exchange.wake_localizer();
-                        }
-                        Err(_) => exchange.lose_revolution(),
-                    }
+                    queues.pass_on(revolution, exchange);
                 }
                 Happening::Lost(reason) => {
                     watch.lost(reason);

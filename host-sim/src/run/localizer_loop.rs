@@ -44,7 +44,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
 
     /// Handles what has come, and returns whether there was anything. Samples that wait go first: they are what a revolution is seen
     /// from. A search takes what time is left.
-    fn step(&mut self) -> bool {
+    pub fn step(&mut self) -> bool {
         self.exchange.check_in(Task::Localizer);
         self.log_published(self.localization.told());
         if self.exchange.has_failed() {
@@ -66,7 +66,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
     }
 
     /// Tells the bus what the localiser says.
-    fn tell(&mut self) {
+    pub fn tell(&mut self) {
         let estimate = self.localization.estimate();
         self.log.answer(&estimate);
         self.exchange.publish(estimate);

@@ -30,6 +30,7 @@ mod real_time;
 mod service_port;
 mod state_keeper;
 mod status;
+mod stepped;
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
@@ -63,6 +64,7 @@ pub use periods::{PeriodClock, PeriodFigures, Periods};
 pub use pose_line::{PoseLine, PoseSinkError};
 pub use real_time::RealTime;
 pub use status::{LeftOut, Status, StatusBoard, serve_status};
+pub use stepped::{Stepped, run_stepped};
 
 use self::bus_loop::BusLoop;
 use self::bus_port::BusPort;
@@ -350,7 +352,7 @@ pub fn run(
     let bus = Bus::new(&settings, identity, troubles, start);
     let port = BusPort::new(options.open_bus, exchange.clock, &bus.nodes(), &bus.other_frames());
     let period = Duration::from_millis(settings.publishing_period.max(1).into());
-    let bus_loop = BusLoop { bus, port, exchange, controller: &controller, period, begin };
+    let bus_loop = BusLoop::new((bus, port), exchange, &controller, period);
     let laser = SocketAddr::from((settings.network.laser, settings.network.laser_port)).to_string();
     let configuration = settings.laser.configuration();
     let limits = settings.parameters.alert_limits;
@@ -393,7 +395,7 @@ pub fn run(
         let busing = named("bus", STACK).spawn_scoped(scope, || {
             let _alarm = Alarm(exchange);
             real_time::enter("bus", real_time.bus_priority, real_time.bus_core, lacks);
-            bus_loop.run(note);
+            bus_loop.run(begin, note);
         });
         let lining = options.lines.map(|lines| {
             named("lines", STACK).spawn_scoped(scope, move || {

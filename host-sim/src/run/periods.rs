@@ -1,8 +1,9 @@
 //! How regularly poses go to the bus.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use agv_core::measurement::Time;
 use serde::Serialize;
 
 /// Longest period with a place of its own, us: ten of the longest ones that can be set. Longer ones share the last place.
@@ -47,7 +48,7 @@ impl Default for Periods {
 pub struct PeriodClock {
     /// What is aimed at.
     period: Duration,
-    last: Option<Instant>,
+    last: Option<Time>,
 }
 
 impl PeriodClock {
@@ -58,16 +59,16 @@ impl PeriodClock {
     }
 
     /// A pose went to the bus. Whether its deadline, or one before it, was missed.
-    pub fn sent(&mut self, now: Instant, periods: &Periods) -> bool {
+    pub fn sent(&mut self, now: Time, periods: &Periods) -> bool {
         periods.poses.fetch_add(1, Ordering::Relaxed);
         let Some(last) = self.last.replace(now) else { return false };
-        let passed = now.saturating_duration_since(last);
-        let micros = usize::try_from(passed.as_micros()).unwrap_or(LONGEST).min(LONGEST);
+        let passed = now.micros().saturating_sub(last.micros());
+        let micros = usize::try_from(passed).unwrap_or(LONGEST).min(LONGEST);
         if let Some(count) = periods.counts.get(micros) {
             count.fetch_add(1, Ordering::Relaxed);
         }
-        periods.longest.fetch_max(passed.as_micros() as u64, Ordering::Relaxed);
-        let share = passed.as_secs_f64() / self.period.as_secs_f64();
+        periods.longest.fetch_max(passed, Ordering::Relaxed);
+        let share = 1e-6 * passed as f64 / self.period.as_secs_f64();
         let is_missed = share > 1.0 + LATE;
         if is_missed {
             periods.missed.fetch_add((share - LATE).floor().max(1.0) as u64, Ordering::Relaxed);
@@ -116,7 +117,9 @@ impl Periods {
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
+    use std::time::Duration;
+
+    use agv_core::measurement::Time;
 
     use super::{PeriodClock, PeriodFigures, Periods};
 
@@ -125,24 +128,24 @@ mod tests {
         let periods = Periods::default();
         assert_eq!(periods.figures(), PeriodFigures::default());
         let mut clock = PeriodClock::new(Duration::from_millis(10));
-        let start = Instant::now();
-        let mut time = start;
+        let mut micros = 0;
         for number in 0..1001_u64 {
-            time = start + Duration::from_micros(10_000 * number + 5 * (number % 2));
+            micros = 10_000 * number + 5 * (number % 2);
+            let time = Time::from_micros(micros);
             assert!(!clock.sent(time, &periods));
         }
         // Two poses are missing, then one is late by six tenths.
-        time += Duration::from_millis(30);
-        assert!(clock.sent(time, &periods));
-        time += Duration::from_micros(16_000);
-        assert!(clock.sent(time, &periods));
+        micros += 30_000;
+        assert!(clock.sent(Time::from_micros(micros), &periods));
+        micros += 16_000;
+        assert!(clock.sent(Time::from_micros(micros), &periods));
         assert_eq!((periods.poses(), periods.missed()), (1003, 3));
         // 500 of 9.995 ms, 500 of 10.005 ms and these two: the 501st and the 1001st of 1002.
         let PeriodFigures { p50, p999, max } = periods.figures();
         assert_eq!([p50, p999, max], [10.005, 16.0, 30.0]);
         // A bus that was away for an hour is no period.
         clock.interrupt();
-        assert!(!clock.sent(time + Duration::from_secs(3600), &periods));
+        assert!(!clock.sent(Time::from_micros(micros + 3_600_000_000), &periods));
         assert_eq!((periods.figures().max, periods.missed()), (30.0, 3));
     }
 }

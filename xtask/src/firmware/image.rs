@@ -59,7 +59,17 @@ const CONTOUR_MAP: u64 = 128 * 1024;
 pub const AN500: Board = Board {
     feature: "an500",
     chip: None,
-    images: &["calibrate", "deliberate_panic", "latency", "measure", "no_panic", "replay", "restart", "vehicle"],
+    images: &[
+        "calibrate",
+        "deliberate_panic",
+        "latency",
+        "measure",
+        "no_panic",
+        "play",
+        "replay",
+        "restart",
+        "vehicle",
+    ],
     flash: H743.flash,
     ram: &[Region {
         name: "RAM",

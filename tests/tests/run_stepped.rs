@@ -1,0 +1,261 @@
+//! The controller on Linux in a time that is told: the poses of the emulated board to the last bit, and a day without growth.
+#![cfg(target_os = "linux")]
+
+use std::process::Command;
+use std::sync::atomic::AtomicU64;
+
+use agv_controller::{EncoderNodes, LaserOrder};
+use agv_core::measurement::Time;
+use agv_core::state::Mode;
+use agv_host_sim::emulate::motion::EmulatedMotion;
+use agv_host_sim::log;
+use agv_host_sim::provision::flash_image;
+use agv_host_sim::recording::Recording;
+use agv_host_sim::run::{FLASH, Stepped, run_stepped};
+use agv_host_sim::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
+use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
+use agv_host_sim::simulate::{simulate, standard};
+use agv_settings::Settings;
+use agv_tests::{emulator, image};
+use agv_wire::can::frame::{Frame, Id};
+use agv_wire::nav350::SensorFrame;
+
+/// What everything is asked, us.
+const STEP: u64 = 1_000;
+/// How long the vehicle stands before it drives, s: it finds itself meanwhile.
+const STANDS: f64 = 8.0;
+
+/// What a controller hears, as the image `play` reads it, and what it has sent.
+#[derive(Default)]
+struct Tape {
+    heard: Vec<u8>,
+    sent: Vec<u8>,
+}
+
+impl Tape {
+    fn hear(&mut self, kind: u8, now: Time, bytes: &[u8]) {
+        self.heard.push(kind);
+        self.heard.extend(now.micros().to_le_bytes());
+        self.heard.extend(u16::try_from(bytes.len()).unwrap().to_le_bytes());
+        self.heard.extend(bytes);
+    }
+
+    fn hear_frame(&mut self, now: Time, frame: &Frame) {
+        let bytes = [&id(frame).to_le_bytes(), frame.data()].concat();
+        self.hear(1, now, &bytes);
+    }
+
+    fn send(&mut self, now: Time, frame: &Frame) {
+        self.sent.extend(now.micros().to_le_bytes());
+        self.sent.extend(id(frame).to_le_bytes());
+        self.sent.extend(frame.padded());
+    }
+}
+
+fn id(frame: &Frame) -> u32 {
+    assert!(!frame.is_remote());
+    let Id::Standard(id) = frame.id() else { panic!("{frame:?}") };
+    id.as_raw().into()
+}
+
+/// Encoders and laser of a drive, and what is on its way between them and a controller.
+struct Sensors {
+    motion: EmulatedMotion,
+    sensor: Sensor,
+    connection: Option<Connection>,
+    frames: Vec<Frame>,
+    telegrams: Vec<Vec<u8>>,
+}
+
+impl Sensors {
+    fn new(recording: &Recording) -> Self {
+        let nodes = EncoderNodes::of(&Settings::of(recording.parameters));
+        let drive = Drive::new(recording, SensorFrame::default()).unwrap();
+        let clock = SensorClockOptions { start: 1_000_000, ..SensorClockOptions::default() };
+        Self {
+            motion: EmulatedMotion::new(recording, &nodes).unwrap().standing(),
+            sensor: Sensor::new(drive, clock, None, true),
+            connection: None,
+            frames: Vec::new(),
+            telegrams: Vec::new(),
+        }
+    }
+
+    fn begin(&mut self, now: Time) {
+        self.motion.begin(now);
+        self.sensor.begin(now.seconds());
+    }
+
+    /// One step of all. `hear` is told what the controller hears, kind by kind, and what it sends.
+    fn step(&mut self, controller: &mut Stepped, now: Time, tape: &mut Option<Tape>) {
+        controller.set_time(now);
+        let mut orders: Vec<LaserOrder<Vec<u8>>> = Vec::new();
+        let telegrams = std::mem::take(&mut self.telegrams);
+        for bytes in telegrams.iter().map(Vec::as_slice).chain([&[][..]]) {
+            if let Some(tape) = tape {
+                tape.hear(3, now, bytes);
+            }
+            controller.step_laser(bytes, |order| orders.push(order.map(<[u8]>::to_vec)));
+        }
+        for order in orders {
+            match order {
+                LaserOrder::Connect => {
+                    self.connection = Some(Connection::default());
+                    controller.connect_laser();
+                    if let Some(tape) = tape {
+                        tape.hear(2, now, &[]);
+                    }
+                }
+                LaserOrder::Disconnect => self.connection = None,
+                LaserOrder::Send(bytes) => {
+                    let Some(connection) = &mut self.connection else { continue };
+                    self.telegrams.push(connection.receive(&mut self.sensor, &bytes, now.seconds()));
+                }
+            }
+        }
+        if let Some(connection) = &mut self.connection {
+            self.telegrams.extend(connection.poll(&self.sensor, now.seconds()));
+        }
+        let frames = std::mem::take(&mut self.frames);
+        for heard in frames.iter().map(Some).chain([None]) {
+            if let Some(tape) = tape {
+                match heard {
+                    Some(frame) => tape.hear_frame(now, frame),
+                    None => tape.hear(0, now, &[]),
+                }
+            }
+            controller.step_bus(heard, |frame| {
+                if let Some(tape) = tape {
+                    tape.send(now, frame);
+                }
+                self.frames.extend(self.motion.handle(frame));
+            });
+        }
+        self.frames.extend(self.motion.poll(now));
+    }
+}
+
+fn store(recording: &Recording) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = Settings::of(recording.parameters);
+    std::fs::write(folder.path().join(FLASH), flash_image(&settings, &recording.landmarks, None).unwrap()).unwrap();
+    folder
+}
+
+fn hall() -> Scenario {
+    toml::from_str(standard::HALL).unwrap()
+}
+
+#[test]
+fn the_emulated_board_says_the_same_on_the_bus_to_the_last_bit() {
+    // The board is switched on at the first time of the tape.
+    static HAND: AtomicU64 = AtomicU64::new(STEP);
+    let test = "the_emulated_board_says_the_same_on_the_bus_to_the_last_bit";
+    let Some(image) = image(test, "an500", "play").filter(|_| emulator(test)) else { return };
+    let recording = simulate(&hall()).unwrap().recording;
+    let store = store(&recording);
+    let folder = tempfile::tempdir().unwrap();
+    let (tape, parameters, landmarks) = run_stepped(store.path(), &HAND, |controller| {
+        let (mut sensors, mut tape) = (Sensors::new(&recording), Some(Tape::default()));
+        for step in 1..=40_000 {
+            let now = Time::from_micros(step * STEP);
+            if now == Time::from_seconds(STANDS) {
+                sensors.begin(now);
+            }
+            sensors.step(controller, now, &mut tape);
+        }
+        // It has found itself and drives.
+        let pose = controller.pose().unwrap();
+        assert_eq!((pose.mode, controller.left_out()), (Mode::Reflectors, [0; 3]));
+        assert!(controller.poses().0 >= 3_900, "{:?}", controller.poses());
+        assert_eq!(*controller.settings, Settings::of(controller.settings.parameters));
+        (tape.unwrap(), controller.settings.parameters, controller.landmarks.to_vec())
+    })
+    .unwrap();
+    let header = Recording { parameters, landmarks, events: Vec::new(), ..recording };
+    log::write(&folder.path().join("drive.agvlog"), &header).unwrap();
+    std::fs::write(folder.path().join("tape.bin"), &tape.heard).unwrap();
+    let output = Command::new("qemu-system-arm")
+        .args(["-M", "mps2-an500", "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(&image)
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let sent = std::fs::read(folder.path().join("sent.bin")).unwrap();
+    let (by_linux, by_board) = (tape.sent.chunks(20), sent.chunks(20));
+    assert!(by_linux.len() > 15_000, "{} frames", by_linux.len());
+    let difference = by_linux.clone().zip(by_board.clone()).enumerate().find(|(_, (linux, board))| linux != board);
+    assert_eq!(difference, None, "the first frame that differs, of {}", by_linux.len());
+    assert_eq!(by_linux.len(), by_board.len());
+}
+
+/// Descriptors that are open, and resident memory, kB.
+fn occupied() -> (usize, u64) {
+    let pages = std::fs::read_to_string("/proc/self/statm").unwrap();
+    let resident: u64 = pages.split(' ').nth(1).unwrap().parse().unwrap();
+    (std::fs::read_dir("/proc/self/fd").unwrap().count(), 4 * resident)
+}
+
+const HOUR: f64 = 3600.0;
+/// Time between two looks, us.
+const PART: u64 = 600_000_000;
+/// The shortest lap, s.
+const LAP: f64 = 70.0;
+
+/// An hour; a day with `AGV_LONG`.
+#[test]
+fn a_day_takes_neither_memory_nor_descriptors() {
+    static HAND: AtomicU64 = AtomicU64::new(0);
+    let hours = if std::env::var_os("AGV_LONG").is_some() { 24 } else { 1 };
+    let mut scenario = hall();
+    let lap = scenario.build_path();
+    let laps = (HOUR / LAP).ceil() as usize;
+    let start = PoseOptions { x: lap.start.x, y: lap.start.y, heading_deg: lap.start.theta.to_degrees() };
+    let legs = lap.legs.iter().cycle().take(lap.legs.len() * laps).cloned().collect();
+    scenario.path = PathOptions { kind: PathKind::Legs, start, legs };
+    scenario.laser.scans = false;
+    // The same hour again and again: the vehicle is where it began, as it stands at the end of a lap.
+    let recording = simulate(&scenario).unwrap().recording;
+    let store = store(&recording);
+    let grown = run_stepped(store.path(), &HAND, |controller| {
+        let mut occupied_after = Vec::new();
+        let (mut now, mut lost) = (0, 0);
+        for hour in 0..hours {
+            let mut sensors = Sensors::new(&recording);
+            let begin = now + (STANDS * 1e6) as u64;
+            let end = now + (HOUR * 1e6) as u64;
+            while now < end {
+                now += STEP;
+                let time = Time::from_micros(now);
+                if now == begin {
+                    sensors.begin(time);
+                }
+                sensors.step(controller, time, &mut None);
+                let is_settled = now > begin + 10_000_000;
+                lost += u64::from(is_settled && controller.pose().is_some_and(|pose| !pose.mode.is_localised()));
+                if now % PART == 0 {
+                    occupied_after.push(occupied());
+                }
+            }
+            println!("hour {}: {:?}, {lost} ms not localised", hour + 1, occupied());
+        }
+        assert_eq!(controller.left_out(), [0; 3]);
+        let (poses, figures, missed) = controller.poses();
+        assert!(poses >= 359_000 * hours && missed == 0, "{poses} poses, {missed} missed, {figures:?}");
+        // Not a hundredth of the time: where a drive begins again, the encoders do.
+        assert!(lost * 100 < hours * 3_600_000, "{lost} ms");
+        occupied_after
+    })
+    .unwrap();
+    let (first, last) = (grown.first().unwrap(), grown.last().unwrap());
+    assert_eq!(grown.len() as u64, 6 * hours);
+    assert_eq!(first.0, last.0, "descriptors: {grown:?}");
+    assert!(last.1 as f64 <= 1.01 * first.1 as f64, "kB: {grown:?}");
+}
