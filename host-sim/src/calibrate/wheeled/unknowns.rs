@@ -84,6 +84,20 @@ impl Unknown {
         unknowns
     }
 
+    /// The same numbers with one of all radii, which stay as many times each other, instead of those of each wheel.
+    #[must_use]
+    pub fn with_common_radius(unknowns: &[Self], wheels: &[Wheel]) -> Vec<Self> {
+        let is_radius = |unknown: &&Self| match &unknown.moves {
+            Moves::Wheels(moves) => moves.iter().all(|(_, parameter, _)| *parameter == WheelParameter::Radius),
+            Moves::Sensor(_) => false,
+        };
+        let measured = || wheels.iter().enumerate().filter(|(_, wheel)| wheel.turn.is_some());
+        let Some((_, first)) = measured().next() else { return unknowns.to_vec() };
+        let moves = measured().map(|(number, wheel)| (number, WheelParameter::Radius, wheel.radius / first.radius));
+        let common = Self::wheel("radius of all wheels m".to_owned(), moves.collect(), SHARE * first.radius.abs());
+        std::iter::once(common).chain(unknowns.iter().filter(|unknown| !is_radius(unknown)).cloned()).collect()
+    }
+
     fn geometry(kind: Kind, wheels: &[Wheel]) -> Vec<Self> {
         use WheelParameter::{X, Y};
         let away = |wheel: usize| wheels.get(wheel).map_or(0.0, |wheel| wheel.x.hypot(wheel.y));

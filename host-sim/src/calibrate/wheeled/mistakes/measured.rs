@@ -11,7 +11,7 @@ use crate::calibrate::wheeled::unknowns::{Moves, Unknown, WheeledModel};
 /// Differences that are told: in standard deviations, and the least ones: share of a radius and of a length, steering offset and heading,
 /// rad, place, m, and time, s. Slip and drift are mistaken for less.
 const CLEAR: f64 = 5.0;
-const SHARE: f64 = 0.02;
+pub(super) const SHARE: f64 = 0.02;
 const LENGTH: f64 = 0.02;
 const STEERING: f64 = 1.5 * PI / 180.0;
 const HEADING: f64 = PI / 180.0;

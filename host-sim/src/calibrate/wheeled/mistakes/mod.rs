@@ -248,6 +248,13 @@ fn promising(group: Vec<Undone>) -> Vec<Undone> {
 const FAR: f64 = 1.0;
 
 fn simplest(mut found: Vec<WheelExplanation>) -> Vec<WheelExplanation> {
+    // A tick of about minus one tick is a counter that counts the wrong way.
+    let is_reversed = |mistake: &Mistake| match mistake {
+        Mistake::WheelScale(wheel, ratio) if (*ratio + 1.0).abs() < measured::SHARE => Some(*wheel),
+        _ => None,
+    };
+    let reversed: Vec<usize> = found.iter().flat_map(|one| one.mistakes.iter().filter_map(turned)).collect();
+    found.retain(|one| !one.mistakes.iter().filter_map(is_reversed).any(|wheel| reversed.contains(&wheel)));
     let best = found.iter().map(|one| one.residual).fold(f64::INFINITY, f64::min);
     found.retain(|one| one.residual <= WORSE * best.max(FINE));
     let weight = |one: &WheelExplanation| {
@@ -267,6 +274,14 @@ fn simplest(mut found: Vec<WheelExplanation>) -> Vec<WheelExplanation> {
     each
 }
 
+/// The wheel of which a counter of turns counts the wrong way.
+const fn turned(mistake: &Mistake) -> Option<usize> {
+    match mistake {
+        Mistake::Reversed { wheel, counted: Counted::Turn } => Some(*wheel),
+        _ => None,
+    }
+}
+
 /// Explanations that are told at the most.
 const MOST: usize = 2;
 
@@ -284,16 +299,16 @@ fn explanation(undone: Undone) -> Option<WheelExplanation> {
     let mut mistakes = undone.mistakes.clone();
     let measured = measured(&nominal, &found, &unknowns);
     add(&mut mistakes, measured);
-    let named: Vec<Unknown> = unknowns
-        .iter()
-        .filter(|unknown| mistakes.iter().any(|mistake| mistake.is_mended_by(unknown)))
-        .cloned()
-        .collect();
-    let only = fit(std::slice::from_ref(&drive), &start, &named, true).ok();
-    let (model, unknowns) = match only.filter(|only| only.residual <= WORSE * found.residual.max(FINE)) {
-        Some(only) => (only.model, named),
-        None => (found.model, unknowns),
-    };
+    let is_named = |unknown: &&Unknown| mistakes.iter().any(|mistake| mistake.is_mended_by(unknown));
+    let named: Vec<Unknown> = unknowns.iter().filter(is_named).cloned().collect();
+    // What is alike of all wheels is one number: where the wheels are free, the place of the laser hides in them.
+    let is_scaled = mistakes.iter().any(|mistake| matches!(mistake, Mistake::Scale(_)));
+    let common = is_scaled.then(|| Unknown::with_common_radius(&named, &start.wheels));
+    let fitted = common.into_iter().chain([named]).find_map(|named| {
+        let only = fit(std::slice::from_ref(&drive), &start, &named, true).ok()?;
+        (only.residual <= WORSE * found.residual.max(FINE)).then_some((only.model, named))
+    });
+    let (model, unknowns) = fitted.unwrap_or((found.model, unknowns));
     let mut mended = undone.input.clone();
     mended.parameters.vehicle = fitted_vehicle(&mended.parameters.vehicle, &model)?;
     *mended.parameters.lasers.first_mut() = model.sensor;
