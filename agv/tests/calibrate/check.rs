@@ -180,7 +180,7 @@ pub fn replayed(files: &Files, command: &[&str]) -> f64 {
 }
 
 /// What a sound drive ends with, mm.
-const GOOD: f64 = 20.0;
+pub const GOOD: f64 = 20.0;
 
 fn assert_vehicle_is_mended(files: &Files, scenario: &str, planted: &Planted) {
     let log = drive(files, scenario, planted);
