@@ -1,8 +1,10 @@
 //! The controller on Linux in a time that is told: the poses of the emulated board to the last bit, and a day without growth.
 #![cfg(target_os = "linux")]
 
+use std::alloc::System;
 use std::process::Command;
 use std::sync::atomic::AtomicU64;
+use std::sync::{Mutex, PoisonError};
 
 use agv_controller::{EncoderNodes, LaserOrder};
 use agv_core::measurement::Time;
@@ -19,6 +21,7 @@ use agv_settings::Settings;
 use agv_tests::{emulator, image};
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::nav350::SensorFrame;
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 
 /// What everything is asked, us.
 const STEP: u64 = 1_000;
@@ -150,6 +153,7 @@ fn hall() -> Scenario {
 fn the_emulated_board_says_the_same_on_the_bus_to_the_last_bit() {
     // The board is switched on at the first time of the tape.
     static HAND: AtomicU64 = AtomicU64::new(STEP);
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let test = "the_emulated_board_says_the_same_on_the_bus_to_the_last_bit";
     let Some(image) = image(test, "an500", "play").filter(|_| emulator(test)) else { return };
     let recording = simulate(&hall()).unwrap().recording;
@@ -196,11 +200,17 @@ fn the_emulated_board_says_the_same_on_the_bus_to_the_last_bit() {
     assert_eq!(by_linux.len(), by_board.len());
 }
 
-/// Descriptors that are open, and resident memory, kB.
-fn occupied() -> (usize, u64) {
-    let pages = std::fs::read_to_string("/proc/self/statm").unwrap();
-    let resident: u64 = pages.split(' ').nth(1).unwrap().parse().unwrap();
-    (std::fs::read_dir("/proc/self/fd").unwrap().count(), 4 * resident)
+#[global_allocator]
+static COUNTED: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// One test at a time: memory is counted of all.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// Descriptors that are open, and memory that is held, kB.
+fn occupied() -> (usize, usize) {
+    let held = COUNTED.stats();
+    let bytes = held.bytes_allocated - held.bytes_deallocated;
+    (std::fs::read_dir("/proc/self/fd").unwrap().count(), bytes / 1024)
 }
 
 const HOUR: f64 = 3600.0;
@@ -213,6 +223,7 @@ const LAP: f64 = 70.0;
 #[test]
 fn a_day_takes_neither_memory_nor_descriptors() {
     static HAND: AtomicU64 = AtomicU64::new(0);
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let hours = if std::env::var_os("AGV_LONG").is_some() { 24 } else { 1 };
     let mut scenario = hall();
     let lap = scenario.build_path();
