@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex};
 use agv_core::measurement::Time;
 use agv_host_sim::layout_file;
 use agv_host_sim::mapping::contour_file;
+use agv_host_sim::mapping::map_file;
 use agv_settings::contour_store::ContourStore;
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::service::{Action, Controller, Frames, LONGEST_MESSAGE, Response, Session, encode};
@@ -236,6 +237,35 @@ fn who_may_not_change_a_controller_is_told_why() {
     assert_eq!(bench.ctl(&["list"]), before);
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     assert!(refusal(&["ctl", &closed, "--key", &bench.key, "apply", &bench.vehicle]).contains(&closed));
+}
+
+/// A map of features is none of a layout; it goes to the controller whole, by its port and in its image.
+#[test]
+fn a_map_of_features_is_brought_to_a_controller_and_back() {
+    let bench = Bench::new();
+    let content =
+        "id,kind,x_m,y_m,deviation_m\n0,corner,1.25,-3.5,0.01\n1,end_point,2,7.75,0.02\n4,reflector,0.5,0.25,0.005\n";
+    let features = bench.files.write("features.csv", content.as_bytes());
+    bench.ctl(&["--key", &bench.key, "map", "upload", &features]);
+    bench.ctl(&["--key", &bench.key, "reboot"]);
+    let back = bench.files.path("back.csv");
+    assert_eq!(row(&bench.ctl(&["map", "download", &back]), "landmarks"), ["3"]);
+    let of = |path: &str| -> Vec<_> {
+        let read = map_file::read(Path::new(path)).unwrap();
+        read.iter().map(|one| (one.id, one.kind, one.x, one.y)).collect()
+    };
+    assert_eq!(of(&back), of(&features));
+    assert!(bench.refused(&["map", "download", &bench.files.path("back.imk")]).contains("only a .csv holds"));
+    let (key, image) = (&bench.key, bench.files.path("flash.bin"));
+    let made = agv(&["provision", "--key", key, "--map", &features, "--output", &image, "--json"]);
+    let made: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(made["landmarks"], 3);
+    // What holds no landmark at all, or none of a layout, is refused.
+    let none = bench.files.write("none.csv", b"id,kind,x_m,y_m,deviation_m\n");
+    assert!(refusal(&["provision", "--key", key, "--map", &none, "--output", &image]).contains("no landmarks"));
+    let corners = bench.files.write("corners.csv", b"id,kind,x_m,y_m,deviation_m\n0,corner,1,2,0.01\n");
+    let layout = bench.files.path("layout.imk");
+    assert!(refusal(&["layout", "convert", &corners, &layout]).contains("holds no reflectors"));
 }
 
 #[test]

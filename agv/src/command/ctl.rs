@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use agv_core::geometry::Pose;
+use agv_core::maps::LandmarkKind;
 use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::layout_file;
 use agv_host_sim::link::service::{Client, KeptIncident, PORT, ServiceError, Setting};
 use agv_host_sim::link::with_port;
-use agv_host_sim::mapping::contour_file;
+use agv_host_sim::mapping::{contour_file, map_file};
 use agv_host_sim::output_file::OutputFile;
 use agv_host_sim::setting_doubts::doubt;
 use agv_settings::leaf::{Leaf, Value};
@@ -307,7 +308,7 @@ impl Ctl {
             Action::Apply { file, dry_run } => self.print(&apply(&mut client, file, *dry_run)?)?,
             Action::Store => client.store()?,
             Action::Map { action: MapAction::Upload { file } } => {
-                let landmarks = layout_file::landmarks(&layout_input::load(file)?);
+                let landmarks = layout_input::load_map(file)?;
                 let progress = progress::bar("uploading", landmarks.len() as u64);
                 client.upload_map(&landmarks, |count| progress.inc(count as u64))?;
                 progress.finish_and_clear();
@@ -316,7 +317,17 @@ impl Ctl {
             Action::Map { action: MapAction::Download { file } } => {
                 layout_file::Format::of(file)?;
                 let landmarks = client.download_map()?;
-                layout_file::save(file, &layout_file::layout(&landmarks))?;
+                if landmarks.iter().all(|landmark| landmark.kind == LandmarkKind::Reflector) {
+                    layout_file::save(file, &layout_file::layout(&landmarks))?;
+                } else {
+                    let format = layout_file::Format::of(file)?;
+                    ensure!(
+                        format == layout_file::Format::Csv,
+                        "{}: the map has natural features, which only a .csv holds",
+                        file.display()
+                    );
+                    map_file::write(file, &landmarks)?;
+                }
                 self.print(&map_rows(&landmarks))?;
             }
             Action::Contours { action: ContourAction::Upload { file } } => {

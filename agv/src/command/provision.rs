@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use agv_host_sim::mapping::contour_file;
 use agv_host_sim::provision::{contour_image, flash_image};
 use agv_host_sim::setting_doubts::doubt;
-use agv_host_sim::{layout_file, log, output_file};
+use agv_host_sim::{log, output_file};
 use agv_settings::leaf::{Leaf, Value};
 use agv_settings::{LEAVES, Settings, map_identity};
 use anyhow::Context;
@@ -69,7 +69,7 @@ impl Provision {
             None => (Settings::default(), Vec::new()),
         };
         if let Some(map) = &self.map {
-            landmarks = layout_file::landmarks(&layout_input::load(map)?);
+            landmarks = layout_input::load_map(map)?;
         }
         self.settings.change(&mut settings)?;
         let doubts = doubts(&settings);

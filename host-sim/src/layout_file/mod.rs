@@ -173,6 +173,13 @@ pub fn load_as(path: &Path, reading: &Reading) -> Result<LoadedLayout, TextFileE
     if text.lines().next().is_some_and(|first| first.trim() == map_file::HEADER) && *reading == Reading::default() {
         let map = map_file::read(path)?;
         let landmarks = layout(&map);
+        if landmarks.is_empty() {
+            return Err(TextFileError::of_line(
+                path,
+                1,
+                "the map holds no reflectors, of which a layout is".to_owned(),
+            ));
+        }
         account.take(landmarks.len());
         account.set_aside("landmarks that are no reflectors", map.len() - landmarks.len());
         return Ok(LoadedLayout { landmarks, lines: Vec::new(), account });

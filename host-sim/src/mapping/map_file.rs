@@ -20,6 +20,12 @@ use crate::text_file::{self, TextFileError};
 /// First line of every map.
 pub const HEADER: &str = "id,kind,x_m,y_m,deviation_m";
 
+/// Whether a file begins as a map does.
+#[must_use]
+pub fn is_map(path: &Path) -> bool {
+    text_file::read(path, "a map").is_ok_and(|text| text.lines().next().is_some_and(|first| first.trim() == HEADER))
+}
+
 /// Reads a map.
 ///
 /// # Errors
