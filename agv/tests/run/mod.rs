@@ -147,11 +147,10 @@ fn free_port() -> u16 {
     TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port()
 }
 
-#[test]
-fn a_controller_tells_its_state_and_keeps_its_settings() {
-    let files = Files::new();
+/// The configuration of a controller at free ports whose bus is behind an adapter at one, without a laser; and the file of its key.
+fn provisioned(files: &Files, adapter: u16, status: u16) -> [String; 2] {
     let key = files.write("agv.key", crate::ctl::KEY.as_bytes());
-    let [log, service, laser, status, adapter] = std::array::from_fn(|_| free_port());
+    let [log, service, laser] = std::array::from_fn(|_| free_port());
     let store = files.path("store");
     std::fs::create_dir(&store).unwrap();
     let (image, set) = (format!("{store}/flash.bin"), |name: &str, value: u16| format!("{name}={value}"));
@@ -163,7 +162,34 @@ fn a_controller_tells_its_state_and_keeps_its_settings() {
         "store = \"{store}\"\nbus = \"slcan-tcp:127.0.0.1:{adapter}\"\nlisten = \"127.0.0.1\"\n[real_time]\n\
          [status]\nlisten = \"127.0.0.1:{status}\"\n"
     );
-    let configuration = files.write("vehicle.toml", configuration.as_bytes());
+    [files.write("vehicle.toml", configuration.as_bytes()), key]
+}
+
+/// An adapter that has room for one client hears the controller on the first connection.
+#[test]
+fn the_bus_is_opened_once() {
+    let files = Files::new();
+    let bus = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let [configuration, _] = provisioned(&files, bus.local_addr().unwrap().port(), free_port());
+    let running = Running::start(&["run", "--config", &configuration]);
+    let (mut adapter, _) = bus.accept().unwrap();
+    drop(bus);
+    adapter.set_read_timeout(Some(PATIENCE)).unwrap();
+    let mut heard = Vec::new();
+    while !text(&heard).contains("t1908") {
+        let mut bytes = [0; 4096];
+        let count = adapter.read(&mut bytes).unwrap();
+        assert!(count > 0, "the connection was closed behind {:?}", text(&heard));
+        heard.extend(&bytes[..count]);
+    }
+    assert!(running.terminate().0);
+}
+
+#[test]
+fn a_controller_tells_its_state_and_keeps_its_settings() {
+    let files = Files::new();
+    let [status, adapter] = std::array::from_fn(|_| free_port());
+    let [configuration, key] = provisioned(&files, adapter, status);
     let mut running = Running::start(&["run", "--config", &configuration]);
     let [_, service] = running.ports();
     // There is no adapter yet: it is tried again.

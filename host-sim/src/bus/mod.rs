@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::frame::{AnyFrame, Id};
+#[cfg(target_os = "linux")]
+use agv_wire::can::slcan::BitRate;
 
 pub use in_process::{InProcessBus, InProcessNode};
 #[cfg(target_os = "linux")]
@@ -109,6 +111,43 @@ pub trait Bus: Send {
     }
 }
 
+/// What a bus is, by its name.
+#[cfg(target_os = "linux")]
+enum Kind {
+    Device(String, BitRate),
+    Address(String, BitRate),
+    Interface(String),
+}
+
+#[cfg(target_os = "linux")]
+impl Kind {
+    fn of(name: &str) -> Result<Self, BusError> {
+        let wrong = || BusError::Name { name: name.to_owned() };
+        let with_rate = |text: &str| match text.rsplit_once('@') {
+            None => Some((text.to_owned(), BitRate::Kbit500)),
+            Some((place, rate)) => Some((place.to_owned(), BitRate::from_bits_per_second(rate.parse().ok()?)?)),
+        };
+        if let Some(device) = name.strip_prefix("slcan:") {
+            with_rate(device).map(|(device, rate)| Self::Device(device, rate)).ok_or_else(wrong)
+        } else if let Some(address) = name.strip_prefix("slcan-tcp:") {
+            with_rate(address).map(|(address, rate)| Self::Address(address, rate)).ok_or_else(wrong)
+        } else if name.is_empty() || name.contains([':', '/', '@']) {
+            Err(wrong())
+        } else {
+            Ok(Self::Interface(name.to_owned()))
+        }
+    }
+}
+
+/// Whether a bus can have that name; nothing is opened.
+///
+/// # Errors
+/// [`BusError::Name`] if it cannot.
+#[cfg(target_os = "linux")]
+pub fn check_name(name: &str) -> Result<(), BusError> {
+    Kind::of(name).map(drop)
+}
+
 /// Opens the bus with that name: `slcan:DEVICE[@BITRATE]`, `slcan-tcp:HOST:PORT[@BITRATE]` (500 kbit/s if no bit rate is
 /// named), else an interface of SocketCAN.
 ///
@@ -116,24 +155,20 @@ pub trait Bus: Send {
 /// If there is no such bus, or it cannot be used.
 #[cfg(target_os = "linux")]
 pub fn open(name: &str) -> Result<Box<dyn Bus>, BusError> {
-    use agv_wire::can::slcan::BitRate;
+    Ok(match Kind::of(name)? {
+        Kind::Device(device, rate) => Box::new(SlcanBus::open_device(&device, rate)?),
+        Kind::Address(address, rate) => Box::new(SlcanBus::connect(&address, rate)?),
+        Kind::Interface(name) => Box::new(SocketCanBus::open(&name)?),
+    })
+}
 
-    let wrong = || BusError::Name { name: name.to_owned() };
-    let with_rate = |text: &str| match text.rsplit_once('@') {
-        None => Some((text.to_owned(), BitRate::Kbit500)),
-        Some((place, rate)) => Some((place.to_owned(), BitRate::from_bits_per_second(rate.parse().ok()?)?)),
-    };
-    if let Some(device) = name.strip_prefix("slcan:") {
-        let (device, rate) = with_rate(device).ok_or_else(wrong)?;
-        Ok(Box::new(SlcanBus::open_device(&device, rate)?))
-    } else if let Some(address) = name.strip_prefix("slcan-tcp:") {
-        let (address, rate) = with_rate(address).ok_or_else(wrong)?;
-        Ok(Box::new(SlcanBus::connect(&address, rate)?))
-    } else if name.is_empty() || name.contains([':', '/', '@']) {
-        Err(wrong())
-    } else {
-        Ok(Box::new(SocketCanBus::open(name)?))
-    }
+/// This system has no CAN.
+///
+/// # Errors
+/// Always.
+#[cfg(not(target_os = "linux"))]
+pub fn check_name(name: &str) -> Result<(), BusError> {
+    Err(BusError::Name { name: name.to_owned() })
 }
 
 /// This system has no CAN.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use agv_host_sim::bus::{self, BusError};
+use agv_host_sim::bus;
 use agv_host_sim::run::{
     self, Configuration, Demonstration, Logs, Options, Ports, RealTime, RecordingConfiguration, RingOptions, Running,
     Summary,
@@ -107,7 +107,7 @@ impl Run {
         // What cannot be used is refused before anything begins.
         let configuration = self.config.as_deref().map(Configuration::read).transpose()?;
         if let Some(configuration) = &configuration
-            && let Err(error @ BusError::Name { .. }) = bus::open(&configuration.bus)
+            && let Err(error) = bus::check_name(&configuration.bus)
         {
             bail!("{}: bus: {error}", self.config.as_deref().unwrap_or(Path::new("")).display());
         }
