@@ -31,7 +31,9 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
     let doc = usr.join("share/doc/agv");
     write(&doc.join("copyright"), copyright(&doc)?.as_bytes())?;
     write(&doc.join("changelog"), changelog(epoch)?.as_bytes())?;
-    run(Command::new("gzip").args(["-9", "--no-name"]).arg(doc.join("changelog")))?;
+    compress(&[doc.join("changelog")])?;
+    compress(&files(&usr.join("share/man/man1"))?)?;
+    write(&usr.join("share/lintian/overrides/agv"), OVERRIDES.as_bytes())?;
     let libc = libc(&usr.join("bin/agv"))?;
     let folder = root.with_file_name("package");
     let size = output(Command::new("du").args(["--summarize", "--apparent-size", "--block-size=1024"]).arg(&usr))?;
@@ -52,6 +54,27 @@ pub fn pack(root: &Path, epoch: &str) -> anyhow::Result<PathBuf> {
     Ok(package)
 }
 
+/// What lintian takes for errors, and why it is none.
+const OVERRIDES: &str = "\
+# Who distributes the package states an address; nobody here can be asked by mail.
+agv: bogus-mail-host *
+agv: bogus-mail-host-in-debian-changelog *
+# A translation of libyaml into Rust, of which Debian has no library.
+agv: embedded-library *libyaml*
+";
+
+fn compress(files: &[PathBuf]) -> anyhow::Result<()> {
+    run(Command::new("gzip").args(["-9", "--no-name"]).args(files))
+}
+
+/// The files of a folder, in the order of their names.
+fn files(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
+    let mut files = entries.map(|entry| Ok(entry?.path())).collect::<anyhow::Result<Vec<_>>>()?;
+    files.sort();
+    Ok(files)
+}
+
 /// What Debian's tools read of the versions; people read `CHANGELOG.md`.
 fn changelog(epoch: &str) -> anyhow::Result<String> {
     let date = output(Command::new("date").args(["--utc", "--rfc-email", "--date"]).arg(format!("@{epoch}")))?;
@@ -62,13 +85,13 @@ fn changelog(epoch: &str) -> anyhow::Result<String> {
     ))
 }
 
-/// Who may do what with the package.
+/// Who may do what with the package. Debian has the text of the Apache licence once for all packages.
 fn copyright(doc: &Path) -> anyhow::Result<String> {
-    let read = |name: &str| std::fs::read_to_string(doc.join(name)).with_context(|| name.to_owned());
-    let [mit, apache] = [read("LICENSE-MIT")?, read("LICENSE-APACHE")?];
+    let mit = std::fs::read_to_string(doc.join("LICENSE-MIT")).context("LICENSE-MIT")?;
     Ok(format!(
         "Either of the two licences below, as you like. What the program is built on has the licences that stand in\n\
-         LICENSES-OF-OTHERS.\n\n{mit}\n{apache}"
+         LICENSES-OF-OTHERS.\n\n{mit}\n\
+         Apache License, Version 2.0: see /usr/share/common-licenses/Apache-2.0.\n"
     ))
 }
 
