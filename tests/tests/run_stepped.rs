@@ -1,22 +1,26 @@
-//! The controller on Linux in a time that is told: the poses of the emulated board to the last bit, and a day without growth.
+//! The controller on Linux in a time that is told: the poses of the emulated board to the last bit, what is kept of a drive replayed to the
+//! last bit, and a day without growth.
 #![cfg(target_os = "linux")]
 
 use std::alloc::System;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use agv_controller::{EncoderNodes, LaserOrder};
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_host_sim::emulate::motion::EmulatedMotion;
-use agv_host_sim::log;
 use agv_host_sim::provision::flash_image;
-use agv_host_sim::recording::Recording;
-use agv_host_sim::run::{FLASH, Stepped, run_stepped};
+use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::replay::Comparison;
+use agv_host_sim::run::{FLASH, RingOptions, Stepped, run_stepped};
 use agv_host_sim::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
 use agv_host_sim::simulate::{simulate, standard};
+use agv_host_sim::{log, replay};
 use agv_settings::Settings;
 use agv_tests::{emulator, image};
 use agv_wire::can::frame::{Frame, Id};
@@ -159,7 +163,7 @@ fn the_emulated_board_says_the_same_on_the_bus_to_the_last_bit() {
     let recording = simulate(&hall()).unwrap().recording;
     let store = store(&recording);
     let folder = tempfile::tempdir().unwrap();
-    let (tape, parameters, landmarks) = run_stepped(store.path(), &HAND, |controller| {
+    let (tape, parameters, landmarks) = run_stepped(store.path(), &HAND, None, &|_| (), |controller| {
         let (mut sensors, mut tape) = (Sensors::new(&recording), Some(Tape::default()));
         for step in 1..=40_000 {
             let now = Time::from_micros(step * STEP);
@@ -200,6 +204,86 @@ fn the_emulated_board_says_the_same_on_the_bus_to_the_last_bit() {
     assert_eq!(by_linux.len(), by_board.len());
 }
 
+/// Where the reflectors are covered, s of the drive.
+const COVERED: f64 = 8.0;
+
+/// The hall whose reflectors are covered from then on.
+fn covered_hall() -> Recording {
+    let mut scenario = hall();
+    scenario.laser.scans = false;
+    let mut recording = simulate(&scenario).unwrap().recording;
+    // As soon as nothing is seen, the level is too large for travelling.
+    recording.parameters.alert_limits.travel.position = 0.1;
+    let first = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
+    for event in &mut recording.events {
+        let is_covered = event.time().is_some_and(|time| time.since(first) > COVERED);
+        if let RecordedEvent::Reflectors(seen) = event
+            && is_covered
+        {
+            seen.observations.clear();
+        }
+    }
+    recording
+}
+
+fn logs(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut logs: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "agvlog")).collect();
+    logs.sort();
+    logs
+}
+
+/// What was kept, and whether it begins in the middle of the drive.
+fn assert_replayed(path: &Path) -> (Comparison, bool) {
+    let contents = log::read_contents(path, |_| ()).unwrap();
+    assert_eq!(contents.damages, [], "{}", path.display());
+    let again = replay::replay_in(&contents.recording, None, |_| ()).unwrap();
+    let outputs = replay::compare(&contents.outputs, &again);
+    let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
+    assert!(outputs.is_equal() && published.is_equal(), "{}: {outputs:?} {published:?}", path.display());
+    // A log that is cut may end between an event and its answer.
+    let events = contents.recording.events.len();
+    assert!((events - 1..=events).contains(&outputs.compared), "{outputs:?} of {events} events");
+    (outputs, contents.recording.state.is_some())
+}
+
+#[test]
+fn an_incident_is_a_log_that_replays_to_the_same_bits() {
+    static HAND: AtomicU64 = AtomicU64::new(STEP);
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let recording = covered_hall();
+    let (store, folder) = (store(&recording), tempfile::tempdir().unwrap());
+    let options = RingOptions {
+        span: Duration::from_secs(4),
+        part: Duration::from_secs(1),
+        around: [Duration::from_secs(2), Duration::from_secs(1)],
+        ring_bytes: 8 << 20,
+        incident_bytes: 8 << 20,
+        ..RingOptions::usual(folder.path().join("recording"))
+    };
+    run_stepped(store.path(), &HAND, Some(&options), &|text| println!("{text}"), |controller| {
+        let mut sensors = Sensors::new(&recording);
+        for step in 1..=30_000 {
+            let now = Time::from_micros(step * STEP);
+            if now == Time::from_seconds(STANDS) {
+                sensors.begin(now);
+            }
+            sensors.step(controller, now, &mut None);
+        }
+        assert_eq!(controller.left_out(), [0; 3]);
+    })
+    .unwrap();
+    let incidents = logs(&options.incidents());
+    assert_eq!(incidents.len(), 1, "{incidents:?}");
+    assert!(incidents[0].to_string_lossy().ends_with("-alarm.agvlog"), "{incidents:?}");
+    let (compared, goes_on) = assert_replayed(&incidents[0]);
+    // At least two seconds before it and one behind it, of encoders at 100 Hz; and no more than the part before.
+    assert!(goes_on && (300..500).contains(&compared.compared), "{compared:?}");
+    let ring = logs(&options.folder.join("ring"));
+    assert!((5..=6).contains(&ring.len()), "{ring:?}");
+    assert!(ring.iter().all(|path| assert_replayed(path).1));
+}
+
 #[global_allocator]
 static COUNTED: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
@@ -235,7 +319,7 @@ fn a_day_takes_neither_memory_nor_descriptors() {
     // The same hour again and again: the vehicle is where it began, as it stands at the end of a lap.
     let recording = simulate(&scenario).unwrap().recording;
     let store = store(&recording);
-    let grown = run_stepped(store.path(), &HAND, |controller| {
+    let grown = run_stepped(store.path(), &HAND, None, &|_| (), |controller| {
         let mut occupied_after = Vec::new();
         let (mut now, mut lost) = (0, 0);
         for hour in 0..hours {

