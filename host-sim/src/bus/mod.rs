@@ -5,6 +5,8 @@ mod in_process;
 mod slcan;
 #[cfg(target_os = "linux")]
 mod socket_can;
+#[cfg(target_os = "linux")]
+mod waiting;
 
 use std::time::{Duration, Instant};
 

@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 use agv_wire::can::frame::AnyFrame;
 use agv_wire::can::slcan::{BitRate, Command, Decoder, Message};
-use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{BaudRate, SetArg, cfmakeraw, cfsetspeed, tcgetattr, tcsetattr};
 
+use super::waiting::wait;
 use super::{Bus, BusError};
 
 /// How long a frame may wait for the line to take it.
@@ -119,21 +119,6 @@ impl SlcanBus {
         let outcome = self.stream.write_all(bytes).and_then(|()| self.stream.flush());
         outcome.map_err(|source| self.io(source))
     }
-
-    /// Waits until there is something to read. False if there is nothing until `deadline`.
-    fn wait(&self, deadline: Instant) -> Result<bool, BusError> {
-        loop {
-            let rest = deadline.saturating_duration_since(Instant::now());
-            let milliseconds = u16::try_from(rest.as_micros().div_ceil(1000)).unwrap_or(u16::MAX);
-            let mut waited = [PollFd::new(self.stream.as_fd(), PollFlags::POLLIN)];
-            match poll(&mut waited, PollTimeout::from(milliseconds)) {
-                Ok(0) if Instant::now() >= deadline => return Ok(false),
-                Ok(0) | Err(nix::errno::Errno::EINTR) => {}
-                Ok(_) => return Ok(true),
-                Err(error) => return Err(self.io(error.into())),
-            }
-        }
-    }
 }
 
 impl Bus for SlcanBus {
@@ -146,7 +131,7 @@ impl Bus for SlcanBus {
             if let Some(frame) = self.received.pop_front() {
                 return Ok(Some(frame));
             }
-            if !self.wait(deadline)? {
+            if !wait(&self.stream, deadline).map_err(|source| self.io(source))? {
                 return Ok(None);
             }
             let mut bytes = [0; 4096];

@@ -1,17 +1,15 @@
 //! SocketCAN.
 
 use std::io::{self, ErrorKind};
-use std::os::fd::AsFd;
 use std::time::{Duration, Instant, SystemTime};
 
 use agv_wire::can::canopen::NodeId;
 use agv_wire::can::frame::{AnyFrame, FdFrame, Frame, Id};
-use nix::poll::{PollFd, PollFlags, ppoll};
-use nix::sys::time::TimeSpec;
 use socketcan::{
     CanAnyFrame, CanErrorFrame, CanFdFrame, CanFdSocket, CanFilter, CanFrame, EmbeddedFrame, Socket, SocketOptions,
 };
 
+use super::waiting::wait;
 use super::{Bus, BusChange, BusError, HeardFrame};
 
 /// How long a full transmit queue is waited for, and how often it is looked at.
@@ -91,20 +89,6 @@ impl SocketCanBus {
 }
 
 impl SocketCanBus {
-    /// Waits until there is something to read. False if there is nothing until `deadline`.
-    fn wait(&self, deadline: Instant) -> io::Result<bool> {
-        loop {
-            let rest = deadline.saturating_duration_since(Instant::now());
-            let mut waited = [PollFd::new(self.socket.as_fd(), PollFlags::POLLIN)];
-            match ppoll(&mut waited, Some(TimeSpec::from_duration(rest)), None) {
-                Ok(0) if Instant::now() >= deadline => return Ok(false),
-                Ok(0) | Err(nix::errno::Errno::EINTR) => {}
-                Ok(_) => return Ok(true),
-                Err(error) => return Err(error.into()),
-            }
-        }
-    }
-
     /// Notes what the interface says of itself.
     fn note(&mut self, error: &CanErrorFrame) {
         let bits = error.error_bits();
@@ -143,7 +127,7 @@ impl Bus for SocketCanBus {
 
     fn hear(&mut self, deadline: Instant) -> Result<Option<HeardFrame>, BusError> {
         loop {
-            if !self.wait(deadline).map_err(|error| self.io(error))? {
+            if !wait(&self.socket, deadline).map_err(|error| self.io(error))? {
                 return Ok(None);
             }
             let (frame, stamps) = match self.socket.read_frame_with_timestamps() {
