@@ -6,8 +6,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::AtomicBool;
 
-use agv_core::localizer::{Mode, PoseOutput};
+use agv_core::localizer::{LandmarkUse, Mode, PoseOutput};
+use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::Time;
+use agv_core::record::{Output, Record};
 use agv_host_sim::log;
 use agv_host_sim::recording::RecordedEvent;
 use agv_host_sim::replay::replay;
@@ -184,5 +186,25 @@ fn what_is_sent_coarsely_hides_nothing() {
         // It began without a landmark, which is graver than what followed.
         let first = overview.modes.iter().flatten().next().map(|mode| overview.mode_names[usize::from(*mode)]);
         assert_eq!(first, Some("dead reckoning"));
+    }
+}
+
+#[test]
+fn features_are_called_contours_where_no_landmark_among_them_leads() {
+    let recording = hall(6.0);
+    let answers = replay(&recording, |_| ()).unwrap();
+    let accepted = answers.uses.iter().find(|one| one.verdict == Verdict::Accepted).unwrap();
+    let pose = PoseOutput { mode: Mode::Features, ..*answers.poses.last().unwrap() };
+    let corner = LandmarkUse { kind: LandmarkKind::Corner, ..*accepted };
+    let gated = LandmarkUse { verdict: Verdict::Gated, ..corner };
+    for (uses, name) in
+        [(&[][..], "contours"), (&[*accepted], "contours"), (&[gated], "contours"), (&[corner], "features")]
+    {
+        let mut timeline = Timeline::of_controller("here");
+        timeline.take(&Record::Output(Output { pose, uses }), 0);
+        let [from, to] = [timeline.status().start_s, timeline.status().end_s + 1.0].map(Time::from_seconds);
+        let overview = timeline.overview(from, to, 1);
+        assert_eq!(overview.modes[0].map(|mode| overview.mode_names[usize::from(mode)]), Some(name));
+        assert_eq!(timeline.happenings()[0].text.split(':').next(), Some(name));
     }
 }

@@ -8,7 +8,7 @@ use agv_core::localizer::Mode;
 use agv_core::maps::{Landmark, LandmarkKind};
 use serde::Serialize;
 
-use crate::drive::{Figures, GOOD, Track, kind_name, mode_name, percent};
+use crate::drive::{Figures, GOOD, Track, kind_name, percent};
 use crate::replay::Comparisons;
 use crate::text_file::{self, TextFileError};
 use crate::wording::count_of;
@@ -144,7 +144,8 @@ fn same_bits(said: &Comparisons) -> Line {
 
 fn never_lost(figures: &Figures) -> Line {
     let bad = figures.modes.iter().filter(|time| BAD.contains(&time.mode));
-    let bad: Vec<String> = bad.map(|time| format!("{} for {:.1} s", mode_name(time.mode), time.duration_s)).collect();
+    let bad: Vec<String> =
+        bad.map(|time| format!("{} for {:.1} s", figures.mode_name(time.mode), time.duration_s)).collect();
     let (verdict, found) = if figures.poses == 0 {
         (Verdict::NotMeasured, "the vehicle was never localised".to_owned())
     } else if bad.is_empty() {

@@ -6,7 +6,7 @@ use agv_core::measurement::Time;
 use serde::Serialize;
 
 use super::fitness::{Fitness, Spell};
-use super::names::mode_name;
+use super::names::mode_name_of_drive;
 use super::track::{Standard, Track, TrackError};
 use crate::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, Spread};
 use crate::recording::Recording;
@@ -137,11 +137,7 @@ impl Figures {
     pub fn mode_name(&self, mode: Mode) -> &'static str {
         let is_feature = |counts: &&ObservationCounts| counts.kind != LandmarkKind::Reflector && counts.accepted > 0;
         let is_by_contours = self.contours.matched > 0 && !self.observations.iter().any(|counts| is_feature(&counts));
-        match mode {
-            Mode::Features if is_by_contours => "contours",
-            Mode::Mixed if is_by_contours => "reflectors and contours",
-            mode => mode_name(mode),
-        }
+        mode_name_of_drive(mode, is_by_contours)
     }
 
     /// The figures of a replayed recording and its track.

@@ -18,6 +18,16 @@ pub fn mode_name(mode: Mode) -> &'static str {
     }
 }
 
+/// Name of a mode in a drive; contours are what its features were if no feature among the landmarks ever led.
+#[must_use]
+pub fn mode_name_of_drive(mode: Mode, is_by_contours: bool) -> &'static str {
+    match mode {
+        Mode::Features if is_by_contours => "contours",
+        Mode::Mixed if is_by_contours => "reflectors and contours",
+        mode => mode_name(mode),
+    }
+}
+
 /// Name of a reason.
 #[must_use]
 pub fn reason_name(reason: Reason) -> &'static str {

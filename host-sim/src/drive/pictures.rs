@@ -6,8 +6,8 @@ use agv_core::localizer::{LandmarkSource, LandmarkUse, Mode};
 use agv_core::maps::{LandmarkKind, Verdict};
 use agv_core::measurement::Time;
 
-use super::figures::{KINDS, MODES};
-use super::names::{kind_name, mode_name};
+use super::figures::{Figures, KINDS, MODES};
+use super::names::kind_name;
 use super::track::Track;
 use crate::accuracy::{HEADING_REQUIREMENT, POSITION_REQUIREMENT, Spread, pose_at};
 use crate::recording::{RecordedEvent, RecordedScan, Recording};
@@ -70,7 +70,13 @@ pub fn heading_error_chart(series: &[Series]) -> Result<Figure, FigureError> {
 ///
 /// # Errors
 /// If a picture cannot be drawn.
-pub fn add_pictures(page: &mut Page, recording: &Recording, replay: &Replay, track: &Track) -> Result<(), FigureError> {
+pub fn add_pictures(
+    page: &mut Page,
+    recording: &Recording,
+    replay: &Replay,
+    track: &Track,
+    figures: &Figures,
+) -> Result<(), FigureError> {
     page.section("Where the pose was good for what");
     page.figure(
         &level_map(recording, replay, track)?,
@@ -85,7 +91,7 @@ pub fn add_pictures(page: &mut Page, recording: &Recording, replay: &Replay, tra
     if !track.errors.is_empty() {
         add_errors(page, track)?;
     }
-    add_modes(page, recording, replay)?;
+    add_modes(page, figures, recording, replay)?;
     add_innovations(page, recording, replay)?;
     add_landmark_use(page, replay)
 }
@@ -226,7 +232,7 @@ fn add_errors(page: &mut Page, track: &Track) -> Result<(), FigureError> {
     Ok(())
 }
 
-fn add_modes(page: &mut Page, recording: &Recording, replay: &Replay) -> Result<(), FigureError> {
+fn add_modes(page: &mut Page, figures: &Figures, recording: &Recording, replay: &Replay) -> Result<(), FigureError> {
     let mut spans: Vec<StateSpan> = Vec::new();
     for (event, pose) in recording.events.iter().zip(&replay.poses) {
         let now = if pose.mode == Mode::NotLocalised { event.time() } else { Some(pose.time) };
@@ -242,7 +248,7 @@ fn add_modes(page: &mut Page, recording: &Recording, replay: &Replay) -> Result<
         }
     }
     page.section("Mode over time");
-    let names = MODES.map(mode_name);
+    let names = MODES.map(|mode| figures.mode_name(mode));
     page.figure(&state_timeline("time, s", &names, &spans)?, "What the pose rested on.");
     Ok(())
 }

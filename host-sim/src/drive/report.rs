@@ -39,7 +39,7 @@ pub fn add_drive(
     rows.extend(figure_rows(figures));
     add_verdict(page, figures);
     page.section("Figures").table(&table(rows));
-    add_pictures(page, recording, replay, track)?;
+    add_pictures(page, recording, replay, track, figures)?;
     page.section("Parameters").paragraph("Settings by their names, in SI units and radians.");
     page.table(&table(parameter_rows(&recording.parameters)));
     Ok(())

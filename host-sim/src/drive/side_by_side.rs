@@ -87,7 +87,7 @@ pub fn report_page(drives: &[ReplayedDrive]) -> Result<Page, FigureError> {
         if drives.len() > 1 {
             page.part(&drive.name);
         }
-        add_pictures(&mut page, &drive.recording, &drive.replay, &drive.track)?;
+        add_pictures(&mut page, &drive.recording, &drive.replay, &drive.track, &drive.figures)?;
     }
     let is_one = drives.len() == 1;
     page.section(if is_one { "Parameters" } else { "Parameters that differ" })

@@ -5,7 +5,7 @@ use agv_core::localizer::{Mode, PoseOutput, Reason};
 use agv_core::measurement::{EncoderFault, EncoderFaults};
 use serde::Serialize;
 
-use crate::drive::{mode_name, reason_name};
+use crate::drive::reason_name;
 
 /// What kind of thing happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -54,8 +54,8 @@ pub(super) struct ModeMemory {
 impl ModeMemory {
     pub(super) const NEW: Self = Self { last: None, was_lost: true };
 
-    /// What the mode of an answer means; None if nothing has changed.
-    pub(super) fn take(&mut self, now: &PoseOutput) -> Option<(HappeningKind, String)> {
+    /// What the mode of an answer means, which is called `name`; None if nothing has changed.
+    pub(super) fn take(&mut self, now: &PoseOutput, name: &str) -> Option<(HappeningKind, String)> {
         let before = self.last.replace((now.mode, now.reason));
         if before == self.last {
             return None;
@@ -69,7 +69,6 @@ impl ModeMemory {
         };
         self.was_lost = now.mode == Mode::Lost || (self.was_lost && !now.mode.is_localised());
         let reason = reason_name(now.reason);
-        let name = mode_name(now.mode);
         Some((kind, if reason.is_empty() { name.to_owned() } else { format!("{name}: {reason}") }))
     }
 }

@@ -24,10 +24,13 @@ pub(super) struct Hits {
     reflectors: BTreeMap<u16, Vec<Time>>,
     features: BTreeMap<u16, Vec<Time>>,
     found: BTreeMap<u16, Vec<(Time, [f64; 2])>>,
+    /// Whether a feature among the landmarks has corrected the pose.
+    pub(super) is_by_features: bool,
 }
 
 impl Hits {
     pub(super) fn take(&mut self, time: Time, one: &LandmarkUse) {
+        self.is_by_features |= one.verdict == Verdict::Accepted && one.kind != LandmarkKind::Reflector;
         match one.landmark.filter(|_| one.verdict == Verdict::Accepted) {
             Some((LandmarkSource::Fixed, id)) if one.kind == LandmarkKind::Reflector => {
                 self.reflectors.entry(id).or_default().push(time);

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::hits::FoundLandmark;
 use super::scans::Found;
 use super::timeline::{Revolution, Timeline};
-use crate::drive::{mode_name, reason_name};
+use crate::drive::reason_name;
 use crate::recording::{RecordedScan, truth_at};
 
 /// A sensor that has been silent for longer is no longer sound, s.
@@ -126,7 +126,7 @@ impl Timeline {
                 level: [output.level.position, output.level.heading],
                 alarm: self.parameters.alert_limits.alarm(output.mode, &output.level),
                 mode: output.mode,
-                mode_name: mode_name(output.mode),
+                mode_name: self.mode_name(output.mode),
                 reason: output.reason,
                 reason_name: reason_name(output.reason),
                 dead_reckoning_m: output.dead_reckoning_distance,

@@ -5,7 +5,7 @@ use agv_core::measurement::Time;
 use serde::Serialize;
 
 use super::timeline::Timeline;
-use crate::drive::{MODES, mode_name};
+use crate::drive::MODES;
 
 /// Intervals of one answer at the most.
 const MOST: usize = 4000;
@@ -54,7 +54,7 @@ impl Timeline {
         let mut overview = Overview {
             from_s: from.seconds(),
             to_s: to.seconds(),
-            mode_names: MODES.map(mode_name).to_vec(),
+            mode_names: MODES.map(|mode| self.mode_name(mode)).to_vec(),
             modes: vec![None; intervals],
             deviation_m: empty(),
             normalised_square: empty(),

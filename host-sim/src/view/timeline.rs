@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::happening::{self, Happening, HappeningKind, ModeMemory};
 use super::hits::Hits;
 use super::scans::Scans;
-use crate::drive::parameter_rows;
+use crate::drive::{mode_name_of_drive, parameter_rows};
 use crate::recording::Truth;
 
 /// Happenings that are kept; a drive with more has another problem.
@@ -191,6 +191,11 @@ impl Timeline {
         &self.happenings
     }
 
+    /// Name of a mode, by what has led so far.
+    pub(super) fn mode_name(&self, mode: Mode) -> &'static str {
+        mode_name_of_drive(mode, !self.hits.is_by_features)
+    }
+
     fn now(&self) -> Time {
         self.span.map(|(_, end)| end).unwrap_or_default()
     }
@@ -297,7 +302,10 @@ impl Timeline {
     pub(super) fn take_replayed(&mut self, asked: Asked, pose: &PoseOutput, uses: &[LandmarkUse]) {
         let beginning = self.span.map(|(start, _)| start).unwrap_or_default();
         let time = if pose.mode == Mode::NotLocalised { beginning } else { pose.time };
-        if let Some((kind, text)) = self.mode.take(pose) {
+        if pose.mode != Mode::NotLocalised {
+            uses.iter().for_each(|one| self.hits.take(pose.time, one));
+        }
+        if let Some((kind, text)) = self.mode.take(pose, self.mode_name(pose.mode)) {
             self.happen(time, kind, text);
         }
         if pose.mode == Mode::NotLocalised {
@@ -322,7 +330,6 @@ impl Timeline {
             }
         }
         if !uses.is_empty() {
-            uses.iter().for_each(|one| self.hits.take(pose.time, one));
             self.uses.extend_from_slice(uses);
             self.revolutions.push(Revolution { time: pose.time, end: self.uses.len() });
         }

@@ -38,8 +38,8 @@ class CurveView {
 
   // Graver modes fill more of the strip, so that it reads without colours, too.
   modes(c, overview, step, strip) {
-    const heights = { "mixed": 0.3, "reflectors": 0.4, "features": 0.5, "not localised": 0.6, "dead reckoning": 0.75,
-      "degraded": 0.7, "without odometry": 0.85, "lost": 1 };
+    const heights = { "mixed": 0.3, "reflectors and contours": 0.3, "reflectors": 0.4, "features": 0.5, "contours": 0.5,
+      "not localised": 0.6, "dead reckoning": 0.75, "degraded": 0.7, "without odometry": 0.85, "lost": 1 };
     overview.modes.forEach((mode, k) => {
       if (mode === null) return;
       const name = overview.mode_names[mode], height = strip * heights[name];

@@ -1,6 +1,7 @@
 // The map: everything that has a place. Lengths are in m, on the screen in CSS pixels.
 const MODE_COLOURS = {
-  "not localised": "#999999", "reflectors": "#0072b2", "features": "#009e73", "mixed": "#56b4e9",
+  "not localised": "#999999", "reflectors": "#0072b2", "features": "#009e73", "contours": "#009e73",
+  "mixed": "#56b4e9", "reflectors and contours": "#56b4e9",
   "dead reckoning": "#e69f00", "degraded": "#f0e442", "without odometry": "#cc79a7", "lost": "#d55e00",
 };
 
