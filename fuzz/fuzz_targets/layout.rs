@@ -1,14 +1,17 @@
 #![no_main]
 
+use agv_fuzz::in_file;
 use agv_host_sim::layout_file;
+use agv_host_sim::mapping::map_file;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
-    let folder = std::env::temp_dir();
-    for ending in ["csv", "imk"] {
-        let path = folder.join(format!("agv-fuzz-layout-{}.{ending}", std::process::id()));
-        if std::fs::write(&path, text).is_ok() {
-            let _ = layout_file::load(&path);
-        }
+    in_file("map", text.as_bytes(), |path| {
+        let _ = map_file::read(path);
+    });
+    for name in ["layout.csv", "layout.imk"] {
+        in_file(name, text.as_bytes(), |path| {
+            let _ = layout_file::load(path);
+        });
     }
 });

@@ -1,5 +1,7 @@
 //! What the targets have in common.
 
+use std::path::Path;
+
 use agv_core::measurement::Time;
 use agv_wire::cola::{Deframed, Deframer, Dialect};
 use agv_wire::nav350::{Answer, DeviceTime, MethodResult, Request, Revolution, SensorClock, SensorFrame};
@@ -53,4 +55,11 @@ pub fn stream(bytes: &[u8]) {
         }
     }
     assert_eq!(accounted + deframer.waiting(), bytes.len());
+}
+
+/// Has `read` read a file of these contents, whose name ends so.
+pub fn in_file(name: &str, contents: &[u8], read: impl FnOnce(&Path)) {
+    let path = std::env::temp_dir().join(format!("agv-fuzz-{}-{name}", std::process::id()));
+    std::fs::write(&path, contents).expect("the folder of temporary files takes them");
+    read(&path);
 }

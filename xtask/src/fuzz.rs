@@ -18,7 +18,7 @@ pub struct Fuzz {
 }
 
 /// Targets of the folder `fuzz`.
-const TARGETS: [&str; 12] = [
+const TARGETS: [&str; 16] = [
     "cola_a",
     "cola_b",
     "canopen",
@@ -31,6 +31,10 @@ const TARGETS: [&str; 12] = [
     "scan_log",
     "layout",
     "table",
+    "drawing",
+    "point_cloud",
+    "lidar_calibration",
+    "robot_log",
 ];
 
 impl Fuzz {

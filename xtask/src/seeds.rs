@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 
 use crate::repository;
 
-/// Make the seeds of the fuzz targets from recorded telegrams
+/// Make the seeds of the fuzz targets from recorded telegrams and files that people sent
 #[derive(clap::Args)]
 pub struct Seeds {}
 
@@ -54,10 +54,12 @@ impl Seeds {
         }
         let frames = write_frames(&data, &corpus)?;
         let captures = write_captures(&data, &corpus)?;
+        let imports = write_imports(&data, &corpus)?;
         let drives = write_drives(&corpus)?;
         println!("telegrams  {count}");
         println!("frames     {frames}");
         println!("captures   {captures}");
+        println!("imports    {imports}");
         println!("drives     {drives}");
         Ok(())
     }
@@ -110,6 +112,56 @@ fn write_captures(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
         count += usize::from(is_capture);
     }
     Ok(count)
+}
+
+/// Folders of data, endings of the files in them that are taken, and the target that reads such files.
+const IMPORTS: [(&str, &[&str], &str); 8] = [
+    ("reports/can_delta", &["log"], "can_log"),
+    ("reports/can_small", &["log"], "can_log"),
+    ("reports/carmen_fov", &["log"], "scan_log"),
+    ("reports/check_wheels", &["csv"], "table"),
+    ("reports/dxf", &["dxf"], "drawing"),
+    ("reports/clouds", &["pcd", "ply", "las", "bin"], "point_cloud"),
+    ("lidar3d/calib", &["yaml", "xml"], "lidar_calibration"),
+    ("sapienza_tricycle", &["txt"], "robot_log"),
+];
+/// Longest seed of an import, bytes: a drawing that people sent.
+const IMPORT_PIECE: usize = 20_000;
+/// Clouds that are whole.
+const CLOUDS: [(&str, &str); 2] = [
+    (
+        "cloud.pcd",
+        "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n1 2 3 4\n5 6 7 8\n",
+    ),
+    (
+        "cloud.ply",
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n\
+         1 2 3\n4 5 6\n",
+    ),
+];
+
+/// The beginnings of files that people import. Returns how many there are.
+fn write_imports(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
+    let mut count = 0;
+    for (folder, endings, target) in IMPORTS {
+        let (folder, corpus) = (data.join(folder), corpus.join(target));
+        std::fs::create_dir_all(&corpus)?;
+        for entry in std::fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+            let path = entry?.path();
+            let is_one = |ending: &&str| path.extension().is_some_and(|found| *found == **ending);
+            if !endings.iter().any(|ending| is_one(&ending)) {
+                continue;
+            }
+            let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
+            std::fs::write(corpus.join(path.file_name().unwrap_or_default()), &bytes[..bytes.len().min(IMPORT_PIECE)])?;
+            count += 1;
+        }
+    }
+    for (name, text) in CLOUDS {
+        std::fs::write(corpus.join("point_cloud").join(name), text)?;
+    }
+    Ok(count + CLOUDS.len())
 }
 
 /// Choices without a pattern, from which most events are plausible. Returns how many drives there are.
