@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::progress;
 use super::setting_arguments::SettingArguments;
+use super::vehicle_argument::VehicleArgument;
 
 const HELP: &str = "\
 Looks at what is missing, at times, at the encoders and the laser against each other, at the map, and at the noise.
@@ -20,6 +21,7 @@ Examples:
   agv check drive.agvlog
   agv check drive.agvlog --json
   agv check drive.agvlog --put-right mended.agvlog
+  agv check drive.agvlog --vehicle vehicle.toml
 
 Keys of --json: poor_share, damage, findings [what, next].";
 
@@ -29,6 +31,8 @@ Keys of --json: poor_share, damage, findings [what, next].";
 pub struct Check {
     /// The log.
     log: PathBuf,
+    #[command(flatten)]
+    vehicle: VehicleArgument,
     #[command(flatten)]
     settings: SettingArguments,
     /// Write the log with the laser's times moved to those of the encoders, if they are off; an older one is replaced.
@@ -51,6 +55,7 @@ impl Check {
     pub fn run(self) -> anyhow::Result<()> {
         let Contents { mut recording, damages, .. } = log::read_contents(&self.log, |_| ())?;
         self.settings.apply(&mut recording.parameters)?;
+        self.vehicle.apply(&mut recording.parameters, &self.log)?;
         let name = self.log.display().to_string();
         if let Some(path) = &self.put_right {
             let (right, late) = moved(&recording).with_context(|| format!("{name}: the laser's times are not off"))?;
@@ -61,7 +66,8 @@ impl Check {
         let replay = replay(&recording, |_| ()).with_context(|| name.clone())?;
         let figures = Figures::new(&recording, &replay, &Track::new(&recording, &replay));
         let bar = progress::bar("looking", TRIES as u64);
-        let findings = check(&recording, &replay, &figures, &name, |done| bar.set_position(done as u64));
+        let mut findings = check(&recording, &replay, &figures, &name, |done| bar.set_position(done as u64));
+        findings.iter_mut().for_each(|finding| self.keep_vehicle(finding, &name));
         bar.finish_and_clear();
         let poor_share = poor_share(&figures);
         let damage: Vec<String> = damages.iter().map(ToString::to_string).collect();
@@ -78,5 +84,12 @@ impl Check {
             println!("{what}\n  next: {next}");
         }
         Ok(())
+    }
+
+    /// Has the command that comes next take the vehicle that was taken here. The viewer shows what was recorded.
+    fn keep_vehicle(&self, finding: &mut Finding, log: &str) {
+        if let Some(vehicle) = self.vehicle.vehicle.as_ref().filter(|_| !finding.next.contains("agv view")) {
+            finding.next = finding.next.replace(log, &format!("{log} --vehicle {}", vehicle.display()));
+        }
     }
 }

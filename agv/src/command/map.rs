@@ -13,6 +13,7 @@ use anyhow::{Context, bail, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
 
+use super::vehicle_argument::VehicleArgument;
 use super::{output, progress};
 
 const HELP: &str = "\
@@ -34,6 +35,8 @@ key_scans, loops.";
 pub struct Map {
     /// The log.
     log: PathBuf,
+    #[command(flatten)]
+    vehicle: VehicleArgument,
     /// Where the map goes; an older one is replaced.
     #[arg(short, long, value_name = "MAP")]
     output: PathBuf,
@@ -94,9 +97,10 @@ impl Map {
         ensure!(self.cell.is_none_or(|cell| (0.02..=1.0).contains(&cell)), "--cell must be from 0.02 to 1 m");
         let size = std::fs::metadata(&self.log).map_or(0, |metadata| metadata.len());
         let reading = progress::bar("reading", size);
-        let (recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
+        let (mut recording, damages) = log::read_contents(&self.log, |bytes| reading.set_position(bytes))
             .map(|read| (read.recording, read.damages))?;
         reading.finish_and_clear();
+        self.vehicle.apply(&mut recording.parameters, &self.log)?;
         let (poses, slam) = self.known_poses(&recording)?;
         if let Some((poses, name)) = &poses {
             ensure!(poses.len() > 1, "{}: the log has no {name}", self.log.display());

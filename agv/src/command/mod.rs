@@ -45,4 +45,5 @@ pub mod settings;
 pub mod simulate;
 mod stop;
 mod summary;
+mod vehicle_argument;
 pub mod view;

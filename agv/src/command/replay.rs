@@ -8,7 +8,6 @@ use agv_core::maps::{Landmark, LandmarkKind};
 use agv_core::odometry::Vehicle;
 use agv_core::record::Damage;
 use agv_core::state::Mode;
-use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::contour_map::ContourMap;
 use agv_host_sim::drive::{Figures, Track, add_drive, figure_rows};
 use agv_host_sim::drive_check::{POOR, poor_share};
@@ -18,13 +17,13 @@ use agv_host_sim::mapping::{contour_file, map_file};
 use agv_host_sim::recording::{RecordedEvent, RecordedOutput, Recording, Truth};
 use agv_host_sim::replay::{Comparisons, Replay as Replayed, replay_in};
 use agv_host_sim::report::Page;
-use agv_host_sim::setting_doubts::doubt;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 
 use super::drive_summary::DriveSummary;
 use super::lidar3d::relocalise::Relocalisation;
 use super::setting_arguments::SettingArguments;
+use super::vehicle_argument::VehicleArgument;
 use super::{like, output, pose_argument, progress};
 
 const HELP: &str = "\
@@ -72,9 +71,8 @@ pub struct Replay {
     /// Log whose vehicle and map are those of this one, if this one is a part that has lost its beginning.
     #[arg(long, value_name = "LOG")]
     like: Option<PathBuf>,
-    /// Parameters of the vehicle, instead of those of the log; as `agv calibrate --apply` writes them.
-    #[arg(long, value_name = "FILE")]
-    vehicle: Option<PathBuf>,
+    #[command(flatten)]
+    vehicle: VehicleArgument,
     /// Which landmarks correct the pose, instead of what the log states.
     #[arg(long, value_name = "KIND,...", value_delimiter = ',')]
     landmarks: Vec<Landmarks>,
@@ -187,7 +185,7 @@ impl Replay {
         self.like.is_none()
             && self.landmarks.is_empty()
             && self.start.is_none()
-            && self.vehicle.is_none()
+            && self.vehicle.vehicle.is_none()
             && self.settings.is_empty()
             && !self.relocalisation.is_wanted()
     }
@@ -200,13 +198,7 @@ impl Replay {
             recording.state = None;
         }
         self.settings.apply(&mut recording.parameters)?;
-        if let Some(path) = &self.vehicle {
-            let vehicle = VehicleFile::read(path)?;
-            let doubts = vehicle.settings().filter_map(|(name, value)| doubt(name, value));
-            doubts.for_each(|doubt| output::note(&format!("agv: {}: {doubt}", path.display())));
-            let is_of_kind = vehicle.apply(&mut recording.parameters);
-            ensure!(is_of_kind, "{}: the log is of another kind of vehicle", self.log.display());
-        }
+        self.vehicle.apply(&mut recording.parameters, &self.log)?;
         let mut contours = None;
         for path in &self.map {
             if contour_file::is_contour_map(path) {
@@ -281,7 +273,7 @@ impl Replay {
         // A part of a log does not tell it.
         rows.extend((!software.is_empty()).then(|| ["written by".to_owned(), software.to_owned()]));
         rows.extend(self.like.iter().map(|path| ["vehicle and map of".to_owned(), path.display().to_string()]));
-        rows.extend(self.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
+        rows.extend(self.vehicle.vehicle.iter().map(|path| ["vehicle".to_owned(), path.display().to_string()]));
         for map in &self.map {
             rows.push(["map".to_owned(), map.display().to_string()]);
         }

@@ -21,11 +21,13 @@ use agv_host_sim::calibrate::vehicle_file::VehicleFile;
 use agv_host_sim::calibrate::wheeled::mistakes::{WheelExplanation, explain_wheels};
 use agv_host_sim::drive_check::with_laser_motion;
 use agv_host_sim::mapping::map_file;
+use agv_host_sim::recording::Recording;
 use agv_host_sim::report::Page;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
 
+use super::vehicle_argument::VehicleArgument;
 use super::{output, progress};
 
 const HELP: &str = "\
@@ -54,6 +56,8 @@ pub struct Calibrate {
     /// The log.
     #[arg(required = true)]
     log: Option<PathBuf>,
+    #[command(flatten)]
+    vehicle: VehicleArgument,
     /// How the parameters are found.
     #[arg(long, value_enum, default_value = "joint")]
     method: MethodName,
@@ -251,8 +255,9 @@ impl Calibrate {
         let log = self.log.as_ref().context("a log is needed")?;
         let size = std::fs::metadata(log).map_or(0, |metadata| metadata.len());
         let reading = progress::bar("reading", size);
-        let (input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
+        let (mut input, damages) = LogInput::read(log, |bytes| reading.set_position(bytes))?;
         reading.finish_and_clear();
+        self.vehicle.apply(&mut input.parameters, log)?;
         let input = self.with_laser_motion(input, log)?;
         let tell_damages =
             || damages.iter().for_each(|damage| output::note(&format!("agv: the log is damaged: {damage}")));
@@ -322,8 +327,15 @@ impl Calibrate {
         if is_told || (is_tricycle && 2 * reflectors > input.revolutions.len() && reflectors > 0) {
             return Ok(input);
         }
-        let (recording, _) = agv_host_sim::log::read(log)?;
+        let recording = self.recording(log)?;
         Ok(with_laser_motion(&input, &recording).unwrap_or(input))
+    }
+
+    /// The log, with the vehicle that is given.
+    fn recording(&self, log: &Path) -> anyhow::Result<Recording> {
+        let (mut recording, _) = agv_host_sim::log::read(log)?;
+        self.vehicle.apply(&mut recording.parameters, log)?;
+        Ok(recording)
     }
 
     /// The parameters; with what explains the drive mended, if that is wanted.
@@ -378,7 +390,7 @@ impl Calibrate {
 
     /// What the laser's motion, by whatever it sees, says of the wheels.
     fn explained_by_wheels(&self, input: &LogInput) -> Option<WheelExplanation> {
-        let (recording, _) = agv_host_sim::log::read(self.log.as_deref()?).ok()?;
+        let recording = self.recording(self.log.as_deref()?).ok()?;
         let input = with_laser_motion(input, &recording)?;
         explain_wheels(&input, |_, _| ()).into_iter().find(WheelExplanation::is_mendable)
     }

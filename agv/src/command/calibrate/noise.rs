@@ -13,6 +13,7 @@ use serde_json::json;
 
 use crate::command::progress;
 use crate::command::setting_arguments::SettingArguments;
+use crate::command::vehicle_argument::VehicleArgument;
 
 const HELP: &str = "\
 The drive is cut into sixteen pieces. The noise is fitted on every other one and held against those between. The mean normalised square
@@ -35,6 +36,8 @@ pub struct Noise {
     /// The log.
     log: PathBuf,
     #[command(flatten)]
+    vehicle: VehicleArgument,
+    #[command(flatten)]
     settings: SettingArguments,
     /// Write the log with the noise that was found, and with what the localiser then answers.
     #[arg(short, long, value_name = "LOG2")]
@@ -55,6 +58,7 @@ impl Noise {
     pub fn run(self) -> anyhow::Result<()> {
         let (mut recording, _) = log::read(&self.log)?;
         self.settings.apply(&mut recording.parameters)?;
+        self.vehicle.apply(&mut recording.parameters, &self.log)?;
         let name = || self.log.display().to_string();
         let bar = progress::bar("replaying", STEPS as u64);
         let found = find(&recording, |done| bar.set_position(done as u64)).with_context(name)?;
