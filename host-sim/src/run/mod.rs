@@ -74,7 +74,7 @@ use self::log_file::{Beginning, LogFile};
 use self::log_passing::{LogDisk, pass_log};
 use self::log_queue::{divide, log_queue};
 use self::log_ring::{log_ring, write_incidents};
-use self::pose_line::{PoseSinks, bounded};
+use self::pose_line::{PoseSinks, levels};
 use self::real_time::Lacks;
 use crate::drive::mode_name;
 use crate::link::clock::Clock;
@@ -456,7 +456,7 @@ pub fn run(
         period_ms: exchange.periods.figures(),
         missed: exchange.periods.missed(),
         mode: pose.map_or(mode_name(agv_core::state::Mode::NotLocalised), |pose| mode_name(pose.mode)),
-        level_mm: pose.and_then(|pose| bounded(pose.level.position)).map(|level| 1e3 * level),
+        level_mm: pose.and_then(|pose| levels(&pose)[0]).map(|level| 1e3 * level),
         restarts: 0,
         was_localised: exchange.was_localised(),
         is_restart_wanted: exchange.is_restart_wanted(),

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
 use agv_core::integrity::{Alarm, AlertLimits};
-use agv_core::state::{PoseOutput, ProtectionLevel};
+use agv_core::state::{Mode, PoseOutput, ProtectionLevel};
 use serde::Serialize;
 
 use super::exchange::Exchange;
@@ -46,24 +46,28 @@ pub struct PoseLine {
     pub dead_reckoning_m: f64,
 }
 
-/// A level in the position, m, or the heading, rad; none if nothing is bounded.
-pub(super) fn bounded(level: f64) -> Option<f64> {
+/// The levels of the position, m, and of the heading, rad. Where nothing is bounded there is none, nor has a vehicle one that does not
+/// know where it is.
+pub(super) fn levels(output: &PoseOutput) -> [Option<f64>; 2] {
     let ProtectionLevel { position, heading } = ProtectionLevel::UNBOUNDED;
-    (level < position.min(heading)).then_some(level)
+    let is_known = !matches!(output.mode, Mode::NotLocalised | Mode::Lost);
+    let bounded = |level: f64| (is_known && level < position.min(heading)).then_some(level);
+    [bounded(output.level.position), bounded(output.level.heading)]
 }
 
 impl PoseLine {
     /// What is said of a pose of a vehicle that can live with these limits.
     #[must_use]
     pub fn of(output: &PoseOutput, limits: &AlertLimits) -> Self {
+        let [level_m, level_rad] = levels(output);
         Self {
             time_s: output.time.seconds(),
             x_m: output.pose.x,
             y_m: output.pose.y,
             heading_rad: output.pose.theta,
             covariance: output.covariance,
-            level_m: bounded(output.level.position),
-            level_rad: bounded(output.level.heading),
+            level_m,
+            level_rad,
             alarm: limits.alarm(output.mode, &output.level),
             mode: mode_name(output.mode),
             reason: reason_name(output.reason),
@@ -169,5 +173,30 @@ impl PoseSinks {
                 Err(error) => matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted),
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use agv_core::geometry::Pose;
+    use agv_core::localizer::{Localizer, Parameters};
+    use agv_core::odometry::Vehicle;
+
+    use super::*;
+
+    #[test]
+    fn only_who_knows_where_it_is_has_a_level() {
+        let localizer: Box<Localizer> = Box::new(Localizer::new(Parameters::new(Vehicle::Increments, Pose::default())));
+        let mut output = localizer.outputs().pose;
+        for mode in [Mode::Reflectors, Mode::DeadReckoning, Mode::Degraded, Mode::WithoutOdometry] {
+            (output.mode, output.level.position, output.level.heading) = (mode, 0.02, 0.001);
+            assert_eq!(levels(&output), [Some(0.02), Some(0.001)], "{mode:?}");
+            output.level = ProtectionLevel::UNBOUNDED;
+            assert_eq!(levels(&output), [None, None], "{mode:?}");
+        }
+        for mode in [Mode::Lost, Mode::NotLocalised] {
+            (output.mode, output.level.position, output.level.heading) = (mode, 8_579.035, 0.5);
+            assert_eq!(levels(&output), [None, None], "{mode:?}");
+        }
     }
 }
