@@ -256,7 +256,9 @@ impl Bus {
     /// Takes a reading of the controller's own gyro ([`super::GyroChip`]), if the vehicle is said to have one. From the first one on none on
     /// the bus is heard: two would be taken for one that contradicts itself.
     pub fn hear_gyro(&mut self, sample: &GyroSample) -> Option<BusOutput> {
-        self.gyro.id()?;
+        if !self.gyro.is_there {
+            return None;
+        }
         self.has_own_gyro = true;
         Some(self.tell_gyro(sample))
     }

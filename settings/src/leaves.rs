@@ -6,6 +6,7 @@ use agv_wire::can::encoder::CodeSequence;
 
 use crate::VehicleKind::{self, Ackermann, BiSteerable, CarSpeed, Differential, Increments, Mecanum, Omni3, Omni4};
 use crate::VehicleKind::{Tricycle, TricycleSpeed};
+use crate::gyro_connection::GyroConnection;
 use crate::laser::{LaserMode, LaserOrientation};
 use crate::leaf::{Leaf, Value};
 
@@ -269,7 +270,7 @@ const CODE_SEQUENCES: [Option<CodeSequence>; 3] =
     [None, Some(CodeSequence::RisingClockwise), Some(CodeSequence::FallingClockwise)];
 
 /// Every setting. A key belongs to its setting for ever: a setting that goes leaves its key unused.
-pub static LEAVES: [Leaf; 159] = [
+pub static LEAVES: [Leaf; 160] = [
     Leaf {
         key: 107,
         name: "vehicle.kind",
@@ -348,6 +349,7 @@ pub static LEAVES: [Leaf; 159] = [
     number!(335, "gyro.drift", "rad/s/sqrt(s)", parameters.gyro.drift),
     number!(336, "gyro.scale", "", parameters.gyro.scale),
     number!(337, "gyro.range", "rad/s", parameters.gyro.range),
+    choice!(338, "gyro.connection", GyroConnection, gyro_connection),
     switch!(160, "maps.reflectors", parameters.maps.reflectors),
     switch!(161, "maps.features", parameters.maps.features),
     switch!(162, "maps.dynamic", parameters.maps.dynamic),

@@ -9,6 +9,7 @@ mod bus_load;
 mod checksum;
 pub mod contour_store;
 mod contradiction;
+mod gyro_connection;
 mod laser;
 pub mod leaf;
 mod leaves;
@@ -23,6 +24,7 @@ pub use bus_load::bus_load;
 pub use contradiction::{Cause, Contradiction};
 /// For whoever has nothing else to do until a store has done its work.
 pub use embassy_futures::block_on;
+pub use gyro_connection::GyroConnection;
 pub use laser::{LaserMode, LaserOrientation, LaserSettings};
 pub use leaves::LEAVES;
 pub use map_identity::map_identity;

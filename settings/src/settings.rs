@@ -8,6 +8,7 @@ use agv_wire::can::encoder::CodeSequence;
 use agv_wire::can::gyro::GyroFrame;
 use agv_wire::can::motion_frames::MotionFrames;
 
+use crate::gyro_connection::GyroConnection;
 use crate::laser::LaserSettings;
 use crate::map_identity::map_identity;
 use crate::vehicle::VehicleSettings;
@@ -27,7 +28,9 @@ pub struct Settings {
     pub publishing_period: u16,
     /// Bit rate of the CAN bus, kbit/s.
     pub bit_rate: u16,
-    /// Where the rates of the gyro are on the CAN bus, if there is a gyro.
+    /// Where the gyro is connected, if there is one.
+    pub gyro_connection: GyroConnection,
+    /// Where the rates of the gyro are on the CAN bus, if it is there.
     pub gyro_frame: GyroFrame,
     /// Where the vehicle's own controller says how it moves, if it does.
     pub motion_frames: MotionFrames,
@@ -124,6 +127,7 @@ impl Settings {
             encoder_period: 10,
             publishing_period: 10,
             bit_rate: 500,
+            gyro_connection: GyroConnection::Can,
             gyro_frame: GyroFrame::USUAL,
             motion_frames: MotionFrames::USUAL,
             network: Network {
