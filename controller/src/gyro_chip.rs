@@ -36,6 +36,18 @@ pub enum GyroChipError {
     Silent,
 }
 
+impl GyroChipError {
+    /// What is wrong, in words.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Bus => "it does not answer",
+            Self::Foreign(_) => "what answers is no BMI160",
+            Self::Silent => "it answers, but has no readings; it is started again",
+        }
+    }
+}
+
 /// How far it is.
 #[derive(Clone, Copy, Debug)]
 enum State {

@@ -52,6 +52,9 @@ NODE_17 = item(300, bytes([1, 17]))
 # Leaf 312 lets masters of the bus change settings: a switch (variant 2 of the value).
 ACCEPTS_SETTINGS = item(312, bytes([2, 1]))
 
+# Leaf 330 says that there is a gyro, and leaf 338 where it is: at 68h on the board's I2C.
+GYRO_ON_I2C = item(330, bytes([2, 1])) + item(338, bytes([1, 1]))
+
 # Leaf 308 is the bit rate of the bus in kbit/s, in the seven bits a byte of `postcard`.
 BIT_RATE_250 = item(308, bytes([1, 0x80 | 250 & 0x7F, 250 >> 7]))
 

@@ -70,6 +70,9 @@ pub async fn run<F: PatientFlash>(
         if let Either::First((frame, heard)) = &woken {
             bus.hear(frame, *heard, &mut objects, &mut take);
         }
+        while let Some(output) = exchange::next_gyro().and_then(|sample| bus.hear_gyro(&sample)) {
+            take(output);
+        }
         bus.poll(now(), exchange::laser_health(), &mut take);
         if let Some(speed) = bus.laser_speed() {
             exchange::set_laser_speed(speed);

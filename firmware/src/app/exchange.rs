@@ -3,7 +3,7 @@
 use core::cell::Cell;
 
 use agv_controller::{Estimate, SentPose, Told};
-use agv_core::measurement::Time;
+use agv_core::measurement::{GyroSample, Time};
 use agv_core::state::LaserHealth;
 use agv_wire::can::controller_node::CommunicationParameters;
 use agv_wire::nav350::{Revolution, SensorSpeed, SensorWatch};
@@ -26,6 +26,9 @@ const PUBLISHED_POSES: usize = 5;
 
 /// What the bus has published, for the log.
 static PUBLISHED: Channel<CriticalSectionRawMutex, SentPose, PUBLISHED_POSES> = Channel::new();
+
+/// Readings of the board's own gyro that wait for the bus, which looks every millisecond.
+static READINGS: Channel<CriticalSectionRawMutex, GyroSample, 4> = Channel::new();
 
 /// The end of the revolutions' channel at the laser, and that at the localiser.
 pub type RevolutionSender = zerocopy_channel::Sender<'static, CriticalSectionRawMutex, Revolution>;
@@ -77,6 +80,19 @@ pub fn published_until(told: u32) -> Option<SentPose> {
     let next = PUBLISHED.try_peek().ok()?;
     // The count wraps: what is ahead by less than half of its range is later.
     if next.progress.told.wrapping_sub(told) as i32 > 0 { None } else { PUBLISHED.try_receive().ok() }
+}
+
+/// The board's own gyro has told a rate. If there is no room for it, it is lost and counted.
+pub fn pass_gyro(sample: GyroSample) {
+    if READINGS.try_send(sample).is_err() {
+        LOST_EVENTS.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// The next rate of the board's own gyro.
+#[must_use]
+pub fn next_gyro() -> Option<GyroSample> {
+    READINGS.try_receive().ok()
 }
 
 /// The localiser has said something.

@@ -5,6 +5,7 @@ pub mod bus;
 pub mod can_port;
 pub mod capacities;
 pub mod exchange;
+pub mod gyro;
 pub mod laser;
 pub mod localize;
 pub mod log_stream;

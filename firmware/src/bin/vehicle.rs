@@ -16,10 +16,12 @@ use agv_firmware::app::service::{BoardActions, ServiceMemory, SharedController};
 use agv_firmware::app::settings::KeptMap;
 use agv_firmware::app::supervision::Supervisor;
 use agv_firmware::app::throttle::Throttle;
-use agv_firmware::app::{bus, exchange, laser, localize, log_stream, service, settings, shared_settings, supervision};
+use agv_firmware::app::{
+    bus, exchange, gyro, laser, localize, log_stream, service, settings, shared_settings, supervision,
+};
 use agv_firmware::board::{self, Board, Current, Parts, RestartCause, Watchdog, retained, stack};
 use agv_settings::service::Controller;
-use agv_settings::{Settings, block_on};
+use agv_settings::{GyroConnection, Settings, block_on};
 use agv_wire::can::controller_node::CommunicationParameters;
 use agv_wire::nav350::Revolution;
 use embassy_executor::Spawner;
@@ -42,6 +44,7 @@ const CONNECTIONS: usize = 2;
 
 type Can = <Current as Board>::Can;
 type Lines = LineSet<<Current as Board>::Output, <Current as Board>::Input>;
+type Wires = <Current as Board>::Wires;
 type Ethernet = <Current as Board>::Ethernet;
 type Flash = AnnouncedFlash<<Current as Board>::Flash>;
 type Capacities = <Current as Board>::Capacities;
@@ -112,6 +115,11 @@ async fn bus_task(
 }
 
 #[embassy_executor::task]
+async fn gyro_task(wires: Wires, settings: &'static Settings) -> ! {
+    gyro::run(wires, settings).await
+}
+
+#[embassy_executor::task]
 async fn save_task(controller: &'static SharedController<Flash>) -> ! {
     shared_settings::keep(controller).await
 }
@@ -148,9 +156,17 @@ async fn service_task(stack: Stack<'static>, memory: &'static mut ServiceMemory,
 /// Starts the network on the executor that runs it: its tasks may not move to another one.
 #[embassy_executor::task]
 #[allow(unsafe_code, reason = "the spawner of an interrupt executor is to be had in no other way")]
-async fn start_network(ethernet: Ethernet, revolutions: exchange::RevolutionSender, shared: Shared) {
+async fn start_network(
+    ethernet: Ethernet,
+    wires: Option<Wires>,
+    revolutions: exchange::RevolutionSender,
+    shared: Shared,
+) {
     // SAFETY: this task was made by embassy's macro, so its context is embassy's.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
+    if let Some(wires) = wires {
+        spawner.spawn(gyro_task(wires, shared.settings).expect("the task runs once"));
+    }
     // Whoever asks at the service port waits until the start is counted: its number is part of what keys answer for. That may
     // take as long as a page takes to erase: so nothing else waits for it where the processor goes on meanwhile, and where it
     // does not, it was done before the bus heard anything.
@@ -264,7 +280,8 @@ fn read_flash(
 #[inline(never)]
 fn start() -> Vehicle {
     let core = cortex_m::Peripherals::take().expect("the program begins once");
-    let Parts { can, lines, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } = Current::start(core);
+    let Parts { can, lines, wires, ethernet, flash, contour_flash, watchdog, restart_cause, troubles } =
+        Current::start(core);
     let failure = failure(restart_cause);
     let supervisor = Supervisor::start();
     let Kept { settings, controller, landmarks, contours, communication } = read_flash(flash, contour_flash, failure);
@@ -300,7 +317,9 @@ fn start() -> Vehicle {
     Current::bus_tasks()
         .spawn(bus_task(can, lines, settings, controller, identity, troubles).expect("the task runs once"));
     let shared = Shared { settings, controller, landmarks, log: queue };
-    Current::network_tasks().spawn(start_network(ethernet, sender, shared).expect("the task runs once"));
+    let has_own_gyro = settings.parameters.gyro.is_fitted && settings.gyro_connection != GyroConnection::Can;
+    let wires = if has_own_gyro { Current::take_wires(wires) } else { None };
+    Current::network_tasks().spawn(start_network(ethernet, wires, sender, shared).expect("the task runs once"));
     Vehicle { localization, revolutions, watchdog, supervisor }
 }
 

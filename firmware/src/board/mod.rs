@@ -30,6 +30,7 @@ use agv_settings::patient_flash::PatientFlash;
 use embassy_executor::SendSpawner;
 use embassy_net_driver::Driver;
 use embedded_hal::digital::{InputPin, OutputPin};
+use embedded_hal::i2c::I2c;
 
 use crate::app::can_port::CanPort;
 
@@ -54,6 +55,10 @@ pub trait Board: Sized + 'static {
     type Output: OutputPin + 'static;
     /// A discrete line that it reads.
     type Input: InputPin + 'static;
+    /// The I2C before anybody wants it.
+    type WireParts;
+    /// The I2C, which has a gyro if the settings say so.
+    type Wires: I2c + 'static;
     /// The network.
     type Ethernet: Driver + 'static;
     /// Where settings are kept, and maps of contours: at least two pages.
@@ -70,6 +75,9 @@ pub trait Board: Sized + 'static {
 
     /// Takes part in the bus of that many kbit/s. Call once.
     fn take_part(can: Self::CanParts, bit_rate: u16) -> Self::Can;
+
+    /// Starts the I2C, if the board has one. Call once.
+    fn take_wires(parts: Self::WireParts) -> Option<Self::Wires>;
 
     /// Which of all boards it is; 0 if it does not know.
     fn serial() -> u32;
@@ -96,6 +104,8 @@ pub struct Parts<B: Board> {
     pub can: B::CanParts,
     /// The discrete lines, whose outputs are low.
     pub lines: LineSet<B::Output, B::Input>,
+    /// The I2C, which begins when somebody wants it.
+    pub wires: B::WireParts,
     /// The network.
     pub ethernet: B::Ethernet,
     /// Where settings are kept.

@@ -16,6 +16,7 @@ from .fdcan import Fdcan, MessageRam
 from .finding import Finding
 from .flash import WORD, Flash, FlashInterface, PowerCut
 from .gpio import Gpio
+from .i2c import I2c
 from .loads import transfer_size
 from .memory import PAGE, DataFlash, ProgramFlash, Ram
 from .peripheral_bus import PeripheralBus
@@ -82,6 +83,7 @@ class Chip:
             "FDCAN1": fdcan,
             "FDCANRAM": MessageRam(fdcan),
             "ETH": Ethernet(self, interrupts["ETH"], self.phy),
+            "I2C1": I2c(self),
             "RNG": RandomNumbers(self),
             "DBGMCU": DebugUnit(self, revision or self.description.variant.newest),
             "AXI": RegisterFile(self, "axi"),

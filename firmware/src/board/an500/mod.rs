@@ -6,6 +6,7 @@ pub mod interrupts;
 pub mod lan9118;
 pub mod log_file;
 pub mod no_lines;
+pub mod no_wires;
 pub mod panic;
 mod registers;
 pub mod stopwatch;
@@ -27,6 +28,7 @@ use flash::FileFlash;
 use interrupts::{BUS_TASKS, Interrupt, NETWORK_TASKS};
 use lan9118::Lan9118;
 use no_lines::NoPin;
+use no_wires::NoWires;
 use uart::SlcanPort;
 use watchdog::ApbWatchdog;
 
@@ -46,6 +48,8 @@ impl Board for An500 {
     type Can = SlcanPort;
     type Output = NoPin;
     type Input = NoPin;
+    type WireParts = ();
+    type Wires = NoWires;
     type Ethernet = Lan9118;
     type Flash = FileFlash;
     type Watchdog = ApbWatchdog;
@@ -64,6 +68,7 @@ impl Board for An500 {
         Parts {
             can: SlcanPort,
             lines: LineSet::NONE,
+            wires: (),
             ethernet,
             flash: FileFlash::open(SETTINGS),
             contour_flash: Some(FileFlash::open(CONTOURS)),
@@ -83,6 +88,10 @@ impl Board for An500 {
     /// Its bit rate is a matter of the adapter.
     fn take_part(can: SlcanPort, _bit_rate: u16) -> SlcanPort {
         can
+    }
+
+    fn take_wires((): ()) -> Option<NoWires> {
+        None
     }
 
     fn serial() -> u32 {

@@ -9,6 +9,7 @@ mod clocks;
 mod ethernet;
 mod faults;
 mod flash;
+mod i2c_wires;
 mod lines;
 mod memory_protection;
 mod option_bytes;
@@ -38,6 +39,7 @@ use can::{CanParts, FdCanPort};
 use clocks::Source;
 use ethernet::{Ethernet, Queue, Wires};
 use flash::Pages;
+use i2c_wires::{I2cParts, I2cWires};
 use lines::{LinePins, ShownOutput};
 use watchdog::IndependentWatchdog;
 
@@ -102,6 +104,8 @@ impl<C: Chip> Board for Nucleo<C> {
     type Can = FdCanPort;
     type Output = ShownOutput;
     type Input = Input<'static>;
+    type WireParts = I2cParts;
+    type Wires = I2cWires;
     type Ethernet = Ethernet;
     type Flash = Pages<C>;
     type Watchdog = IndependentWatchdog;
@@ -139,6 +143,7 @@ impl<C: Chip> Board for Nucleo<C> {
             standstill: peripherals.PG9,
             reset: peripherals.PG14,
         };
+        let i2c = I2cParts { controller: peripherals.I2C1, clock: peripherals.PB8, data: peripherals.PB9 };
         // SAFETY: this function is called once, and nobody else knows the queue. All zero is what `PacketQueue::init` makes
         // of it, and a valid one.
         let queue = unsafe {
@@ -167,7 +172,8 @@ impl<C: Chip> Board for Nucleo<C> {
             has_crystal: source.has_crystal(),
             are_options_right: option_bytes::are_right(),
         };
-        Parts { can, lines: lines.start(), ethernet, flash, contour_flash, watchdog, restart_cause, troubles }
+        let lines = lines.start();
+        Parts { can, lines, wires: i2c, ethernet, flash, contour_flash, watchdog, restart_cause, troubles }
     }
 
     fn contour_bytes(offset: u32, length: u32) -> Option<&'static [u8]> {
@@ -176,6 +182,10 @@ impl<C: Chip> Board for Nucleo<C> {
 
     fn take_part(can: CanParts, bit_rate: u16) -> FdCanPort {
         can.start(bit_rate)
+    }
+
+    fn take_wires(parts: I2cParts) -> Option<I2cWires> {
+        Some(parts.start())
     }
 
     fn serial() -> u32 {

@@ -39,9 +39,8 @@ pub type OpenGyro = Box<dyn FnOnce(&Settings) -> Box<dyn GyroPort> + Send>;
 
 fn word(error: GyroChipError) -> String {
     match error {
-        GyroChipError::Bus => "it does not answer".to_owned(),
-        GyroChipError::Foreign(identity) => format!("what answers is no BMI160 but calls itself {identity:02X}h"),
-        GyroChipError::Silent => "it answers, but has no readings; it is started again".to_owned(),
+        GyroChipError::Foreign(identity) => format!("{} but calls itself {identity:02X}h", error.text()),
+        GyroChipError::Bus | GyroChipError::Silent => error.text().to_owned(),
     }
 }
 
