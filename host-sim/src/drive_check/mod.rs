@@ -238,7 +238,7 @@ fn map(recording: &Recording, figures: &Figures, is_sound: bool, log: &str) -> V
     let words = counted.map(|(kind, share)| {
         let what = format!("{:.0} % of what is seen of {} is in the map", 100.0 * share, kind_name(kind));
         let next = if is_sound && share < 0.5 {
-            format!("the map may be of another place, or the start is wrong: agv replay {log} --relocalise reflectors")
+            format!("the map may be of another place, or the start is wrong: {}", start_remedy(recording, log))
         } else {
             format!("agv map {log} --output new.csv, and compare")
         };
