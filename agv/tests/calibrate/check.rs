@@ -143,7 +143,7 @@ pub fn run(files: &Files, command: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_agv")).args(command).current_dir(files.folder()).output().unwrap()
 }
 
-fn json(files: &Files, command: &[&str]) -> serde_json::Value {
+pub fn json(files: &Files, command: &[&str]) -> serde_json::Value {
     let output = run(files, command);
     assert!(output.status.success(), "{command:?}: {}", text(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
