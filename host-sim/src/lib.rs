@@ -13,6 +13,7 @@ pub mod drive_check;
 pub mod emulate;
 pub mod export;
 pub mod file_kind;
+pub mod foreign_code;
 pub mod hdl64e_packets;
 pub mod import;
 pub mod layout_check;

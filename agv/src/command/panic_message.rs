@@ -2,6 +2,8 @@
 
 use std::process::exit;
 
+use agv_host_sim::foreign_code;
+
 /// How the standard library begins the panic of `println!`.
 const PRINTING: &str = "failed printing to stdout: ";
 
@@ -9,6 +11,9 @@ const PRINTING: &str = "failed printing to stdout: ";
 /// result that cannot be written otherwise is a failure.
 pub fn install() {
     std::panic::set_hook(Box::new(|panic| {
+        if foreign_code::is_at_work() {
+            return;
+        }
         let message = panic.payload_as_str().unwrap_or_default();
         if let Some(reason) = message.strip_prefix(PRINTING) {
             if reason.starts_with("Broken pipe") {

@@ -320,3 +320,22 @@ proptest! {
         let _ = layout_file::load(files.write(name, text.as_bytes()).as_ref());
     }
 }
+
+#[test]
+fn what_the_reader_of_drawings_did_not_expect_is_no_fault_of_the_program() {
+    let sound = drawing(Some(4), "", "", &point([1000.0, 2000.0], ""));
+    let (ended, places) = converted("sound.dxf", sound.as_bytes(), &[]);
+    assert_eq!((ended.code, places), (Some(0), vec![(0, 1000, 2000)]), "{}", ended.complaint);
+    // Dates that no calendar has.
+    for date in ["1e300", "-1e300", "9e15", "1e12"] {
+        let content =
+            sound.replacen("$ACADVER\n1\nAC1015\n", &format!("$ACADVER\n1\nAC1015\n9\n$TDCREATE\n40\n{date}\n"), 1);
+        let (ended, places) = converted("date.dxf", content.as_bytes(), &[]);
+        let is_read = ended.code == Some(0) && places == [(0, 1000, 2000)];
+        let is_refused = ended.code == Some(1)
+            && ended.complaint.lines().count() == 1
+            && ended.complaint.contains("no drawing has")
+            && !ended.complaint.contains("fault of the program");
+        assert!(is_read || is_refused, "{date}: {}", ended.complaint);
+    }
+}

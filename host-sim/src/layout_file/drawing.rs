@@ -9,6 +9,7 @@ use super::LoadedLayout;
 use super::blocks::{self, Place};
 use super::reading::{Reading, Unit};
 use crate::account::Account;
+use crate::foreign_code;
 
 /// Layer of the points and their names.
 const LAYER: &str = "REFLECTORS";
@@ -48,7 +49,10 @@ pub(super) fn is_binary(bytes: &[u8]) -> bool {
 /// is written at a landmark, or in an attribute of its block, names it; the others are numbered.
 pub(super) fn parse(bytes: &[u8], reading: &Reading) -> Result<LoadedLayout, (usize, String)> {
     let mut account = Account::default();
-    let drawing = Drawing::load(&mut &*bytes).map_err(|error| (line(&error), error.to_string()))?;
+    let read = foreign_code::read(|| Drawing::load(&mut &*bytes));
+    let read =
+        read.map_err(|reason| (1, format!("there is something in the drawing that no drawing has: {reason}")))?;
+    let drawing = read.map_err(|error| (line(&error), error.to_string()))?;
     let found = blocks::collect(&drawing, &frozen_layers(bytes), reading.layer.as_deref(), &mut account);
     if found.places.is_empty() {
         let layer = reading.layer.as_ref().map(|layer| format!(" on the layer {layer}")).unwrap_or_default();
