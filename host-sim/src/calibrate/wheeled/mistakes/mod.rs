@@ -253,10 +253,10 @@ fn simplest(mut found: Vec<WheelExplanation>) -> Vec<WheelExplanation> {
         Mistake::WheelScale(wheel, ratio) if (*ratio + 1.0).abs() < measured::SHARE => Some(*wheel),
         _ => None,
     };
-    let reversed: Vec<usize> = found.iter().flat_map(|one| one.mistakes.iter().filter_map(turned)).collect();
-    found.retain(|one| !one.mistakes.iter().filter_map(is_reversed).any(|wheel| reversed.contains(&wheel)));
     let best = found.iter().map(|one| one.residual).fold(f64::INFINITY, f64::min);
     found.retain(|one| one.residual <= WORSE * best.max(FINE));
+    let reversed: Vec<usize> = found.iter().flat_map(|one| one.mistakes.iter().filter_map(turned)).collect();
+    found.retain(|one| !one.mistakes.iter().filter_map(is_reversed).any(|wheel| reversed.contains(&wheel)));
     let weight = |one: &WheelExplanation| {
         one.mistakes.iter().map(|mistake| if matches!(mistake, Mistake::LaserPlace(..)) { 2 } else { 1 }).sum::<usize>()
     };
