@@ -246,7 +246,8 @@ fn a_bus_that_was_lost_comes_back() {
             let before = attempts.load(Ordering::Relaxed);
             wait("an attempt", || attempts.load(Ordering::Relaxed) > before);
         };
-        wait("the first attempt", || attempts.load(Ordering::Relaxed) > 0);
+        // With the second attempt the first has failed, and was told.
+        wait("the second attempt", || attempts.load(Ordering::Relaxed) > 1);
         for _ in 0..2 {
             is_broken.store(false, Ordering::Relaxed);
             wait("the bus", is(BusState::Open));
