@@ -2,6 +2,7 @@
 //! about every test for which one of them is missing.
 
 pub mod busy_board;
+mod covered;
 mod programs;
 mod real_time;
 mod skip;
@@ -10,6 +11,7 @@ pub mod user_mode_linux;
 
 use std::path::{Path, PathBuf};
 
+pub use covered::{covered, logs};
 pub use programs::{agv, emulator, image, is_on_path, python};
 pub use real_time::{faults, heard_in_time, is_fair, sound_drive};
 pub use skip::{no_kernel, skip, too_busy};

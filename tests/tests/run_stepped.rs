@@ -3,7 +3,7 @@
 #![cfg(target_os = "linux")]
 
 use std::alloc::System;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Mutex, PoisonError};
@@ -14,7 +14,7 @@ use agv_core::measurement::Time;
 use agv_core::state::Mode;
 use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::provision::flash_image;
-use agv_host_sim::recording::{RecordedEvent, Recording};
+use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::Comparison;
 use agv_host_sim::run::{FLASH, RingOptions, Stepped, run_stepped};
 use agv_host_sim::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
@@ -22,7 +22,7 @@ use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scena
 use agv_host_sim::simulate::{simulate, standard};
 use agv_host_sim::{log, replay};
 use agv_settings::Settings;
-use agv_tests::{emulator, image};
+use agv_tests::{covered, emulator, image, logs};
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::nav350::SensorFrame;
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
@@ -207,32 +207,6 @@ fn the_emulated_board_says_the_same_on_the_bus_to_the_last_bit() {
 /// Where the reflectors are covered, s of the drive.
 const COVERED: f64 = 8.0;
 
-/// The hall whose reflectors are covered from then on.
-fn covered_hall() -> Recording {
-    let mut scenario = hall();
-    scenario.laser.scans = false;
-    let mut recording = simulate(&scenario).unwrap().recording;
-    // As soon as nothing is seen, the level is too large for travelling.
-    recording.parameters.alert_limits.travel.position = 0.1;
-    let first = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
-    for event in &mut recording.events {
-        let is_covered = event.time().is_some_and(|time| time.since(first) > COVERED);
-        if let RecordedEvent::Reflectors(seen) = event
-            && is_covered
-        {
-            seen.observations.clear();
-        }
-    }
-    recording
-}
-
-fn logs(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut logs: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "agvlog")).collect();
-    logs.sort();
-    logs
-}
-
 /// What was kept, and whether it begins in the middle of the drive.
 fn assert_replayed(path: &Path) -> (Comparison, bool) {
     let contents = log::read_contents(path, |_| ()).unwrap();
@@ -251,7 +225,9 @@ fn assert_replayed(path: &Path) -> (Comparison, bool) {
 fn an_incident_is_a_log_that_replays_to_the_same_bits() {
     static HAND: AtomicU64 = AtomicU64::new(STEP);
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let recording = covered_hall();
+    let mut scenario = hall();
+    scenario.laser.scans = false;
+    let recording = covered(simulate(&scenario).unwrap().recording, COVERED);
     let (store, folder) = (store(&recording), tempfile::tempdir().unwrap());
     let options = RingOptions {
         span: Duration::from_secs(4),

@@ -1,41 +1,15 @@
 //! What a controller keeps of its run: each incident can be fetched, and no more bytes are kept than are allowed.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use agv_core::measurement::Time;
 use agv_host_sim::link::service::{Client, KeptIncident};
-use agv_host_sim::recording::{RecordedEvent, Recording};
 use agv_host_sim::run::{Demonstration, Logs, RealTime, RingOptions, Running};
+use agv_tests::{covered, logs};
 
 use super::vehicle::{End, hall, wait};
-
-/// The hall whose reflectors are covered from that time of the drive on, s.
-fn covered(seconds: f64) -> Recording {
-    let mut recording = hall();
-    // As soon as nothing is seen, the level is too large for travelling.
-    recording.parameters.alert_limits.travel.position = 0.1;
-    let first = recording.events.iter().filter_map(RecordedEvent::time).min().unwrap_or_default();
-    let is_later = |time: Option<Time>| time.is_some_and(|time| time.since(first) > seconds);
-    for event in &mut recording.events {
-        let is_later = is_later(event.time());
-        if let RecordedEvent::Reflectors(seen) = event
-            && is_later
-        {
-            seen.observations.clear();
-        }
-    }
-    recording
-}
-
-fn logs(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut logs: Vec<_> = entries.filter(|path| path.extension().is_some_and(|ending| ending == "agvlog")).collect();
-    logs.sort();
-    logs
-}
 
 #[test]
 fn an_incident_is_fetched_from_a_controller_that_runs() {
@@ -65,7 +39,7 @@ fn an_incident_is_fetched_from_a_controller_that_runs() {
     };
     let store = folder.path().join("store");
     let remark = |text: &str| println!("{text}");
-    let demonstration = Demonstration::of(covered(8.0));
+    let demonstration = Demonstration::of(covered(hall(), 8.0));
     let summary = demonstration.run(&store, RealTime::default(), logs_of_run, &is_stopped, &remark, watch).unwrap();
     assert!(summary.was_localised && is_stopped.load(Ordering::Relaxed), "{summary:?}");
     let incidents = logs(&options.incidents());
