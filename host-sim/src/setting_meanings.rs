@@ -74,6 +74,10 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("gyro.drift", "walk of the bias"),
     ("gyro.scale", "error of its scale"),
     ("gyro.range", "largest rate that it can tell"),
+    (
+        "gyro.connection",
+        "where the gyro is: on the CAN bus, or a BMI160 on the I2C of a board; a Linux machine has that in its own configuration",
+    ),
     ("maps.reflectors", "whether the map's reflectors are used"),
     ("maps.features", "whether the map's natural features are used"),
     ("maps.dynamic", "whether features that are found while driving are used"),
@@ -151,10 +155,6 @@ pub const MEANINGS: &[(&str, &str)] = &[
     ("can.third_code_sequence", "the same of the third counter"),
     ("can.fourth_code_sequence", "the same of the fourth counter"),
     ("can.accept_settings", "whether settings can be changed over the bus while the vehicle stands"),
-    (
-        "gyro.connection",
-        "where the gyro is: on the CAN bus, or a BMI160 on the I2C of a board; a Linux machine has that in its own configuration",
-    ),
     ("can.gyro_identifier", "identifier of the gyro's frames"),
     ("can.gyro_extended", "whether that has 29 bits"),
     ("can.gyro_first_byte", "where the rate about the gyro's first axis begins, bytes"),

@@ -54,7 +54,7 @@ const HOUSES: [House; 8] = [
     House {
         folder: "settings",
         floors: &[
-            &["checksum", "laser", "patient_flash", "vehicle"],
+            &["checksum", "gyro_connection", "laser", "patient_flash", "vehicle"],
             &["map_identity"],
             &["settings"],
             &["bus_load"],
@@ -88,6 +88,7 @@ const HOUSES: [House; 8] = [
                 "data",
                 "delimited",
                 "file_kind",
+                "foreign_code",
                 "hdl64e_packets",
                 "left_out",
                 "link",

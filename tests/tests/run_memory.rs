@@ -72,7 +72,8 @@ fn play() {
             for frame in motion.poll(clock.now()) {
                 bus.send(&frame.into()).unwrap();
             }
-            let heard = bus.receive(Instant::now() + Duration::from_millis(1)).unwrap();
+            // The controller has ended.
+            let Ok(heard) = bus.receive(Instant::now() + Duration::from_millis(1)) else { return };
             let Some(frame) = heard.as_ref().and_then(|frame| frame.classic()) else { continue };
             for answer in motion.handle(frame) {
                 bus.send(&answer.into()).unwrap();
