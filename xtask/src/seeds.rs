@@ -150,7 +150,7 @@ fn write_imports(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
         for entry in std::fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
             let path = entry?.path();
             let is_one = |ending: &&str| path.extension().is_some_and(|found| *found == **ending);
-            if !endings.iter().any(|ending| is_one(&ending)) {
+            if !endings.iter().any(is_one) {
                 continue;
             }
             let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
