@@ -11,7 +11,7 @@ pub mod user_mode_linux;
 
 use std::path::{Path, PathBuf};
 
-pub use covered::{covered, logs};
+pub use covered::{covered, logs, short_ring};
 pub use programs::{agv, emulator, image, is_on_path, python};
 pub use real_time::{faults, heard_in_time, is_fair, sound_drive};
 pub use skip::{no_kernel, skip, too_busy};

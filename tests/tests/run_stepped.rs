@@ -7,7 +7,6 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
 
 use agv_controller::{EncoderNodes, LaserOrder};
 use agv_core::measurement::Time;
@@ -16,13 +15,13 @@ use agv_host_sim::emulate::motion::EmulatedMotion;
 use agv_host_sim::provision::flash_image;
 use agv_host_sim::recording::Recording;
 use agv_host_sim::replay::Comparison;
-use agv_host_sim::run::{FLASH, RingOptions, Stepped, run_stepped};
+use agv_host_sim::run::{FLASH, Stepped, run_stepped};
 use agv_host_sim::serve::nav350::{Connection, Drive, Sensor, SensorClockOptions};
 use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario};
 use agv_host_sim::simulate::{simulate, standard};
 use agv_host_sim::{log, replay};
 use agv_settings::Settings;
-use agv_tests::{covered, emulator, image, logs};
+use agv_tests::{covered, emulator, image, logs, short_ring};
 use agv_wire::can::frame::{Frame, Id};
 use agv_wire::nav350::SensorFrame;
 use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
@@ -229,14 +228,7 @@ fn an_incident_is_a_log_that_replays_to_the_same_bits() {
     scenario.laser.scans = false;
     let recording = covered(simulate(&scenario).unwrap().recording, COVERED);
     let (store, folder) = (store(&recording), tempfile::tempdir().unwrap());
-    let options = RingOptions {
-        span: Duration::from_secs(4),
-        part: Duration::from_secs(1),
-        around: [Duration::from_secs(2), Duration::from_secs(1)],
-        ring_bytes: 8 << 20,
-        incident_bytes: 8 << 20,
-        ..RingOptions::usual(folder.path().join("recording"))
-    };
+    let options = short_ring(folder.path().join("recording"));
     run_stepped(store.path(), &HAND, Some(&options), &|text| println!("{text}"), |controller| {
         let mut sensors = Sensors::new(&recording);
         for step in 1..=30_000 {
