@@ -89,7 +89,52 @@ impl Check {
     /// Has the command that comes next take the vehicle that was taken here. The viewer shows what was recorded.
     fn keep_vehicle(&self, finding: &mut Finding, log: &str) {
         if let Some(vehicle) = self.vehicle.vehicle.as_ref().filter(|_| !finding.next.contains("agv view")) {
-            finding.next = finding.next.replace(log, &format!("{log} --vehicle {}", vehicle.display()));
+            finding.next = with_vehicle(&finding.next, log, &vehicle.display().to_string());
+        }
+    }
+}
+
+/// What comes next, with the vehicle behind each log that is read; one that is written has it already.
+fn with_vehicle(next: &str, log: &str, vehicle: &str) -> String {
+    let mut before = "";
+    let words = next.split(' ').map(|word| {
+        let is_written = std::mem::replace(&mut before, word) == "--put-right";
+        if word == log && !is_written { format!("{word} --vehicle {vehicle}") } else { word.to_owned() }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_vehicle;
+
+    #[test]
+    fn each_log_that_is_read_has_the_vehicle_once() {
+        let cases = [
+            (
+                "agv calibrate d.agvlog --mend --apply vehicle.toml",
+                "d.agvlog",
+                "agv calibrate d.agvlog --vehicle V --mend --apply vehicle.toml",
+            ),
+            (
+                "agv check d.agvlog --put-right mended.agvlog",
+                "d.agvlog",
+                "agv check d.agvlog --vehicle V --put-right mended.agvlog",
+            ),
+            (
+                "agv check mended.agvlog --put-right mended.agvlog",
+                "mended.agvlog",
+                "agv check mended.agvlog --vehicle V --put-right mended.agvlog",
+            ),
+            (
+                "agv replay d.agvlog --map MAP, or agv replay d.agvlog --start X",
+                "d.agvlog",
+                "agv replay d.agvlog --vehicle V --map MAP, or agv replay d.agvlog --vehicle V --start X",
+            ),
+            ("agv settings vehicle.kind", "d.agvlog", "agv settings vehicle.kind"),
+        ];
+        for (next, log, expected) in cases {
+            assert_eq!(with_vehicle(next, log, "V"), expected);
         }
     }
 }
