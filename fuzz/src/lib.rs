@@ -63,3 +63,17 @@ pub fn in_file(name: &str, contents: &[u8], read: impl FnOnce(&Path)) {
     std::fs::write(&path, contents).expect("the folder of temporary files takes them");
     read(&path);
 }
+
+/// Between the files of one input.
+pub const BETWEEN_FILES: char = '\u{c}';
+
+/// Has `read` read a folder with files of these names; the text has their contents in turn. What the text has no more is absent.
+pub fn in_folder(names: &[&str], text: &str, read: impl FnOnce(&Path)) {
+    let folder = std::env::temp_dir().join(format!("agv-fuzz-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the folder of temporary files takes them");
+    for (name, contents) in names.iter().zip(text.split(BETWEEN_FILES)) {
+        std::fs::write(folder.join(name), contents).expect("the folder of temporary files takes them");
+    }
+    read(&folder);
+}

@@ -18,7 +18,7 @@ pub struct Fuzz {
 }
 
 /// Targets of the folder `fuzz`.
-const TARGETS: [&str; 16] = [
+const TARGETS: [&str; 19] = [
     "cola_a",
     "cola_b",
     "canopen",
@@ -35,6 +35,9 @@ const TARGETS: [&str; 16] = [
     "point_cloud",
     "lidar_calibration",
     "robot_log",
+    "car_park",
+    "robot_session",
+    "described_table",
 ];
 
 impl Fuzz {

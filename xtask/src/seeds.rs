@@ -55,11 +55,13 @@ impl Seeds {
         let frames = write_frames(&data, &corpus)?;
         let captures = write_captures(&data, &corpus)?;
         let imports = write_imports(&data, &corpus)?;
+        let folders = write_folders(&data, &corpus)?;
         let drives = write_drives(&corpus)?;
         println!("telegrams  {count}");
         println!("frames     {frames}");
         println!("captures   {captures}");
         println!("imports    {imports}");
+        println!("folders    {folders}");
         println!("drives     {drives}");
         Ok(())
     }
@@ -162,6 +164,79 @@ fn write_imports(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
         std::fs::write(corpus.join("point_cloud").join(name), text)?;
     }
     Ok(count + CLOUDS.len())
+}
+
+/// Tables of the car park, in the order of its target.
+const CAR_PARK: [&str; 7] = [
+    "odometry.csv",
+    "laser_ranges_m.csv",
+    "laser_intensity.csv",
+    "beacons.csv",
+    "gps.csv",
+    "events.csv",
+    "reference_smoothed.csv",
+];
+/// Lines of each of them in a seed.
+const CAR_PARK_LINES: [usize; 2] = [4, 12];
+/// Lines of a robot's run in a seed.
+const RUN_LINES: usize = 40;
+/// Vehicles of a table of wheels, and the columns that go with them.
+const DESCRIPTIONS: [&str; 2] = [
+    "[vehicle.wheels.differential]\ntrack = 0.5\nleft = { radius = 0.1, turn = { scale = 1e-4, range = 65536 } }\n\
+     right = { radius = 0.1, turn = { scale = 1e-4, range = 65536 } }\n[table]\nhas_heading = false\n\
+     time = { column = \"1\", unit = \"s\" }\n\
+     wheel = [{ turn = { column = \"5\", unit = \"ticks\", ticks = 100.0 } }, { turn = { column = \"6\", unit = \"rad\" } }]\n\
+     reference = { x = { column = \"2\", unit = \"m\" }, y = { column = \"3\", unit = \"m\" }, heading = { column = \"4\", unit = \"rad\" } }\n",
+    "[vehicle.tricycle]\nwheelbase = 1.2\ndrive_scale = 1e-4\ndrive_range = 65536\nsteering_scale = 1e-4\n\
+     steering_range = 65536\nsteering_offset_forward = 0.0\nsteering_offset_backward = 0.0\n[table]\nhas_heading = false\ntime = { column = \"1\", unit = \"ms\" }\n\
+     wheel = [{ radius = 0.1, turn = { column = \"5\", unit = \"rad\" }, steering = { column = \"6\", unit = \"deg\" } }]\n",
+];
+
+/// Folders of tables as one text, a form feed between two of them. Returns how many there are.
+fn write_folders(data: &Path, corpus: &Path) -> anyhow::Result<usize> {
+    let read = |path: PathBuf, lines: usize| -> anyhow::Result<String> {
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        Ok(text.lines().take(lines).map(|line| format!("{line}\n")).collect())
+    };
+    let write = |target: &str, name: &str, files: &[String]| -> anyhow::Result<()> {
+        std::fs::create_dir_all(corpus.join(target))?;
+        Ok(std::fs::write(corpus.join(target).join(name), files.join("\u{c}"))?)
+    };
+    let mut count = 0;
+    for lines in CAR_PARK_LINES {
+        let tables = CAR_PARK.map(|name| read(data.join("carpark").join(name), lines));
+        write("car_park", &format!("lines{lines}"), &tables.into_iter().collect::<anyhow::Result<Vec<_>>>()?)?;
+        count += 1;
+    }
+    for robot in ["diff", "omni3", "omni4", "tricyc"] {
+        for path in files_below(&data.join("optiodom").join(robot))? {
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_owned();
+            let Some(session) = name.strip_suffix("_run-01.csv") else { continue };
+            let nominal = read(path.with_file_name(format!("{session}_metadata.csv")), usize::MAX)?;
+            let run = read(path, RUN_LINES)?;
+            for (number, description) in DESCRIPTIONS.iter().enumerate() {
+                write("described_table", &format!("{session}_{number}"), &[(*description).to_owned(), run.clone()])?;
+            }
+            write("robot_session", session, &[nominal, run])?;
+            count += 1 + DESCRIPTIONS.len();
+        }
+    }
+    Ok(count)
+}
+
+/// All files in a folder and the folders in it.
+fn files_below(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.is_dir() {
+            files.extend(files_below(&path)?);
+        } else {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
 }
 
 /// Choices without a pattern, from which most events are plausible. Returns how many drives there are.
