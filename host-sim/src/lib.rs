@@ -39,6 +39,7 @@ pub mod serve;
 pub mod setting_doubts;
 pub mod setting_meanings;
 pub mod simulate;
+pub mod sync;
 pub mod text_file;
 pub mod view;
 mod wording;

@@ -81,7 +81,7 @@ const HOUSES: [House; 8] = [
     House {
         folder: "host-sim",
         floors: &[
-            &["contour_map"],
+            &["contour_map", "sync"],
             &[
                 "account",
                 "bus",

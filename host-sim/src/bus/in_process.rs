@@ -1,12 +1,13 @@
 //! A bus inside this program, for tests and emulators.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
 use agv_wire::can::frame::AnyFrame;
 
 use super::{Bus, BusError};
+use crate::sync::lock::Lock;
+use crate::sync::queue::{Closed, Receiver, Sender, queue};
 
 /// Frames that wait for a node; what comes while it takes none is lost for it, as in a CAN controller. A second of a full bus of
 /// 500 kbit/s, whose shortest frames have 47 bits, has 10,600.
@@ -15,7 +16,7 @@ const QUEUE: usize = 16_384;
 /// The wire. What one node sends, all others receive, in the order of sending.
 #[derive(Clone, Debug, Default)]
 pub struct InProcessBus {
-    nodes: Arc<Mutex<Vec<SyncSender<AnyFrame>>>>,
+    nodes: Arc<Lock<Vec<Sender<AnyFrame>>>>,
 }
 
 /// One node on the wire.
@@ -36,8 +37,8 @@ impl InProcessBus {
     /// Adds a node; it receives what is sent from now on.
     #[must_use]
     pub fn join(&self) -> InProcessNode {
-        let (sender, received) = sync_channel(QUEUE);
-        let mut nodes = self.nodes.lock().unwrap_or_else(PoisonError::into_inner);
+        let (sender, received) = queue(QUEUE);
+        let mut nodes = self.nodes.lock();
         nodes.push(sender);
         InProcessNode { bus: self.clone(), number: nodes.len() - 1, received }
     }
@@ -45,22 +46,18 @@ impl InProcessBus {
 
 impl Bus for InProcessNode {
     fn send(&mut self, frame: &AnyFrame) -> Result<(), BusError> {
-        let nodes = self.bus.nodes.lock().unwrap_or_else(PoisonError::into_inner);
+        let nodes = self.bus.nodes.lock();
         for (number, node) in nodes.iter().enumerate() {
             if number != self.number {
                 // A node that is gone, or takes nothing, hears nothing, as on a real bus.
-                let _ = node.try_send(*frame);
+                let _ = node.send(*frame);
             }
         }
         Ok(())
     }
 
     fn receive(&mut self, deadline: Instant) -> Result<Option<AnyFrame>, BusError> {
-        match self.received.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-            Ok(frame) => Ok(Some(frame)),
-            Err(RecvTimeoutError::Timeout) => Ok(None),
-            // The bus itself holds the other end.
-            Err(RecvTimeoutError::Disconnected) => Err(BusError::Closed { name: "in-process bus".to_owned() }),
-        }
+        // The bus itself holds the other end.
+        self.received.wait(deadline).map_err(|Closed| BusError::Closed { name: "in-process bus".to_owned() })
     }
 }

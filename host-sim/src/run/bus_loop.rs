@@ -130,7 +130,11 @@ impl<'a> BusLoop<'a> {
                 }
                 exchange.published(&published);
             }
-            BusOutput::Save(parameters) => exchange.save(parameters),
+            BusOutput::Save(parameters) => {
+                if !exchange.save(parameters) {
+                    exchange.tell_saved(false);
+                }
+            }
         };
         if let Some((frame, heard)) = &heard {
             bus.hear(frame, *heard, objects, &mut take);

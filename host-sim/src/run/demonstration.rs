@@ -15,6 +15,7 @@ use agv_wire::can::controller::PoseReceiver;
 use agv_wire::can::frame::Frame;
 use agv_wire::nav350::SensorFrame;
 
+use super::real_time::{self, Lacks};
 use super::{DiscretePort, FLASH, Logs, Options, Ports, RealTime, RunError, Running, Summary};
 use crate::bus::{Bus, BusError, InProcessBus, InProcessNode};
 use crate::emulate::gyro::EmulatedGyro;
@@ -139,6 +140,9 @@ impl Demonstration {
         std::thread::scope(|scope| {
             scope.spawn(|| sensor.serve(&listener, &is_over));
             let playing = scope.spawn(|| {
+                // Encoders are machines of their own, which wait for nothing that this one does; what it does not grant, the bus tells.
+                let priority = real_time.bus_priority.map(|priority| priority.saturating_add(1));
+                real_time::enter("encoders", priority, None, &Lacks::default());
                 let outcome = stage.play(&sensor, &is_over);
                 // Without encoders there is nothing to show.
                 if outcome.is_err() {

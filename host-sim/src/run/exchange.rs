@@ -1,11 +1,11 @@
 //! What the threads pass to each other. Whoever has a deadline waits for nobody: queues are bounded, and what does not fit is
-//! counted and left out; locks are held for the time of a copy.
+//! counted and left out; locks are held for the time of a copy, with the priority of
+//! whoever waits for them.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use agv_controller::{DiscreteInputs, DiscreteReport, Estimate, SentPose, Told};
 use agv_core::measurement::{GyroSample, Time};
@@ -16,6 +16,8 @@ use agv_wire::nav350::{Revolution, SensorSpeed, SensorWatch};
 use super::fault::Fault;
 use super::periods::Periods;
 use crate::link::clock::Clock;
+use crate::sync::lock::Lock;
+use crate::sync::queue::{Receiver, Sender, queue};
 
 /// Events that wait for the localiser: a second of encoders and a gyro at 100 Hz each, and more.
 const EVENTS: usize = 256;
@@ -28,6 +30,8 @@ const POSES: usize = 128;
 
 /// Faults that wait to be told to people.
 const FAULTS: usize = 64;
+/// Wishes for the settings to be stored that wait: each comes from a client that waits for its answer.
+const SAVES: usize = 4;
 /// Readings of the machine's own gyro that wait for the bus, which looks every millisecond.
 const READINGS: usize = 16;
 
@@ -67,22 +71,22 @@ pub(super) struct LocalizerQueues {
     pub events: Receiver<Told>,
     pub published: Receiver<SentPose>,
     pub revolutions: Receiver<Box<Revolution>>,
-    pub free_revolutions: SyncSender<Box<Revolution>>,
+    pub free_revolutions: Sender<Box<Revolution>>,
 }
 
 /// The ends of the queues at the laser.
 pub(super) struct LaserQueues {
-    pub revolutions: SyncSender<Box<Revolution>>,
+    pub revolutions: Sender<Box<Revolution>>,
     pub free_revolutions: Receiver<Box<Revolution>>,
 }
 
 impl LaserQueues {
     /// Leaves a revolution to the localiser. If it is so far behind that there is no room, the revolution is lost and counted.
     pub fn pass_on(&self, revolution: &Revolution, exchange: &Exchange) {
-        let Ok(mut room) = self.free_revolutions.try_recv() else { return exchange.lose_revolution() };
+        let Some(mut room) = self.free_revolutions.receive() else { return exchange.lose_revolution() };
         Revolution::clone_from(&mut room, revolution);
         // There are no more of them than there is room for.
-        let _ = self.revolutions.try_send(room);
+        let _ = self.revolutions.send(room);
         exchange.wake_localizer();
     }
 }
@@ -100,50 +104,45 @@ pub(super) struct Exchange {
     pub periods: Periods,
     is_stopped: Arc<AtomicBool>,
     is_restart_wanted: AtomicBool,
-    events: SyncSender<Told>,
-    published: SyncSender<SentPose>,
-    poses: SyncSender<PoseOutput>,
-    faults: (SyncSender<Fault>, Mutex<Receiver<Fault>>),
-    readings: (SyncSender<GyroSample>, Mutex<Receiver<GyroSample>>),
+    events: Sender<Told>,
+    published: Sender<SentPose>,
+    poses: Sender<PoseOutput>,
+    faults: (Sender<Fault>, Receiver<Fault>),
+    readings: (Sender<GyroSample>, Receiver<GyroSample>),
     has_failed: AtomicBool,
     localizer: OnceLock<Thread>,
-    estimate: Mutex<Option<Estimate>>,
-    laser: Mutex<SensorWatch>,
-    laser_speed: Mutex<Option<SensorSpeed>>,
-    save: Mutex<Option<CommunicationParameters>>,
-    save_wanted: Condvar,
-    saved: Mutex<Option<bool>>,
-    pose: Mutex<Option<PoseOutput>>,
-    bus: Mutex<BusState>,
+    estimate: Lock<Option<Estimate>>,
+    laser: Lock<SensorWatch>,
+    laser_speed: Lock<Option<SensorSpeed>>,
+    saves: (Sender<CommunicationParameters>, Receiver<CommunicationParameters>),
+    saved: Lock<Option<bool>>,
+    pose: Lock<Option<PoseOutput>>,
+    bus: Lock<BusState>,
     is_standing: AtomicBool,
     was_localised: AtomicBool,
     lost_events: AtomicU32,
     lost_revolutions: AtomicU32,
     lost_records: AtomicU32,
-    discrete_report: Mutex<Option<DiscreteReport>>,
-    discrete_inputs: Mutex<Option<DiscreteInputs>>,
+    discrete_report: Lock<Option<DiscreteReport>>,
+    discrete_inputs: Lock<Option<DiscreteInputs>>,
     seen: AtomicU32,
     /// Tasks that must run.
     wanted: u32,
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Exchange {
     /// An exchange where nothing was said, and the other ends of its queues, of a controller that has these tasks besides.
     pub fn new(clock: Clock, is_stopped: Arc<AtomicBool>, besides: &[Task]) -> (Self, Queues) {
-        let (events, events_end) = sync_channel(EVENTS);
-        let (published, published_end) = sync_channel(PUBLISHED_POSES);
-        let (poses, poses_end) = sync_channel(POSES);
-        let (revolutions, revolutions_end) = sync_channel(REVOLUTIONS);
-        let (faults, faults_end) = sync_channel(FAULTS);
-        let (readings, readings_end) = sync_channel(READINGS);
-        let (free_revolutions, free_revolutions_end) = sync_channel(REVOLUTIONS);
+        let (events, events_end) = queue(EVENTS);
+        let (published, published_end) = queue(PUBLISHED_POSES);
+        let (poses, poses_end) = queue(POSES);
+        let (revolutions, revolutions_end) = queue(REVOLUTIONS);
+        let (faults, faults_end) = queue(FAULTS);
+        let (readings, readings_end) = queue(READINGS);
+        let (free_revolutions, free_revolutions_end) = queue(REVOLUTIONS);
         for _ in 0..REVOLUTIONS {
             // There is room for all.
-            let _ = free_revolutions.try_send(Box::default());
+            let _ = free_revolutions.send(Box::default());
         }
         let exchange = Self {
             clock,
@@ -153,25 +152,24 @@ impl Exchange {
             events,
             published,
             poses,
-            faults: (faults, Mutex::new(faults_end)),
-            readings: (readings, Mutex::new(readings_end)),
+            faults: (faults, faults_end),
+            readings: (readings, readings_end),
             has_failed: AtomicBool::new(false),
             localizer: OnceLock::new(),
-            estimate: Mutex::new(None),
-            laser: Mutex::new(SensorWatch::new()),
-            laser_speed: Mutex::new(None),
-            save: Mutex::new(None),
-            save_wanted: Condvar::new(),
-            saved: Mutex::new(None),
-            pose: Mutex::new(None),
-            bus: Mutex::new(BusState::Lost),
+            estimate: Lock::new(None),
+            laser: Lock::new(SensorWatch::new()),
+            laser_speed: Lock::new(None),
+            saves: queue(SAVES),
+            saved: Lock::new(None),
+            pose: Lock::new(None),
+            bus: Lock::new(BusState::Lost),
             is_standing: AtomicBool::new(true),
             was_localised: AtomicBool::new(false),
             lost_events: AtomicU32::new(0),
             lost_revolutions: AtomicU32::new(0),
             lost_records: AtomicU32::new(0),
-            discrete_report: Mutex::new(None),
-            discrete_inputs: Mutex::new(None),
+            discrete_report: Lock::new(None),
+            discrete_inputs: Lock::new(None),
             seen: AtomicU32::new(0),
             wanted: besides.iter().fold(ALL, |wanted, task| wanted | *task as u32),
         };
@@ -224,7 +222,7 @@ impl Exchange {
 
     /// Leaves an event to the localiser. If it is so far behind that there is no room, the event is lost and counted.
     pub fn pass_on(&self, told: Told) {
-        if self.events.try_send(told).is_err() {
+        if self.events.send(told).is_err() {
             self.lost_events.fetch_add(1, Ordering::Relaxed);
         }
         self.wake_localizer();
@@ -261,7 +259,7 @@ impl Exchange {
         if !fault.is_over && self.was_localised() {
             self.has_failed.store(true, Ordering::Relaxed);
         }
-        let _ = self.faults.0.try_send(fault);
+        let _ = self.faults.0.send(fault);
     }
 
     /// Whether the bus was told of a fault since the last call, once the vehicle has known where it is.
@@ -271,14 +269,14 @@ impl Exchange {
 
     /// The next fault, or end of one, that the bus was told of.
     pub fn next_fault(&self) -> Option<Fault> {
-        locked(&self.faults.1).try_recv().ok()
+        self.faults.1.receive()
     }
 
     /// Leaves what was published to the log and to other programs; without room it is left out.
     pub fn published(&self, published: &SentPose) {
-        let _ = self.published.try_send(*published);
-        let _ = self.poses.try_send(published.pose);
-        *locked(&self.pose) = Some(published.pose);
+        let _ = self.published.send(*published);
+        let _ = self.poses.send(published.pose);
+        *self.pose.lock() = Some(published.pose);
         if published.pose.mode.is_localised() {
             self.was_localised.store(true, Ordering::Relaxed);
         }
@@ -286,7 +284,7 @@ impl Exchange {
 
     /// The pose that was published last.
     pub fn pose(&self) -> Option<PoseOutput> {
-        *locked(&self.pose)
+        *self.pose.lock()
     }
 
     /// Whether a pose that rests on what was seen was ever published.
@@ -296,42 +294,42 @@ impl Exchange {
 
     /// The localiser has said something.
     pub fn publish(&self, estimate: Estimate) {
-        *locked(&self.estimate) = Some(estimate);
+        *self.estimate.lock() = Some(estimate);
     }
 
     /// What the localiser has said since the last call.
     pub fn newest_estimate(&self) -> Option<Estimate> {
-        locked(&self.estimate).take()
+        self.estimate.lock().take()
     }
 
     /// What is known of the laser.
     pub fn set_laser(&self, watch: SensorWatch) {
-        *locked(&self.laser) = watch;
+        *self.laser.lock() = watch;
     }
 
     /// Whether the laser can be used.
     pub fn laser_health(&self) -> LaserHealth {
-        locked(&self.laser).health(self.now())
+        self.laser.lock().health(self.now())
     }
 
     /// How fast the laser moves.
     pub fn set_laser_speed(&self, speed: SensorSpeed) {
-        *locked(&self.laser_speed) = Some(speed);
+        *self.laser_speed.lock() = Some(speed);
     }
 
     /// How fast the laser moves, by what the bus has said since the last call.
     pub fn newest_laser_speed(&self) -> Option<SensorSpeed> {
-        locked(&self.laser_speed).take()
+        self.laser_speed.lock().take()
     }
 
     /// How the bus is.
     pub fn set_bus(&self, state: BusState) {
-        *locked(&self.bus) = state;
+        *self.bus.lock() = state;
     }
 
     /// How the bus is.
     pub fn bus(&self) -> BusState {
-        *locked(&self.bus)
+        *self.bus.lock()
     }
 
     /// Whether the vehicle stands.
@@ -344,55 +342,52 @@ impl Exchange {
         self.is_standing.load(Ordering::Relaxed)
     }
 
-    /// Leaves it to another thread to store the settings, and how the controller speaks on the bus.
-    pub fn save(&self, parameters: CommunicationParameters) {
-        *locked(&self.save) = Some(parameters);
-        self.save_wanted.notify_one();
+    /// Leaves it to another thread to store the settings, and how the controller speaks on the bus. False if that has too much to store
+    /// already.
+    pub fn save(&self, parameters: CommunicationParameters) -> bool {
+        self.saves.0.send(parameters).is_ok()
     }
 
     /// Waits until somebody on the bus wants the settings stored, but no longer than that.
     pub fn wait_for_save(&self, patience: Duration) -> Option<CommunicationParameters> {
-        let guard = locked(&self.save);
-        let waited = self.save_wanted.wait_timeout_while(guard, patience, |save| save.is_none());
-        let (mut guard, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        guard.take()
+        self.saves.1.wait(Instant::now() + patience).ok().flatten()
     }
 
     /// What was wanted is stored, or could not be.
     pub fn tell_saved(&self, is_stored: bool) {
-        *locked(&self.saved) = Some(is_stored);
+        *self.saved.lock() = Some(is_stored);
     }
 
     /// Whether what was wanted is stored, once that is known.
     pub fn saved(&self) -> Option<bool> {
-        locked(&self.saved).take()
+        self.saved.lock().take()
     }
 
     /// The machine's own gyro has told a rate. If there is no room for it, it is lost and counted.
     pub fn pass_gyro(&self, sample: GyroSample) {
-        if self.readings.0.try_send(sample).is_err() {
+        if self.readings.0.send(sample).is_err() {
             self.lost_events.fetch_add(1, Ordering::Relaxed);
         }
     }
 
     /// The next rate that it has told.
     pub fn next_gyro(&self) -> Option<GyroSample> {
-        locked(&self.readings.1).try_recv().ok()
+        self.readings.1.receive()
     }
 
     /// What wires are to say.
     pub fn set_discrete_report(&self, report: DiscreteReport) {
-        *locked(&self.discrete_report) = Some(report);
+        *self.discrete_report.lock() = Some(report);
     }
 
     /// What wires are to say. None before the bus has begun.
     pub fn discrete_report(&self) -> Option<DiscreteReport> {
-        *locked(&self.discrete_report)
+        *self.discrete_report.lock()
     }
 
     /// What wires say. A reset and a line that has failed stay until the bus has heard of them.
     pub fn set_discrete_inputs(&self, inputs: DiscreteInputs) {
-        let mut waiting = locked(&self.discrete_inputs);
+        let mut waiting = self.discrete_inputs.lock();
         let before = waiting.unwrap_or_default();
         *waiting = Some(DiscreteInputs {
             is_reset: inputs.is_reset || before.is_reset,
@@ -403,7 +398,7 @@ impl Exchange {
 
     /// What wires have said since the last call.
     pub fn newest_discrete_inputs(&self) -> Option<DiscreteInputs> {
-        locked(&self.discrete_inputs).take()
+        self.discrete_inputs.lock().take()
     }
 
     /// A thread has run.

@@ -54,7 +54,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
     }
 
     fn take_bus_event(&mut self) -> bool {
-        let Ok(told) = self.queues.events.try_recv() else { return false };
+        let Some(told) = self.queues.events.receive() else { return false };
         if let Some(progress) = told.progress {
             self.log_published(progress.told.wrapping_sub(1));
         }
@@ -73,7 +73,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
     }
 
     fn take_revolution(&mut self) -> bool {
-        let Ok(revolution) = self.queues.revolutions.try_recv() else { return false };
+        let Some(revolution) = self.queues.revolutions.receive() else { return false };
         let Self { localization, log, .. } = self;
         localization.revolution(&revolution, |record| log.write(record));
         // Where places look alike, the search alone does not end.
@@ -87,7 +87,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
             self.kept = None;
         }
         self.tell();
-        let _ = self.queues.free_revolutions.try_send(revolution);
+        let _ = self.queues.free_revolutions.send(revolution);
         true
     }
 
@@ -109,7 +109,7 @@ impl<L: Localize> LocalizerLoop<'_, L> {
     /// range is later.
     fn log_published(&mut self, told: u32) {
         let Self { localization, queues, log, waiting, .. } = self;
-        while let Some(next) = waiting.take().or_else(|| queues.published.try_recv().ok()) {
+        while let Some(next) = waiting.take().or_else(|| queues.published.receive()) {
             if next.progress.told.wrapping_sub(told) as i32 > 0 {
                 *waiting = Some(next);
                 return;

@@ -1,6 +1,6 @@
 //! The log on its way to whoever listens, and to the disk.
 
-use std::sync::mpsc::RecvTimeoutError;
+use std::time::Instant;
 
 use agv_core::measurement::Time;
 
@@ -11,6 +11,7 @@ use super::log_queue::{LogItem, LogReader};
 use super::log_ring::LogRing;
 use crate::live::relay::Relay;
 use crate::log::LogError;
+use crate::sync::queue::Closed;
 
 /// The log on the disk: the file of the whole run, and the ring, where they are wanted.
 pub(super) struct LogDisk<'a> {
@@ -87,16 +88,16 @@ impl<'a> LogDisk<'a> {
 /// Passes the log on to those who listen, and to the disk, until everything ends and nothing is left.
 pub(super) fn pass_log(log: &LogReader, relay: &Relay, mut disk: LogDisk, exchange: &Exchange) {
     loop {
-        match log.full.recv_timeout(LOOK) {
-            Ok(item) => {
+        match log.full.wait(Instant::now() + LOOK) {
+            Ok(Some(item)) => {
                 if let LogItem::Frame(frame) = &item {
                     relay.pass_frame(frame.bytes());
                 }
                 disk.take(&item, exchange.now());
                 log.give_back(item);
             }
-            Err(RecvTimeoutError::Timeout) if !exchange.is_over() => {}
-            Err(_) => return disk.finish(exchange.now()),
+            Ok(None) if !exchange.is_over() => {}
+            Ok(None) | Err(Closed) => return disk.finish(exchange.now()),
         }
         disk.look(exchange.now());
     }

@@ -1,6 +1,5 @@
 //! The log on its way from the localiser to whoever listens, in frames that are made once and used again and again.
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
 use agv_controller::Estimate;
@@ -12,6 +11,7 @@ use agv_core::record::{Record, encode};
 use super::exchange::Exchange;
 use super::incident::{Incident, IncidentWatch};
 use super::state_keeper::{StateKeeper, States};
+use crate::sync::queue::{Receiver, Sender, queue};
 
 /// Frames that wait: half a second of the records of encoders and gyro at 100 Hz each, poses at 100 Hz, and a laser.
 const FRAMES: usize = 256;
@@ -56,25 +56,25 @@ struct Parts {
 pub(super) struct LogWriter<'a> {
     sequence: u32,
     free: Receiver<LogFrame>,
-    full: SyncSender<LogItem>,
+    full: Sender<LogItem>,
     exchange: &'a Exchange,
     parts: Option<Parts>,
 }
 
 /// The other end.
 pub(super) struct LogReader {
-    free: SyncSender<LogFrame>,
-    free_states: Option<SyncSender<Box<States>>>,
+    free: Sender<LogFrame>,
+    free_states: Option<Sender<Box<States>>>,
     pub full: Receiver<LogItem>,
 }
 
 /// A queue, whose frames are numbered behind those that a log begins with.
 pub(super) fn log_queue(exchange: &Exchange, first: u32) -> (LogWriter<'_>, LogReader) {
-    let (free_end, free) = sync_channel(FRAMES);
-    let (full, full_end) = sync_channel(FRAMES + OTHERS);
+    let (free_end, free) = queue(FRAMES);
+    let (full, full_end) = queue(FRAMES + OTHERS);
     for _ in 0..FRAMES {
         // There is room for all.
-        let _ = free_end.try_send(LogFrame { bytes: vec![0; LONGEST].into(), length: 0 });
+        let _ = free_end.send(LogFrame { bytes: vec![0; LONGEST].into(), length: 0 });
     }
     let writer = LogWriter { sequence: first, free, full, exchange, parts: None };
     (writer, LogReader { free: free_end, free_states: None, full: full_end })
@@ -102,13 +102,13 @@ impl LogWriter<'_> {
             parts.keeper.take(record);
             if let Record::Published(published) = record { parts.watch.see(&published.pose) } else { None }
         });
-        let Ok(mut frame) = self.free.try_recv() else { return self.exchange.lose_record() };
+        let Some(mut frame) = self.free.receive() else { return self.exchange.lose_record() };
         frame.length = encode(record, sequence, &mut frame.bytes).unwrap_or_else(|_| {
             self.exchange.lose_record();
             0
         });
         // There are no more of them than there is room for.
-        let _ = self.full.try_send(LogItem::Frame(frame));
+        let _ = self.full.send(LogItem::Frame(frame));
         if let Some(incident) = incident {
             self.tell(incident);
         }
@@ -117,7 +117,7 @@ impl LogWriter<'_> {
     /// Queues an incident.
     pub fn tell(&mut self, incident: Incident) {
         if self.parts.is_some() {
-            let _ = self.full.try_send(LogItem::Incident(incident));
+            let _ = self.full.send(LogItem::Incident(incident));
         }
     }
 
@@ -137,7 +137,7 @@ impl LogWriter<'_> {
         }
         if let Some(states) = parts.keeper.states(localizer) {
             parts.begun = now;
-            let _ = self.full.try_send(LogItem::States(states, self.sequence));
+            let _ = self.full.send(LogItem::States(states, self.sequence));
         }
     }
 }
@@ -147,10 +147,10 @@ impl LogReader {
     pub fn give_back(&self, item: LogItem) {
         match item {
             LogItem::Frame(frame) => {
-                let _ = self.free.try_send(frame);
+                let _ = self.free.send(frame);
             }
             LogItem::States(states, _) => {
-                let _ = self.free_states.as_ref().map(|free| free.try_send(states));
+                let _ = self.free_states.as_ref().map(|free| free.send(states));
             }
             LogItem::Incident(_) => {}
         }

@@ -4,8 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use agv_core::integrity::{Alarm, AlertLimits};
 use agv_core::state::{Mode, PoseOutput, ProtectionLevel};
@@ -13,6 +12,7 @@ use serde::Serialize;
 
 use super::exchange::Exchange;
 use crate::drive::{mode_name, reason_name};
+use crate::sync::queue::{Closed, Receiver};
 
 /// Waits are cut into pieces of this length, so that everything can end.
 const LOOK: Duration = Duration::from_millis(20);
@@ -130,10 +130,10 @@ impl PoseSinks {
     /// Tells the poses that come until everything ends.
     pub fn run(mut self, poses: Receiver<PoseOutput>, limits: &AlertLimits, exchange: &Exchange) {
         while !exchange.is_over() {
-            match poses.recv_timeout(LOOK) {
-                Ok(output) => self.tell(&PoseLine::of(&output, limits)),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
+            match poses.wait(Instant::now() + LOOK) {
+                Ok(Some(output)) => self.tell(&PoseLine::of(&output, limits)),
+                Ok(None) => {}
+                Err(Closed) => return,
             }
             self.accept();
         }

@@ -1,13 +1,12 @@
 //! What a log that begins in the middle of a drive must know: the state of the localiser, and of the bus's predictor, which is followed
 //! beside the log as a replay follows it.
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-
 use agv_controller::Estimate;
 use agv_core::localizer::{Localize, Parameters};
 use agv_core::record::Record;
 
 use crate::replay::{Answer, LoggedPredictor};
+use crate::sync::queue::{Receiver, Sender, queue};
 
 /// Answers that are remembered: the bus is behind by no more events than may wait for the localiser, and some more.
 const ANSWERS: usize = 512;
@@ -51,11 +50,11 @@ pub(super) struct StateKeeper {
 
 impl StateKeeper {
     /// A keeper of a localiser of so many bytes, and where states go back to.
-    pub fn new(parameters: &Parameters, size: usize) -> (Self, SyncSender<Box<States>>) {
-        let (give_back, free) = sync_channel(STATES);
+    pub fn new(parameters: &Parameters, size: usize) -> (Self, Sender<Box<States>>) {
+        let (give_back, free) = queue(STATES);
         for _ in 0..STATES {
             // There is room for all.
-            let _ = give_back.try_send(Box::new(States::new(size)));
+            let _ = give_back.send(Box::new(States::new(size)));
         }
         let keeper = Self {
             predictor: LoggedPredictor::new(parameters),
@@ -95,7 +94,7 @@ impl StateKeeper {
         if !self.is_level {
             return None;
         }
-        let mut states = self.free.try_recv().ok()?;
+        let mut states = self.free.receive()?;
         let States { localizer: of_localizer, predictor, lengths } = &mut *states;
         // There is room: see `States::new`.
         let localizer = localizer.save_state(of_localizer).unwrap_or_default();

@@ -139,7 +139,7 @@ impl Stepped<'_> {
     fn localize(&mut self) {
         while self.localizer.step() {}
         let now = self.exchange.now();
-        while let Ok(item) = self.log.full.try_recv() {
+        while let Some(item) = self.log.full.receive() {
             self.disk.take(&item, now);
             self.log.give_back(item);
         }
