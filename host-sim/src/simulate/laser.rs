@@ -25,9 +25,9 @@ pub struct LaserTrack {
 }
 
 impl LaserTrack {
-    /// The track of a laser whose mounting (S in R) depends on the time since the first state, s.
+    /// The track of a laser whose mounting (S in R) depends on the vehicle's pose, and on the time since the first state, s.
     #[must_use]
-    pub fn new(motion: &Motion, mounting: impl Fn(f64) -> Pose) -> Self {
+    pub fn new(motion: &Motion, mounting: impl Fn(&Pose, f64) -> Pose) -> Self {
         let mut heading = 0.0;
         let mut previous = 0.0;
         let (positions, headings) = motion
@@ -35,7 +35,7 @@ impl LaserTrack {
             .iter()
             .enumerate()
             .map(|(index, state)| {
-                let pose = state.pose.compose(&mounting(index as f64 * motion.interval));
+                let pose = state.pose.compose(&mounting(&state.pose, index as f64 * motion.interval));
                 heading += agv_core::geometry::difference(pose.theta, previous);
                 previous = pose.theta;
                 (pose.position(), heading)
@@ -162,9 +162,10 @@ pub fn scan(revolution: &Revolution, noise: &mut Random, faults: &mut Random) ->
     for beam in 0..count {
         let time = scan_start + beam as f64 * beam_interval;
         let bearing = FIRST_BEARING + beam as f64 * bearing_step;
-        let (origin, heading) = track.at(time);
+        let (origin, heading) = track.at(options.measured(time));
         let (bearing_error, range_error) = (bearing_noise * noise.normal(), noise.normal());
-        let angle = heading + bearing + bearing_error;
+        // Told is where the beam would be without the error.
+        let angle = heading + bearing - options.systematic.bearing(bearing) + bearing_error;
         let hit = scene.first_hit(&origin, &unit(angle), options.farthest, time);
         let mut distance = hit.map(|hit| hit.distance);
         if options.mixed_share > 0.0 {
@@ -173,7 +174,7 @@ pub fn scan(revolution: &Revolution, noise: &mut Random, faults: &mut Random) ->
         let is_lost = is_lost(bearing, options, faults);
         let range = distance.filter(|_| !is_lost).map_or(0.0, |distance| {
             let deviation = if distance > FAR { options.far_range_noise } else { options.range_noise };
-            distance + deviation * range_error
+            options.systematic.range(distance, 1.0) + deviation * range_error
         });
         let is_return = range >= options.nearest && range <= options.farthest;
         ranges.push(if is_return { range as f32 } else { 0.0 });

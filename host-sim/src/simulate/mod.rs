@@ -4,6 +4,7 @@
 //! elementary functions are those of `libm`.
 
 pub mod block_storage;
+pub mod floor;
 pub mod gyro;
 pub mod laser;
 pub mod multi_beam;
@@ -11,6 +12,7 @@ pub mod odometer;
 pub mod path;
 pub mod people;
 pub mod random;
+pub mod random_field;
 pub mod raycast;
 pub mod reflector_detector;
 pub mod scenario;
@@ -30,10 +32,12 @@ use agv_core::measurement::Time;
 use agv_core::odometry::{Ackermann, Tricycle, Wheel, WheelBased};
 
 use crate::recording::{RecordedEvent, Recording, Truth};
+use floor::Floor;
 use laser::{LaserTrack, Revolution, Scene};
 use odometer::SpeedWheel;
 use path::Path;
 use random::{Random, Stream};
+use random_field::RandomField;
 use raycast::RayCaster;
 use scenario::{MotionReport, Scenario, ScenarioError, believed_parameters, believed_tricycle, believed_wheels};
 use vehicle::Motion;
@@ -96,11 +100,12 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
             arrivals.add(sample.time, RecordedEvent::Gyro(sample));
         }
     }
+    let floor = Floor::new(&scenario.floor, &mut Random::new(scenario.seed, Stream::Floor));
     report_laser(
         &mut arrivals,
         scenario,
         &world,
-        &LaserTrack::new(&motion, |time| scenario.laser.moved(&true_laser, time)),
+        &LaserTrack::new(&motion, |pose, time| floor.tilted(pose, &scenario.laser.moved(&true_laser, time))),
     );
 
     let truth = motion
@@ -175,6 +180,10 @@ fn start_fix(scenario: &Scenario, truth: &Pose) -> PoseFix {
 fn survey(scenario: &Scenario, world: &World) -> Vec<Landmark> {
     let deviation = scenario.reflectors.survey_deviation;
     let mut random = Random::new(scenario.seed, Stream::Survey);
+    let mut shared = Random::new(scenario.seed, Stream::SurveyField);
+    let mut field =
+        || RandomField::new(scenario.reflectors.correlated_survey, scenario.reflectors.survey_length, &mut shared);
+    let fields = [field(), field()];
     world
         .reflectors
         .iter()
@@ -182,8 +191,8 @@ fn survey(scenario: &Scenario, world: &World) -> Vec<Landmark> {
         .map(|(reflector, id)| Landmark {
             id,
             kind: LandmarkKind::Reflector,
-            x: reflector.body.centre.x + deviation * random.normal(),
-            y: reflector.body.centre.y + deviation * random.normal(),
+            x: reflector.body.centre.x + fields[0].at(&reflector.body.centre) + deviation * random.normal(),
+            y: reflector.body.centre.y + fields[1].at(&reflector.body.centre) + deviation * random.normal(),
             deviation: deviation as f32,
         })
         .collect()

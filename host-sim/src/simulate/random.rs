@@ -42,6 +42,14 @@ pub enum Stream {
     Pairs = 17,
     /// Bias and noise of a gyro.
     Gyro = 18,
+    /// The height of the floor.
+    Floor = 19,
+    /// Errors of the reflector survey that near reflectors share.
+    SurveyField = 20,
+    /// Errors of a vehicle in order.
+    Nominal = 21,
+    /// Which hall, drive, noise and faults belong to a run.
+    Scenes = 22,
 }
 
 /// One sequence of random numbers.

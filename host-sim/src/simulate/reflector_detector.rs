@@ -30,7 +30,7 @@ pub fn detect(
         let noise = (random.normal(), random.normal());
         let is_missed = random.happens(options.missing_share);
         let time = crossing(reflector, track, laser, scan_start);
-        let (origin, heading) = track.at(time);
+        let (origin, heading) = track.at(laser.measured(time));
         let offset = reflector.body.centre - origin;
         let distance = offset.norm();
         if is_missed || distance > reflector.farthest.min(options.farthest) || distance < laser.nearest {
@@ -43,8 +43,8 @@ pub fn detect(
         let bearing = libm::atan2(offset.y, offset.x) - heading;
         seen.push(observation(
             drive_start.offset(time),
-            distance + options.range_noise * noise.0,
-            bearing + bearing_noise * noise.1,
+            laser.systematic.range(distance, reflector.cosine_of_incidence(&origin)) + options.range_noise * noise.0,
+            bearing + laser.systematic.bearing(bearing) + bearing_noise * noise.1,
         ));
     }
     for _ in 0..seen.len().max(1) {
@@ -53,7 +53,7 @@ pub fn detect(
         if is_false {
             let time = scan_start + beam * beam_interval(laser);
             let bearing = FIRST_BEARING + beam * bearing_step(laser);
-            let (origin, heading) = track.at(time);
+            let (origin, heading) = track.at(laser.measured(time));
             if let Some(hit) = scene.first_hit(&origin, &unit(heading + bearing), options.farthest, time)
                 && hit.distance >= laser.nearest
             {
@@ -74,7 +74,7 @@ fn crossing(reflector: &Reflector, track: &LaserTrack, laser: &LaserOptions, sca
     let period = 1.0 / laser.frequency;
     let mut time = scan_start + 0.5 * period;
     for _ in 0..CROSSING_STEPS {
-        let (origin, heading) = track.at(time);
+        let (origin, heading) = track.at(laser.measured(time));
         let offset = reflector.body.centre - origin;
         let beam_bearing = FIRST_BEARING + (time - scan_start) / period * std::f64::consts::TAU;
         let lead = difference(libm::atan2(offset.y, offset.x) - heading, beam_bearing);

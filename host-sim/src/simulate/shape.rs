@@ -71,6 +71,14 @@ impl Reflector {
             off.abs() <= sector.half_width
         })
     }
+
+    /// Cosine of the angle between its normal and the ray from `from` (W, m): a flat foil looks to the middle of its sector, one on a
+    /// cylinder to wherever it is seen from.
+    #[must_use]
+    pub fn cosine_of_incidence(&self, from: &Point) -> f64 {
+        let direction = from - self.body.centre;
+        self.sector.map_or(1.0, |sector| libm::cos(libm::atan2(direction.y, direction.x) - sector.middle))
+    }
 }
 
 impl Rectangle {

@@ -9,5 +9,6 @@ mod reflectors;
 mod scenario;
 mod scenario_reference;
 mod support;
+mod systematic;
 mod wheels;
 mod world;

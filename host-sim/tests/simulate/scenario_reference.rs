@@ -81,7 +81,7 @@ const EVERYTHING: [&str; 3] = [
     "[world]\nkind = \"shapes\"\nwalls = [[0, 0, 1, 0]]\nrectangles = [{ x = 0, y = 0, length = 1, width = 1 }]\n\
      circles = [{ x = 0, y = 0, radius = 1 }]\nreflectors = [{ x = 0, y = 0, facing_deg = 1 }]\n\
      [path]\nkind = \"legs\"\nlegs = [{ segments = [{ length = 1.0 }] }]\n\
-     [laser]\ndirty_sectors = [{ from_deg = 0, to_deg = 1, lost_share = 0.5 }]\nknocks = [{ from = 1 }]\n\
+     [laser]\ndirty_sectors = [{ from_deg = 0, to_deg = 1, lost_share = 0.5 }]\nknocks = [{ from = 1 }]\nages = [{ from = 1, seconds = 0.01 }]\n\
      [drive]\ncarries = [{ from = 1 }]\n\
      [odometry]\nslips = [{ from = 1, lasts = 1, share = 0.1 }]\n\
      [gyro]\nfaults = [{ from = 1, lasts = 1 }]\n\

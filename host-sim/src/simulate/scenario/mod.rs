@@ -5,19 +5,23 @@
 
 mod believed;
 mod check;
+mod floor;
 mod gyro;
 pub mod keys;
 mod line;
 mod sensors;
 mod start;
+mod systematic;
 mod vehicle;
 mod way;
 mod world;
 
 pub use believed::{believed_parameters, believed_tricycle, believed_wheels};
+pub use floor::FloorOptions;
 pub use gyro::{GyroFault, GyroOptions};
-pub use sensors::{DirtySector, Knock, LaserOptions, ReflectorOptions};
+pub use sensors::{DataAge, DirtySector, Knock, LaserOptions, ReflectorOptions};
 pub use start::{PersonOptions, StartOptions};
+pub use systematic::SystematicErrors;
 pub use vehicle::{
     BelievedVehicle, Carry, DriveOptions, MotionReport, OdometryOptions, Slip, VehicleErrors, VehicleOptions,
 };
@@ -123,6 +127,8 @@ pub struct Scenario {
     pub laser: LaserOptions,
     /// Detection and survey of reflectors.
     pub reflectors: ReflectorOptions,
+    /// The floor.
+    pub floor: FloorOptions,
     /// The start pose that the localiser is given.
     pub start: StartOptions,
     /// Who walks about.
