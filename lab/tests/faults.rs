@@ -9,10 +9,10 @@ use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Carry, Scenario};
 use agv_host_sim::simulate::{START, Simulation, simulate};
 use agv_lab::campaign::fault::{Fault, FaultKind, simulate_with};
-use agv_lab::trust::hall;
+use agv_lab::trust::hall::{self, Generator};
 
 fn quiet(seed: u64) -> Scenario {
-    let mut scenario = hall::draw(seed).scenario;
+    let mut scenario = hall::draw(Generator::Racks, seed).scenario;
     scenario.laser.scans = false;
     scenario
 }
@@ -176,4 +176,61 @@ fn reflectors_that_stand_there_are_seen_and_not_in_the_map() {
     let all = |recording: &Recording| revolutions(recording).map(Vec::len).sum::<usize>();
     assert!(all(&found.recording) > all(&sound) + 500, "{} {}", all(&found.recording), all(&sound));
     assert!(simulate_with(&Scenario::default(), &[&stand], &mut random()).is_err());
+}
+
+/// A layout of two sessions, or a bent one: what is laid onto the true one is laid as well as it fits, and what is not has its first half,
+/// or its ends, where they were.
+#[test]
+fn a_layout_of_two_sessions_is_distorted_as_it_is_stated() {
+    let before = simulate(&quiet(4)).unwrap().recording.landmarks;
+    let mislead = |what| {
+        let mut recording = simulate(&quiet(4)).unwrap().recording;
+        fault(what).mislead(&mut recording, &mut Random::new(4, Stream::Faults));
+        recording.landmarks
+    };
+    let middle = before.iter().map(|landmark| landmark.x).sum::<f64>() / before.len() as f64;
+    let kinds: [fn(bool) -> FaultKind; 3] = [
+        |is_laid| FaultKind::SessionTurned { deg: 0.5, is_laid },
+        |is_laid| FaultKind::SessionShifted { metres: 0.2, is_laid },
+        |is_laid| FaultKind::LayoutBent { metres: 0.3, is_laid },
+    ];
+    for (number, kind) in kinds.iter().enumerate() {
+        let after = mislead(kind(false));
+        let moved: Vec<Point> =
+            before.iter().zip(&after).map(|(one, other)| other.position() - one.position()).collect();
+        let most = moved.iter().map(Point::norm).fold(0.0, f64::max);
+        if number < 2 {
+            assert!(before.iter().zip(&moved).all(|(one, moved)| (one.x > middle) == (moved.norm() > 1e-9)));
+        }
+        match number {
+            // Distances within a session stay, and its farthest place turns the most.
+            0 => {
+                let lever = before.iter().map(|one| one.x - middle).fold(0.0, f64::max);
+                assert!(most > 0.99 * lever * 0.5_f64.to_radians(), "{most}");
+            }
+            1 => assert!((most - 0.2).abs() < 1e-9),
+            _ => assert!(moved.iter().all(|moved| moved.x == 0.0 && (0.0..=0.3).contains(&moved.y)) && most > 0.25),
+        }
+        // Nothing that turns or shifts all of it brings it nearer: no mean, no moment.
+        let laid = mislead(kind(true));
+        let mean = |landmarks: &[agv_core::maps::Landmark]| {
+            landmarks.iter().map(|one| one.position()).sum::<Point>() / landmarks.len() as f64
+        };
+        let (from, to) = (mean(&before), mean(&laid));
+        assert!((from - to).norm() < 1e-9, "{number}");
+        let moment: f64 = before
+            .iter()
+            .zip(&laid)
+            .map(|(one, other)| {
+                let (one, other) = (one.position() - from, other.position() - to);
+                one.x * other.y - one.y * other.x
+            })
+            .sum();
+        assert!(moment.abs() < 1e-6, "{number}: {moment}");
+        // And it is as distorted as the other one: distances of places are the same.
+        let far = |landmarks: &[agv_core::maps::Landmark]| {
+            (landmarks[0].position() - landmarks[landmarks.len() - 1].position()).norm()
+        };
+        assert!((far(&laid) - far(&after)).abs() < 1e-9, "{number}");
+    }
 }

@@ -2,22 +2,33 @@
 
 use std::path::Path;
 
-use agv_core::geometry::Pose;
+use agv_core::geometry::{Point, Pose};
 use agv_core::integrity::{Alarm, AlertLimit, AlertLimits, ProtectionLevel};
-use agv_core::localizer::Reason;
+use agv_core::localizer::{Parameters, Reason};
 use agv_core::measurement::Time;
 use agv_core::state::Mode;
+use agv_host_sim::recording::RecordedEvent;
+use agv_host_sim::simulate::scenario::WorldOptions;
+use agv_host_sim::simulate::simulate;
 use agv_lab::campaign::Shard;
+use agv_lab::equipment::Equipment;
 use agv_lab::evaluate::levels;
 use agv_lab::trust::exact_bound;
 use agv_lab::trust::figures::figures;
+use agv_lab::trust::hall::{Generator, SKETCHES, Sketch, sketch};
 use agv_lab::trust::judge::{Judge, MOST_OVER, Moment, STEP};
 use agv_lab::trust::kinds::{self, Drawn, NOTHING};
+use agv_lab::trust::nominal::NominalWorld;
 use agv_lab::trust::outcome::Outcome;
 use agv_lab::trust::row::{self, Row, RowsError};
 use agv_lab::trust::trial::{Tested, Trial};
 use agv_lab::trust::{hall, pair, sweep};
 use agv_wire::can::controller::{Health, PublishedPose};
+
+/// The world in which the scenes below were found.
+fn easy() -> Tested<'static> {
+    Tested { world: NominalWorld::Easy, ..Tested::default() }
+}
 
 /// A pose in the origin with a protection level of 10 cm and 1 deg.
 fn pose() -> PublishedPose {
@@ -81,6 +92,34 @@ fn an_error_above_the_protection_level_misleads_and_above_the_alert_limit_is_haz
     let wide = PublishedPose { level: ProtectionLevel { position: 0.2, heading: 0.01 }, ..pose() };
     let warned = judge(&[(1000, wide, 0.3)]);
     assert_eq!((warned.misleading, warned.hazards, warned.available), (1000, 0, 0));
+}
+
+#[test]
+fn what_is_hidden_fails_only_where_all_counts() {
+    let limits = AlertLimits::default();
+    // Half a second in all, of which two fifths are hidden: without them it is no failure.
+    let spans = [(20, false), (20, true), (10, false)];
+    let mut judge = Judge::new(limits);
+    let (heard, mut now) = (pose(), Time::from_seconds(10.0));
+    for (count, is_hidden) in spans {
+        for _ in 0..count {
+            now = now.offset(STEP);
+            judge.hear(&Moment {
+                now,
+                heard: Some((&heard, now)),
+                truth: Some(Pose::new(0.16, 0.0, 0.0)),
+                driven: 0.0,
+                docks: false,
+                is_nominal: false,
+                is_bare: false,
+                has_begun: true,
+                is_hidden,
+            });
+        }
+    }
+    let outcome = judge.outcome();
+    assert_eq!((outcome.failures, outcome.failures_of_all, outcome.hidden_hazardous), (0, 1, 20));
+    assert_eq!(self::judge(&[(1000, pose(), 0.16)]).failures_of_all, 1);
 }
 
 #[test]
@@ -207,6 +246,7 @@ fn pairs_count_in_the_totals_but_where_one_hides_the_other() {
         size,
         with: with.map(|(kind, size)| (kind.to_owned(), size)),
         seed: 1,
+        scene: 1,
         is_accepted: true,
         can_recover: false,
         outcome: Some(Outcome { failures, hazards: failures, outputs: 100, ..Outcome::default() }),
@@ -254,11 +294,91 @@ fn a_fault_is_found_when_the_bus_says_so() {
     assert_eq!(outcome(Reason::None, 0).stanford, [(81 * 20 + 2, 400)].into());
 }
 
+/// Every sketch is drawn, drivable, and what its name says.
+#[test]
+fn sketches_are_what_they_are_called() {
+    for seed in 0..70 {
+        let hall = hall::draw(Generator::Sketches, seed);
+        hall.scenario.check().unwrap();
+        let mut quiet = hall.scenario.clone();
+        (quiet.laser.scans, quiet.reflectors.missing_share, quiet.reflectors.false_share) = (false, 0.0, 0.0);
+        let drive = simulate(&quiet).unwrap();
+        let seen: Vec<usize> = drive
+            .recording
+            .events
+            .iter()
+            .filter_map(|event| match event {
+                RecordedEvent::Reflectors(seen) => Some(seen.observations.len()),
+                _ => None,
+            })
+            .collect();
+        assert!(drive.path.length() > 60.0 && seen.len() > 400, "{seed}: {} m", drive.path.length());
+        let reflectors = drive.world.reflectors.iter().map(|reflector| reflector.body.centre);
+        let places: Vec<_> = reflectors.collect();
+        let share =
+            |is: &dyn Fn(usize) -> bool| seen.iter().filter(|count| is(**count)).count() as f64 / seen.len() as f64;
+        match sketch(seed) {
+            Sketch::Grid | Sketch::Periodic => assert!(share(&|count| count >= 3) > 0.9, "{seed}"),
+            Sketch::ThreeInSight => {
+                assert!(hall.is_accepted, "{seed}");
+                assert!(share(&|count| (3..=5).contains(&count)) > 0.7, "{seed}: {}", share(&|count| count == 3));
+            }
+            Sketch::OneLine => assert!(places.iter().all(|place| (place.y - places[0].y).abs() < 1e-9), "{seed}"),
+            Sketch::Far => {
+                let truth = drive.recording.truth.iter().step_by(50);
+                let nearest = truth
+                    .flat_map(|sample| places.iter().map(|place| (place - sample.pose.position()).norm()))
+                    .fold(f64::INFINITY, f64::min);
+                assert!(nearest > 20.0, "{seed}: {nearest}");
+            }
+            Sketch::Fast => assert!((hall.scenario.drive.speed - 2.5).abs() < 1e-9, "{seed}"),
+            Sketch::Symmetric => {
+                let WorldOptions::Shapes(shapes) = &hall.scenario.world else { panic!() };
+                let far = |axis: usize| shapes.walls.iter().map(|wall| wall[axis]).fold(0.0, f64::max);
+                let corner = Point::new(far(0), far(1));
+                let has_twin = |place: &&Point| places.iter().any(|other| (corner - **place - other).norm() < 1e-9);
+                let odd = places.iter().filter(|place| !has_twin(place)).count();
+                assert!((1..=3).contains(&odd) && places.len() > 8, "{seed}: {odd} of {}", places.len());
+            }
+        }
+    }
+    assert_eq!(SKETCHES.map(|one| SKETCHES.iter().filter(|other| **other == one).count()), [1; 7]);
+}
+
+/// What a hard world changes, and by how much at most; an easy one is as the hall was drawn.
+#[test]
+fn a_hard_world_has_what_is_stated() {
+    let (mut biases, mut last) = (Vec::new(), None);
+    for seed in 1..=200 {
+        let drawn = hall::draw(Generator::Racks, seed).scenario;
+        let mut easy = drawn.clone();
+        NominalWorld::Easy.apply(&mut easy);
+        assert_eq!(easy, drawn);
+        let mut hard = drawn.clone();
+        NominalWorld::Hard.apply(&mut hard);
+        hard.check().unwrap();
+        let stated = Parameters::new(Equipment::default().believed(), Pose::default()).odometry_noise;
+        assert_eq!((hard.odometry.slip, hard.odometry.side_slip), (stated.slip, stated.side_slip));
+        assert!((hard.odometry.yaw_walk_deg.to_radians() - stated.yaw).abs() < 1e-12);
+        let errors = hard.laser.systematic;
+        assert!(
+            errors.range_bias.abs() <= 0.01 && errors.range_scale.abs() <= 5e-4 && errors.first_harmonic_deg <= 0.05
+        );
+        assert_ne!(last.replace(errors), Some(errors));
+        biases.push(errors.range_bias);
+        assert!(hard.floor.deviation > 0.0 && hard.reflectors.correlated_survey > 0.0);
+    }
+    // Uniform within 10 mm: a deviation of 10 mm over the root of three, to a tenth.
+    let variance = biases.iter().map(|bias| bias * bias).sum::<f64>() / biases.len() as f64;
+    assert!((variance.sqrt() - 0.01 / 3.0_f64.sqrt()).abs() < 6e-4, "{variance}");
+}
+
 #[test]
 fn halls_differ_and_a_sound_vehicle_finds_itself_in_them() {
     let kinds = kinds::read(&scenarios("trust.toml")).unwrap().kinds;
     let sound: Vec<_> = kinds.into_iter().filter(|kind| kind.name == NOTHING).collect();
-    let counts: Vec<usize> = (1..=20).map(|seed| hall::draw(seed).scenario.build_world().reflectors.len()).collect();
+    let counts: Vec<usize> =
+        (1..=20).map(|seed| hall::draw(Generator::Racks, seed).scenario.build_world().reflectors.len()).collect();
     assert!(counts.iter().min() < counts.iter().max(), "{counts:?}");
     let rows = sweep::run(&sweep::sweep(&sound, 2, 1), Shard::ALL, &Tested::default(), || ()).unwrap();
     let found = figures(&rows, &[], &kinds::read(&scenarios("trust.toml")).unwrap());
@@ -337,6 +457,7 @@ fn the_worst_size_of_a_fault_is_one_at_which_it_is_there() {
         size,
         with: None,
         seed: 1,
+        scene: 1,
         is_accepted: true,
         can_recover: false,
         outcome: Some(Outcome { most_over_level, misleading, ..Outcome::default() }),
@@ -357,6 +478,7 @@ fn rows_of_parts_are_those_of_the_whole() {
         size,
         with: None,
         seed,
+        scene: seed,
         is_accepted: true,
         can_recover: false,
         outcome: Some(Outcome { most_over_level: 0.1 * size, claims: seed, ..Outcome::default() }),
@@ -401,7 +523,7 @@ fn a_knock_by_which_the_vehicle_was_lost_is_held_once_it_has_found_itself() {
     let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
     for (name, size, seed) in [("laser shifted to the left", 0.3, 20), ("laser shifted forward", 0.6, 50_209)] {
         let kind = catalogue.kinds.iter().find(|kind| kind.name == name).unwrap();
-        let tried = Trial { kind, size, with: None, seed }.run(&Tested::default()).unwrap();
+        let tried = Trial::in_scene((kind, size), None, seed).run(&easy()).unwrap();
         assert_eq!(tried.outcome.failures, 0, "{name}: {} s", tried.outcome.worst_hazard_s);
         assert!(tried.outcome.found.is_some(), "{name}");
     }
@@ -412,7 +534,7 @@ fn a_knock_by_which_the_vehicle_was_lost_is_held_once_it_has_found_itself() {
 fn a_vehicle_that_is_carried_to_where_no_reflector_is_says_so() {
     let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
     let kind = catalogue.kinds.iter().find(|kind| kind.name == "carried on").unwrap();
-    let tried = Trial { kind, size: 9.0, with: None, seed: 50_216 }.run(&Tested::default()).unwrap();
+    let tried = Trial::in_scene((kind, 9.0), None, 50_216).run(&easy()).unwrap();
     assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
 }
 
@@ -424,7 +546,7 @@ fn sound_drives_are_available_all_the_time() {
     let kind = catalogue.kinds.iter().find(|kind| kind.name == NOTHING).unwrap();
     for seed in [50_776, 50_793, 915_048, 915_081, 915_084, 915_096] {
         let Outcome { judged, available, losses, alarms, .. } =
-            Trial { kind, size: 0.0, with: None, seed }.run(&Tested::default()).unwrap().outcome;
+            Trial::in_scene((kind, 0.0), None, seed).run(&easy()).unwrap().outcome;
         assert_eq!((available, losses, alarms.len()), (judged, 0, 0), "{seed}: {alarms:?}");
     }
 }
@@ -435,7 +557,7 @@ fn sound_drives_are_available_all_the_time() {
 fn what_has_not_fitted_is_not_forgotten_where_the_vehicle_looks_for_itself() {
     let catalogue = kinds::read(&scenarios("trust.toml")).unwrap();
     let kind = catalogue.kinds.iter().find(|kind| kind.name == "layout mirrored").unwrap();
-    let tried = Trial { kind, size: 1.0, with: None, seed: 50_508 }.run(&Tested::default()).unwrap();
+    let tried = Trial::in_scene((kind, 1.0), None, 50_508).run(&easy()).unwrap();
     assert_eq!(tried.outcome.failures, 0, "{} s", tried.outcome.worst_hazard_s);
 }
 
@@ -481,6 +603,7 @@ fn the_worst_values_say_whose_they_are() {
         size: 5.0,
         with: None,
         seed,
+        scene: seed,
         is_accepted,
         can_recover: false,
         outcome: Some(Outcome { outputs: 1000, judged: 900, claims: 900, driven_um: 50_000_000_000, ..outcome }),
@@ -523,6 +646,7 @@ fn the_worst_run_is_the_one_with_the_longest_hazard() {
         size: 5.0,
         with: None,
         seed,
+        scene: seed,
         is_accepted: true,
         can_recover: false,
         outcome: Some(Outcome { hazards, worst_hazard_s, misleading, most_over_level, ..Outcome::default() }),

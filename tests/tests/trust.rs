@@ -44,7 +44,7 @@ fn the_worst_size_of_each_kind_is_judged_as_it_was() {
         .collect();
     assert!(missing.is_empty(), "the table has no line of {missing:?}");
     let trials: Vec<Trial> =
-        named.iter().flat_map(|&(kind, size)| SEEDS.map(|seed| Trial { kind, size, with: None, seed })).collect();
+        named.iter().flat_map(|&(kind, size)| SEEDS.map(|seed| Trial::new((kind, size), None, seed))).collect();
     let rows = sweep::run(&trials, Shard::ALL, &Tested::default(), || ()).unwrap();
     let mut found = String::from("kind,worst size,runs that fail,hazardous events,misleading\n");
     for (&(kind, size), rows) in named.iter().zip(rows.chunks(SEEDS.len())) {

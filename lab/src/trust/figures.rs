@@ -1,6 +1,6 @@
 //! The figures of a campaign.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -86,8 +86,10 @@ pub struct Figures {
 /// Exact 95 % bounds, from above; of nothing there are none.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bounds {
-    /// Of the share of runs with one fault that fail.
+    /// Of the share of runs with one fault that fail; it means what it says where all scenes are distinct.
     pub failures_of_singles: Option<f64>,
+    /// Share of the scenes of these runs that are distinct.
+    pub distinct_scenes: Option<f64>,
     /// Of the share of runs without faults with a misleading output.
     pub nominal_mi: Option<f64>,
     /// Of the share of runs without faults with a hazardous output.
@@ -121,6 +123,7 @@ pub fn figures(every_row: &[Row], swept: &[Row], catalogue: &Catalogue) -> Figur
     let losses = accepted.sum(|outcome| u64::from(outcome.losses));
     let false_alarms = false_alarms(&accepted);
     let singles = OfSize { size: 0.0, rows: faulty.iter().copied().filter(|row| row.with.is_none()).collect() };
+    let scenes: BTreeSet<u64> = singles.rows.iter().map(|row| row.scene).collect();
     let sound_runs = sound.rows.len() as u64;
     Figures {
         runs: rows.len(),
@@ -154,6 +157,7 @@ pub fn figures(every_row: &[Row], swept: &[Row], catalogue: &Catalogue) -> Figur
         worst: worst_values(&all, &sound, &accepted),
         bounds: Bounds {
             failures_of_singles: exact_bound::of_share(singles.failures() as u64, singles.rows.len() as u64),
+            distinct_scenes: share(scenes.len() as u64, singles.rows.len() as u64),
             nominal_mi: exact_bound::of_share(sound.count(|outcome| outcome.misleading > 0), sound_runs),
             nominal_hmi: exact_bound::of_share(sound.count(|outcome| outcome.hazards > 0), sound_runs),
             losses_per_100km: per_100km(exact_bound::of_count(losses)),

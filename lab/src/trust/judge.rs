@@ -9,6 +9,7 @@
 //! | hazardous (HMI) | a claim whose error is above an alert limit that its protection level is within |
 //! | event | hazardous outputs less than 1 s apart |
 //! | integrity failure | an event with more than 0.3 s, or more than 0.5 m driven, in hazardous outputs |
+//! | hidden | hazardous while no sensor of the vehicle can tell the fault: counts apart, in events of its own |
 //! | available | a claim with a protection level within the alert limit, from the first claim on |
 //! | loss | the end of availability, but where no reflectors are; losses within 10 s are one |
 //!
@@ -77,6 +78,8 @@ pub struct Judge {
     limits: AlertLimits,
     time: f64,
     events: [Option<Event>; 2],
+    /// The same with what is hidden.
+    events_of_all: [Option<Event>; 2],
     last_loss: Option<f64>,
     was_available: bool,
     right_since: Option<f64>,
@@ -85,6 +88,8 @@ pub struct Judge {
     /// The check that said last that something is wrong.
     said: Option<&'static str>,
     outcome: Outcome,
+    /// What becomes of the events with what is hidden.
+    of_all: Outcome,
 }
 
 impl Judge {
@@ -95,12 +100,14 @@ impl Judge {
             limits,
             time: 0.0,
             events: [None; 2],
+            events_of_all: [None; 2],
             last_loss: None,
             was_available: false,
             right_since: None,
             begun: (0.0, 0.0),
             said: None,
             outcome: Outcome::default(),
+            of_all: Outcome::default(),
         }
     }
 
@@ -121,11 +128,13 @@ impl Judge {
         let share = judged.map(|(errors, level)| self.count_claim(moment, &errors, &level));
         let is_right = is_available && share.is_some_and(|share| share <= 1.0);
         self.right_since = if is_right { self.right_since.or(Some(time)) } else { None };
-        let hazards = [self.limits.travel, self.limits.docking].map(|limit| {
-            !moment.is_hidden && judged.is_some_and(|(errors, level)| errors.exceed(&limit) && limit.holds(&level))
-        });
+        let hazards = [self.limits.travel, self.limits.docking]
+            .map(|limit| judged.is_some_and(|(errors, level)| errors.exceed(&limit) && limit.holds(&level)));
         for (event, is_hazardous) in self.events.iter_mut().zip(hazards) {
-            follow(event, is_hazardous, time, moment.driven, &mut self.outcome);
+            follow(event, is_hazardous && !moment.is_hidden, time, moment.driven, &mut self.outcome);
+        }
+        for (event, is_hazardous) in self.events_of_all.iter_mut().zip(hazards) {
+            follow(event, is_hazardous, time, moment.driven, &mut self.of_all);
         }
     }
 
@@ -192,6 +201,10 @@ impl Judge {
         for event in self.events.into_iter().flatten() {
             close(&event, &mut self.outcome);
         }
+        for event in self.events_of_all.into_iter().flatten() {
+            close(&event, &mut self.of_all);
+        }
+        self.outcome.failures_of_all = self.of_all.failures;
         self.outcome.ends_right =
             self.right_since.is_some_and(|since| self.time - since >= RIGHT_AT_THE_END - 0.5 * STEP);
         self.outcome

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use agv_core::odometry::Vehicle;
 use agv_host_sim::simulate::random::Random;
-use agv_host_sim::simulate::scenario::{Carry, Knock, toml_complaint};
+use agv_host_sim::simulate::scenario::{Carry, DataAge, Knock, toml_complaint};
 use agv_host_sim::simulate::standard;
 use serde::{Deserialize, Serialize};
 
@@ -82,7 +82,7 @@ pub enum TheSize {
     Size,
 }
 
-/// A kind of fault. In `what`, `knock` or `carry`, the text "size" stands for the size, and "-size" for the same with the other sign.
+/// A kind of fault. In `what`, `knock`, `carry` or `age`, the text "size" stands for the size, and "-size" for the same with the other sign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kind {
@@ -104,6 +104,8 @@ pub struct Kind {
     pub knock: Option<toml::Table>,
     /// How the vehicle is lifted and set down.
     pub carry: Option<toml::Table>,
+    /// How much older the laser's data are than the time that they state.
+    pub age: Option<toml::Table>,
     /// What reveals it once it is all there: before the drive, or when a laser that creeps has come to its end. Until then the fault is
     /// of class C.
     #[serde(default)]
@@ -135,6 +137,8 @@ pub enum Drawn {
     Knock(Knock),
     /// The vehicle is carried.
     Carry(Carry),
+    /// The laser's data are older than they state.
+    Age(DataAge),
 }
 
 #[derive(Deserialize)]
@@ -205,7 +209,7 @@ impl Kind {
             return Err("sizes, and nothing that they are of".to_owned());
         }
         if self.tables().count() != 1 {
-            return Err("one of `what`, `knock` and `carry` is expected".to_owned());
+            return Err("one of `what`, `knock`, `carry` and `age` is expected".to_owned());
         }
         self.every_size().iter().try_for_each(|&size| self.at(size, 0.0).map(|_| ()))
     }
@@ -217,7 +221,7 @@ impl Kind {
     }
 
     fn tables(&self) -> impl Iterator<Item = &toml::Table> {
-        [&self.what, &self.knock, &self.carry].into_iter().flatten()
+        [&self.what, &self.knock, &self.carry, &self.age].into_iter().flatten()
     }
 
     /// Its sizes; 1 for what has none.
@@ -246,6 +250,9 @@ impl Kind {
         }
         if let Some(carry) = &self.carry {
             return since(carry).try_into().map(Drawn::Carry).map_err(complaint);
+        }
+        if let Some(age) = &self.age {
+            return since(age).try_into().map(Drawn::Age).map_err(complaint);
         }
         let what: FaultKind =
             with_size(self.what.as_ref().unwrap_or(&nothing()), size).try_into().map_err(complaint)?;

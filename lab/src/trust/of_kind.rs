@@ -23,6 +23,8 @@ pub struct OfKind {
     pub runs: usize,
     /// Of these, runs with an integrity failure or a panic.
     pub failures: usize,
+    /// The same if outputs that are hazardous while no sensor of the vehicle can tell the fault count like all others.
+    pub failures_of_all: usize,
     /// Exact 95 % bound of the share of failures, from above.
     pub bound: Option<f64>,
     /// The worst run.
@@ -120,6 +122,7 @@ pub(super) fn per_fault(rows: &[&Row], swept: &[Row], catalogue: &Catalogue) -> 
             unit: kind.map_or_else(String::new, |kind| kind.unit.clone()),
             runs,
             failures,
+            failures_of_all: of.failures_of_all(),
             bound: exact_bound::of_share(failures as u64, runs as u64),
             worst_seed: of.worst()?.seed,
             worst_hmi_s: of.most(|outcome| outcome.worst_hazard_s),

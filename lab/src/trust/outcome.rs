@@ -49,6 +49,8 @@ pub struct Outcome {
     pub worst_hazard_m: f64,
     /// Events that are integrity failures.
     pub failures: u32,
+    /// The same if outputs that are hazardous while no sensor of the vehicle can tell the fault count like all others.
+    pub failures_of_all: u32,
     /// Largest share of error over protection level of a claim.
     pub most_over_level: f64,
     /// Distance driven, um.

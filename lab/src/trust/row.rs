@@ -89,8 +89,10 @@ pub struct Row {
     /// Name and size of another fault.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub with: Option<(String, f64)>,
-    /// The seed.
+    /// The seed of the run among those of its kind.
     pub seed: u64,
+    /// The seed of hall, drive, noise and faults.
+    pub scene: u64,
     /// Whether the commissioning check accepts the hall.
     pub is_accepted: bool,
     /// Whether a recovery may be asked for.
@@ -131,6 +133,13 @@ impl OfSize<'_> {
     #[must_use]
     pub fn failures(&self) -> usize {
         self.rows.iter().filter(|row| row.has_failed()).count()
+    }
+
+    /// Runs that failed, if what is hidden counts as well.
+    #[must_use]
+    pub fn failures_of_all(&self) -> usize {
+        let has_failed = |row: &&&Row| row.outcome.as_ref().is_none_or(|outcome| outcome.failures_of_all > 0);
+        self.rows.iter().filter(has_failed).count()
     }
 
     /// A sum over all runs that did not panic.

@@ -26,7 +26,7 @@ const SAMPLED: usize = 1_000_000_000;
 pub fn sweep(kinds: &[Kind], runs: u64, first_seed: u64) -> Vec<Trial<'_>> {
     let of_kind = |kind| {
         let of_size =
-            move |&size: &f64| (first_seed..first_seed + runs).map(move |seed| Trial { kind, size, with: None, seed });
+            move |&size: &f64| (first_seed..first_seed + runs).map(move |seed| Trial::new((kind, size), None, seed));
         kind.every_size().iter().flat_map(of_size)
     };
     kinds.iter().flat_map(of_kind).collect()
@@ -36,8 +36,7 @@ pub fn sweep(kinds: &[Kind], runs: u64, first_seed: u64) -> Vec<Trial<'_>> {
 #[must_use]
 pub fn pairs(kinds: &[Kind], runs: u64, first_seed: u64) -> Vec<Trial<'_>> {
     let first = first_seed + PAIR_SEEDS;
-    let of_seed =
-        |seed| pair::draw(kinds, seed).map(|[(kind, size), with]| Trial { kind, size, with: Some(with), seed });
+    let of_seed = |seed| pair::draw(kinds, seed).map(|[one, with]| Trial::new(one, Some(with), seed));
     (first..first + runs).filter_map(of_seed).collect()
 }
 
@@ -49,7 +48,7 @@ pub fn sample(kinds: &[Kind], runs: u64, seed: u64) -> Vec<Trial<'_>> {
     let mut trial = |_| {
         let kind = kinds.get(drawn(kinds.len()))?;
         let size = *kind.every_size().get(drawn(kind.every_size().len()))?;
-        Some(Trial { kind, size, with: None, seed: SAMPLED_SEEDS + drawn(SAMPLED) as u64 })
+        Some(Trial::new((kind, size), None, SAMPLED_SEEDS + drawn(SAMPLED) as u64))
     };
     (0..runs).filter_map(&mut trial).collect()
 }
@@ -60,7 +59,7 @@ pub fn worst<'a>(kinds: &'a [Kind], rows: &[Row], runs: u64, first_seed: u64) ->
     let first = first_seed + OTHER_SEEDS;
     let of_kind = |kind: &'a Kind| {
         let size = worst_size(&by_size(rows, &kind.name)).into_iter();
-        size.flat_map(move |size| (first..first + runs).map(move |seed| Trial { kind, size, with: None, seed }))
+        size.flat_map(move |size| (first..first + runs).map(move |seed| Trial::new((kind, size), None, seed)))
     };
     kinds.iter().flat_map(of_kind).collect()
 }
@@ -93,6 +92,7 @@ pub fn row(trial: &Trial, tested: &Tested, tell: impl FnMut(&Moment)) -> Result<
         size: trial.size,
         with: trial.with.map(|(kind, size)| (kind.name.clone(), size)),
         seed: trial.seed,
+        scene: trial.scene,
         is_accepted: tried.as_ref().is_some_and(|tried| tried.is_accepted),
         can_recover: tried.as_ref().is_some_and(|tried| tried.can_recover),
         outcome: tried.map(|tried| tried.outcome),

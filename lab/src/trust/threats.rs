@@ -28,10 +28,10 @@ const INTRODUCTION: &str =
 
 const WORST_SIZES: &str = "## The worst size of each kind\n\n\
      Failures and hazardous outputs are by either alert limit, those of the worst event; what is hazardous while no sensor can tell (class C) stands \
-     apart. *Claimed* is the share of the time in claims with a protection level within the alert limit of travelling. *Found* is in how many runs, \
+     apart; *with what is hidden* is how many runs fail if it does not. *Claimed* is the share of the time in claims with a protection level within the alert limit of travelling. *Found* is in how many runs, \
      what did so most often, and after how long a time and way at the latest.\n\n\
-     | kind | class | worst size | failures of runs, 95 % bound | hazardous | not to be told | worst seed | error over level, at most | claimed | found |\n\
-     |---|---|---|---|---|---|---|---|---|---|\n";
+     | kind | class | worst size | failures of runs, 95 % bound | with what is hidden | hazardous | not to be told | worst seed | error over level, at most | claimed | found |\n\
+     |---|---|---|---|---|---|---|---|---|---|---|\n";
 
 const EVERY_SIZE: &str = "\n## Every size\n\n\
      The sweep by which the worst sizes were found. Of each size: the largest error over its protection level (— where nothing is claimed), and in \
@@ -46,13 +46,14 @@ fn line(of: &OfKind) -> String {
     };
     let bound = of.bound.map_or_else(String::new, |bound| format!(", {:.1} %", 100.0 * bound));
     format!(
-        "| {} | {:?} | {} {} | {} of {}{bound} | {:.2} s, {:.2} m | {:.2} s | {} | {} | {:.1} % | {found} |\n",
+        "| {} | {:?} | {} {} | {} of {}{bound} | {} | {:.2} s, {:.2} m | {:.2} s | {} | {} | {:.1} % | {found} |\n",
         of.kind,
         of.class,
         of.worst_size,
         of.unit,
         of.failures,
         of.runs,
+        of.failures_of_all,
         of.worst_hmi_s,
         of.worst_hmi_m,
         of.hidden_s,

@@ -1,6 +1,6 @@
 //! One run: a hall and a drive that are drawn, a fault of one size, and the judge at the bus.
 
-use agv_core::geometry::{Point, Pose};
+use agv_core::geometry::Pose;
 use agv_core::integrity::AlertLimits;
 use agv_core::localizer::Parameters;
 use agv_host_sim::contour_map::ContourMap;
@@ -9,9 +9,10 @@ use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Scenario, Shapes, WorldOptions};
 use agv_host_sim::simulate::{START, simulate};
 
-use super::hall::{Hall, STANDS, draw};
+use super::hall::{Generator, STANDS, draw};
 use super::judge::{Judge, Moment};
 use super::kinds::{Drawn, Hidden, Kind};
+use super::nominal::NominalWorld;
 use super::outcome::Outcome;
 use super::sight::Sight;
 use crate::campaign::CampaignError;
@@ -28,8 +29,10 @@ pub struct Trial<'a> {
     pub size: f64,
     /// Another fault, and its size.
     pub with: Option<(&'a Kind, f64)>,
-    /// The seed of hall, drive, noise and faults.
+    /// The seed of the run among those of its kind.
     pub seed: u64,
+    /// The seed of hall, drive, noise and faults.
+    pub scene: u64,
 }
 
 /// What is put to the test.
@@ -37,6 +40,10 @@ pub struct Trial<'a> {
 pub struct Tested<'a> {
     /// The vehicle.
     pub equipment: Equipment,
+    /// What draws the halls.
+    pub halls: Generator,
+    /// The world.
+    pub world: NominalWorld,
     /// Whether it has a map of the contours of its hall, which it has made among the reflectors on the same way before.
     pub has_contours: bool,
     /// What changes that which the controller believes, from its defaults.
@@ -45,7 +52,13 @@ pub struct Tested<'a> {
 
 impl Default for Tested<'_> {
     fn default() -> Self {
-        Self { equipment: Equipment::default(), has_contours: false, settings: &|_| {} }
+        Self {
+            equipment: Equipment::default(),
+            halls: Generator::default(),
+            world: NominalWorld::default(),
+            has_contours: false,
+            settings: &|_| {},
+        }
     }
 }
 
@@ -76,7 +89,19 @@ pub struct Tried {
     pub can_recover: bool,
 }
 
-impl Trial<'_> {
+impl<'a> Trial<'a> {
+    /// The run of a kind, or of two, with that seed.
+    #[must_use]
+    pub fn new((kind, size): (&'a Kind, f64), with: Option<(&'a Kind, f64)>, seed: u64) -> Self {
+        Self { kind, size, with, seed, scene: seed }
+    }
+
+    /// The run of a kind, or of two, in that scene.
+    #[must_use]
+    pub const fn in_scene((kind, size): (&'a Kind, f64), with: Option<(&'a Kind, f64)>, scene: u64) -> Self {
+        Self { kind, size, with, seed: scene, scene }
+    }
+
     /// The kinds of its faults with their sizes.
     fn kinds(&self) -> impl Iterator<Item = (&Kind, f64)> {
         [(self.kind, self.size)].into_iter().chain(self.with)
@@ -95,10 +120,12 @@ impl Trial<'_> {
     /// # Errors
     /// See [`CampaignError`].
     pub fn run_heard(&self, tested: &Tested, mut tell: impl FnMut(&Moment)) -> Result<Tried, CampaignError> {
-        let Hall { mut scenario, station, bare, is_accepted } = draw(self.seed);
+        let hall = draw(tested.halls, self.scene);
+        let mut scenario = hall.scenario.clone();
+        tested.world.apply(&mut scenario);
         tested.equipment.apply(&mut scenario);
         let contours = tested.contours(&scenario)?;
-        let mut random = Random::new(self.seed, Stream::Faults);
+        let mut random = Random::new(self.scene, Stream::Faults);
         let timetable = Timetable::of(&scenario)?;
         let seconds = timetable.seconds;
         let mut drawn = Vec::new();
@@ -110,7 +137,7 @@ impl Trial<'_> {
         let simulation = simulate_with(&scenario, &faults, &mut random)?;
         let mut recording = simulation.recording;
         (tested.settings)(&mut recording.parameters);
-        let sight = Sight::of(&recording, [station.x, station.y]);
+        let sight = Sight::of(&recording, [hall.station.x, hall.station.y]);
         for fault in &faults {
             fault.spoil(&mut recording, &simulation.true_tricycle, &mut random);
         }
@@ -127,7 +154,7 @@ impl Trial<'_> {
         let is_told = self.kinds().any(|(kind, _)| kind.tells_start);
         let contours = contours.as_ref().map(ContourMap::view);
         let told = is_told.then_some(STANDS);
-        let options = RigOptions { seconds, seed: self.seed, stands: 0.0, told, contours };
+        let options = RigOptions { seconds, seed: self.scene, stands: 0.0, told, contours };
         rig::drive(&recording, &faults, &options, |heard| {
             let before = here;
             here = (heard.truth)(heard.now).or(before);
@@ -139,7 +166,7 @@ impl Trial<'_> {
                 driven: before.zip(here).map_or(0.0, |(before, here)| driven(&before, &here)),
                 docks: sight.docks(heard.time),
                 is_nominal: sight.is_nominal(heard.time),
-                is_bare: here.is_some_and(|here| is_within(&bare, &here)),
+                is_bare: here.is_some_and(|here| hall.is_bare(&here.position())),
                 has_begun: heard.time >= begins,
                 is_hidden: hidden.iter().any(|one| heard.time >= one.from),
             };
@@ -152,7 +179,7 @@ impl Trial<'_> {
             None => faults.iter().any(ends),
             Some(_) => faults.len() == drawn.len() && faults.iter().all(ends),
         };
-        Ok(Tried { outcome: judge.outcome(), is_accepted, can_recover })
+        Ok(Tried { outcome: judge.outcome(), is_accepted: hall.is_accepted, can_recover })
     }
 }
 
@@ -165,6 +192,7 @@ fn enter<'a>(drawn: &'a [(f64, Drawn)], scenario: &mut Scenario) -> Vec<&'a Faul
             Drawn::Fault(fault) => faults.push(fault),
             Drawn::Knock(knock) => scenario.laser.knocks.push(*knock),
             Drawn::Carry(carry) => scenario.drive.carries.push(*carry),
+            Drawn::Age(age) => scenario.laser.ages.push(*age),
         }
     }
     faults
@@ -177,11 +205,6 @@ const CARRIED: f64 = 0.1;
 fn driven(before: &Pose, here: &Pose) -> f64 {
     let step = before.between(here).position().norm();
     if step > CARRIED { 0.0 } else { step }
-}
-
-/// Whether a pose is in the rectangle between these corners.
-fn is_within([least, most]: &[Point; 2], here: &Pose) -> bool {
-    (least.x..=most.x).contains(&here.x) && (least.y..=most.y).contains(&here.y)
 }
 
 /// When a drive ends, and when it stands in between.

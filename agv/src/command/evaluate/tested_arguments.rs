@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use agv_core::localizer::Parameters;
 use agv_lab::equipment::Equipment;
+use agv_lab::trust::hall::Generator;
+use agv_lab::trust::nominal::NominalWorld;
 use agv_lab::trust::trial::Tested;
 use agv_settings::Settings;
 
@@ -14,6 +16,12 @@ pub struct TestedArguments {
     /// The kinds of faults.
     #[arg(long, default_value = "trust")]
     pub kinds: PathBuf,
+    /// What draws the halls.
+    #[arg(long, value_enum, default_value_t)]
+    pub halls: Generator,
+    /// How hard the world is in which a vehicle in order drives.
+    #[arg(long, value_enum, default_value_t)]
+    pub world: NominalWorld,
     #[command(flatten)]
     pub equipment: Equipment,
     /// Whether the vehicle has a map of the contours of its hall, which it has made among the reflectors on the same way before.
@@ -35,7 +43,13 @@ impl TestedArguments {
     pub fn with<Made>(&self, make: impl FnOnce(&Tested) -> Made) -> Made {
         // Whatever can be refused was refused before.
         let settings = |parameters: &mut Parameters| _ = self.settings.apply(parameters);
-        make(&Tested { equipment: self.equipment, has_contours: self.contours, settings: &settings })
+        make(&Tested {
+            equipment: self.equipment,
+            halls: self.halls,
+            world: self.world,
+            has_contours: self.contours,
+            settings: &settings,
+        })
     }
 
     /// Says by which settings it differs from a vehicle that is delivered.

@@ -27,6 +27,9 @@ pub struct TrialArguments {
     /// First seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// First scene instead: what a seed draws for its kinds, `scene` in the rows.
+    #[arg(long, conflicts_with = "seed")]
+    scene: Option<u64>,
     /// Runs, of this seed and those after it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     runs: u64,
@@ -46,10 +49,11 @@ Examples:
   agv evaluate trial --fault 'laser shifted forward=0.15' --seed 1 --runs 25
   agv evaluate trial --fault 'power cut=1' --fault 'laser turned=2' --seed 3 --trace trace.csv
   agv evaluate trial --seed 7 --runs 10 --json
+  agv evaluate trial --world easy --fault 'carried on=9' --scene 50216
 
-Keys of --json: kind, size, with [kind, size], seed, is_accepted, can_recover, outcome {outputs, first_claim, judged, available,
+Keys of --json: kind, size, with [kind, size], seed, scene, is_accepted, can_recover, outcome {outputs, first_claim, judged, available,
 docking, docking_available, within_docking, losses, claims, misleading, hidden_hazardous (these in outputs, one each 10 ms), hazards,
-worst_hazard_s, worst_hazard_m, failures, most_over_level, driven_um, nominal_mm, nominal_cdeg, stanford, alarms {check: count}, found
+worst_hazard_s, worst_hazard_m, failures, failures_of_all, most_over_level, driven_um, nominal_mm, nominal_cdeg, stanford, alarms {check: count}, found
 {after_ms, after_mm, by}, ends_right}; outcome is null after a panic.";
 
 impl TrialArguments {
@@ -66,9 +70,13 @@ impl TrialArguments {
         for kind in [Some(kind), with.map(|(kind, _)| kind)].into_iter().flatten() {
             ensure!(kind.is_possible(&parameters.vehicle), "the vehicle cannot have {:?}", kind.name);
         }
-        let last =
-            self.seed.checked_add(self.runs - 1).ok_or_else(|| anyhow!("there are no seeds after the last one"))?;
-        let trials: Vec<Trial> = (self.seed..=last).map(|seed| Trial { kind, size, with, seed }).collect();
+        let first = self.scene.unwrap_or(self.seed);
+        let last = first.checked_add(self.runs - 1).ok_or_else(|| anyhow!("there are no seeds after the last one"))?;
+        let trial = |seed| match self.scene {
+            Some(_) => Trial::in_scene((kind, size), with, seed),
+            None => Trial::new((kind, size), with, seed),
+        };
+        let trials: Vec<Trial> = (first..=last).map(trial).collect();
         let rows = self.tested.with(|tested| self.make(&trials, tested))?;
         if self.json {
             println!("{}", serde_json::to_string_pretty(&rows)?);

@@ -87,6 +87,8 @@ Examples:
   agv evaluate trust --vehicle differential --gyro --sweep-runs 1 --runs 2 --sound-runs 10
   agv evaluate trust --vehicle omni4 --slip 0.001 --set odometry.slip=0.002 --only nothing --sound-runs 15
   agv evaluate trust --contours --sample 100 --seed 7
+  agv evaluate trust --halls sketches --only nothing --sound-runs 70
+  agv evaluate trust --world easy --only nothing --sound-runs 30
   agv evaluate trust --first-seed 100000 --json
   agv evaluate trust --first-seed 100000 --shard 0/2 --output sweep0.jsonl
   agv evaluate trust --first-seed 100000 --swept sweep0.jsonl sweep1.jsonl --shard 0/2 --output worst0.jsonl
@@ -97,13 +99,13 @@ Keys of --json: runs, panics, mi_share, hmi_events, worst_hmi_s, worst_hmi_m, in
 nominal_mi, nominal_hmi, refused_halls, availability_travel, availability_docking, availability_docking_of_all,
 continuity_per_100km, false_alarms {check: count}, recovered_share, recovered_share_of_all, pl_nominal_mm, pl_nominal_deg,
 error_over_pl_max, first_claim_s [95 %, worst], worst {hmi_s, hmi_m, availability_travel, availability_docking, losses,
-pl_nominal_mm, pl_nominal_deg, error_over_pl, first_claim_s: value and seed}, bounds {failures_of_singles, nominal_mi,
+pl_nominal_mm, pl_nominal_deg, error_over_pl, first_claim_s: value and seed}, bounds {failures_of_singles, distinct_scenes, nominal_mi,
 nominal_hmi, losses_per_100km, false_alarms_per_100km: exact, 95 %}, seeds [first, last], class_c [kind], per_fault [kind,
-worst_size, unit, runs, failures, bound, worst_seed, worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed,
+worst_size, unit, runs, failures, failures_of_all, bound, worst_seed, worst_hmi_s, worst_hmi_m, hidden_s, error_over_pl_max, share_claimed,
 class, found, found_s, found_m, found_by, sizes [size, runs, failures, worst_hmi_s, error_over_pl_max, share_claimed]], pairs
 and pairs_apart {runs, failures, bound, hmi_events, worst_hmi_s, worst_hmi_m, failed [kinds, seed, hmi_s, hidden_by]},
 stanford_nominal and stanford_faults {cell_mm, cells [level, error, claims]}, settings [those of --set], vehicle, gyro,
-contours, slip [if --slip], gyro_scale_error [if --gyro-scale-error].";
+contours, world, halls, slip [if --slip], gyro_scale_error [if --gyro-scale-error].";
 
 /// The Stanford diagrams: without faults, and with them.
 const DIAGRAMS: [&str; 2] = ["stanford_nominal.svg", "stanford_faults.svg"];
@@ -192,11 +194,13 @@ impl Trust {
         }
         if self.json {
             let mut told = serde_json::to_value(&figures)?;
-            let TestedArguments { equipment, contours, settings, .. } = &self.tested;
+            let TestedArguments { equipment, contours, settings, halls, world, .. } = &self.tested;
             told["settings"] = settings.texts().into();
             told["vehicle"] = serde_json::to_value(equipment.vehicle)?;
             told["gyro"] = equipment.gyro.into();
             told["contours"] = (*contours).into();
+            told["halls"] = serde_json::to_value(halls)?;
+            told["world"] = serde_json::to_value(world)?;
             for (name, value) in [("slip", equipment.slip), ("gyro_scale_error", equipment.gyro_scale_error)] {
                 if let Some(value) = value {
                     told[name] = value.into();
@@ -213,17 +217,18 @@ impl Trust {
 
 fn print(figures: &Figures) {
     println!(
-        "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7} {:>7} {:>8} {:>7} class, found by",
-        "kind", "worst size", "", "runs", "failures", "seed", "hmi s", "hmi m", "error/pl", "claimed"
+        "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>6} {:>7} {:>7} {:>8} {:>7} class, found by",
+        "kind", "worst size", "", "runs", "failures", "of all", "seed", "hmi s", "hmi m", "error/pl", "claimed"
     );
     for of in &figures.per_fault {
         println!(
-            "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>7.2} {:>7.2} {:>8.2} {:>6.1}% {:?} {}",
+            "{:<36} {:>10} {:<6} {:>5} {:>8} {:>6} {:>6} {:>7.2} {:>7.2} {:>8.2} {:>6.1}% {:?} {}",
             of.kind,
             of.worst_size,
             of.unit,
             of.runs,
             of.failures,
+            of.failures_of_all,
             of.worst_seed,
             of.worst_hmi_s,
             of.worst_hmi_m,

@@ -1,6 +1,6 @@
 //! Faults of what is believed before the vehicle drives.
 
-use agv_core::geometry::Pose;
+use agv_core::geometry::{Point, Pose};
 use agv_core::maps::Landmark;
 use agv_core::odometry::Vehicle;
 
@@ -76,6 +76,33 @@ impl Fault {
                     landmark.y = 2.0 * mean_y - landmark.y + random.between(-3.0, 3.0);
                 }
             }
+            FaultKind::SessionTurned { deg, is_laid } => distort(landmarks, is_laid, |landmarks| {
+                let (seam, middle) = seam(landmarks);
+                let turn = Pose::new(0.0, 0.0, deg.to_radians());
+                let about = Point::new(seam, middle);
+                for landmark in landmarks.iter_mut().filter(|landmark| landmark.x > seam) {
+                    set(landmark, about + turn.transform(&(landmark.position() - about)));
+                }
+            }),
+            FaultKind::SessionShifted { metres, is_laid } => {
+                let (sine, cosine) = libm::sincos(random.between(0.0, std::f64::consts::TAU));
+                let shift = Point::new(cosine, sine) * metres;
+                distort(landmarks, is_laid, |landmarks| {
+                    let (seam, _) = seam(landmarks);
+                    for landmark in landmarks.iter_mut().filter(|landmark| landmark.x > seam) {
+                        set(landmark, landmark.position() + shift);
+                    }
+                });
+            }
+            FaultKind::LayoutBent { metres, is_laid } => distort(landmarks, is_laid, |landmarks| {
+                let xs = || landmarks.iter().map(|landmark| landmark.x);
+                let (least, most) = (xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max));
+                let half = (0.5 * (most - least)).max(1e-9);
+                for landmark in landmarks {
+                    let along = (landmark.x - least) / half - 1.0;
+                    landmark.y += metres * (1.0 - along * along);
+                }
+            }),
             FaultKind::LayoutStretched { share } => {
                 let middle = mean(landmarks.iter().map(|landmark| landmark.x));
                 landmarks.iter_mut().for_each(|landmark| landmark.x += share * (landmark.x - middle));
@@ -83,6 +110,43 @@ impl Fault {
             _ => {}
         }
     }
+}
+
+/// Where a second session began: the middle of the layout, W, m.
+fn seam(landmarks: &[Landmark]) -> (f64, f64) {
+    (mean(landmarks.iter().map(|landmark| landmark.x)), mean(landmarks.iter().map(|landmark| landmark.y)))
+}
+
+fn set(landmark: &mut Landmark, place: Point) {
+    (landmark.x, landmark.y) = (place.x, place.y);
+}
+
+/// Distorts a layout, and lays it onto where it was, as well as it fits, if that is wanted.
+fn distort(landmarks: &mut [Landmark], is_laid: bool, change: impl FnOnce(&mut [Landmark])) {
+    let before: Vec<Point> = landmarks.iter().map(Landmark::position).collect();
+    change(landmarks);
+    if !is_laid {
+        return;
+    }
+    let after: Vec<Point> = landmarks.iter().map(Landmark::position).collect();
+    let laid = rigid_fit(&after, &before);
+    landmarks.iter_mut().zip(after).for_each(|(landmark, place)| set(landmark, laid.transform(&place)));
+}
+
+/// The pose that lays places onto others with the least sum of squares (B. K. P. Horn, "Closed-form solution of absolute orientation using
+/// unit quaternions", JOSA A 4(4), 1987, in the plane).
+fn rigid_fit(places: &[Point], onto: &[Point]) -> Pose {
+    let middle = |points: &[Point]| points.iter().sum::<Point>() / points.len().max(1) as f64;
+    let (from, to) = (middle(places), middle(onto));
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (place, target) in places.iter().zip(onto) {
+        let (place, target) = (place - from, target - to);
+        dot += place.dot(&target);
+        cross += place.x * target.y - place.y * target.x;
+    }
+    let theta = libm::atan2(cross, dot);
+    let turned = Pose::new(0.0, 0.0, theta).transform(&from);
+    Pose::new(to.x - turned.x, to.y - turned.y, theta)
 }
 
 /// Makes what is believed of the vehicle wrong; of one with several steered wheels the first.

@@ -351,6 +351,30 @@ pub enum FaultKind {
         /// By which share.
         share: f64,
     },
+    /// Half of the layout was surveyed in a second session, which was set up turned about where it began.
+    SessionTurned {
+        /// By how much.
+        deg: f64,
+        /// Whether the layout was laid onto the true one as well as it fits.
+        #[serde(default)]
+        is_laid: bool,
+    },
+    /// The same, set up elsewhere.
+    SessionShifted {
+        /// How far, in a direction that is drawn.
+        metres: f64,
+        /// Whether the layout was laid onto the true one as well as it fits.
+        #[serde(default)]
+        is_laid: bool,
+    },
+    /// The layout is bent: its middle is beside the line between its ends.
+    LayoutBent {
+        /// By how much.
+        metres: f64,
+        /// Whether the layout was laid onto the true one as well as it fits.
+        #[serde(default)]
+        is_laid: bool,
+    },
     /// The laser is mounted otherwise than is believed.
     MountingWrong {
         /// Direction.

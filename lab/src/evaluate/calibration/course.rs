@@ -185,7 +185,7 @@ impl Course {
         let mut random = Random::new(seed, Stream::Odometry);
         let motion = drive(&path, wheelbase, &options, &perfect, 1.0 / RATE, &mut random);
         let reflectors = reflectors(&motion, seed);
-        let track = LaserTrack::new(&motion, |_| vehicle.laser);
+        let track = LaserTrack::new(&motion, |_, _| vehicle.laser);
         let count = (track.duration() * FREQUENCY) as usize;
         let revolution = |index: usize| {
             let start = index as f64 / FREQUENCY;

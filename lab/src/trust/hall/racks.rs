@@ -1,4 +1,4 @@
-//! Halls and drives that are drawn by a seed: size, racks, spacing of the reflectors, near-symmetry, clutter.
+//! Halls of three aisles between racks: size, racks, spacing of the reflectors, near-symmetry, clutter.
 //!
 //! A vehicle drives through three aisles with bends to both sides. In the middle one no reflector is in sight for about 10 m:
 //! its flat reflectors, at both ends, are seen from in front of them only. In the third one it
@@ -7,45 +7,20 @@
 use std::f64::consts::FRAC_PI_2;
 
 use agv_core::geometry::{Point, Pose};
-use agv_host_sim::simulate::path::{Direction, Leg, Path, PathSegment};
+use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::random::{Random, Stream};
-use agv_host_sim::simulate::raycast::{RayCaster, Surface};
 use agv_host_sim::simulate::scenario::{
-    DriveOptions, PathKind, PathOptions, PoseOptions, RectangleOptions, ReflectorOptions, ReflectorShape, Scenario,
-    Shapes, WorldOptions,
+    DriveOptions, PathKind, PathOptions, PoseOptions, ReflectorOptions, Scenario, Shapes, WorldOptions,
 };
 
-/// A hall that was drawn, and a drive in it.
-#[derive(Clone, Debug)]
-pub struct Hall {
-    /// What to simulate.
-    pub scenario: Scenario,
-    /// Where the vehicle docks, W, m.
-    pub station: Point,
-    /// Corners of where the middle aisle has no reflectors, W, m: losing availability there is no loss of continuity.
-    pub bare: [Point; 2],
-    /// Whether the commissioning check accepts it: outside of the bare part of the middle aisle, nowhere on more than
-    /// [`LONGEST_BLIND`] m in a row are fewer than three reflectors within [`CHECKED_RANGE`] m in sight.
-    pub is_accepted: bool,
-}
-
-/// Longest way on which the commissioning check tolerates fewer than three reflectors in sight, m.
-pub const LONGEST_BLIND: f64 = 3.0;
-/// Reflectors farther away than this do not count for the commissioning check, m.
-pub const CHECKED_RANGE: f64 = 25.0;
-/// How long the vehicle stands, switched on, before anything may happen, s; it drives off a second later.
-pub const STANDS: f64 = 5.0;
+use super::shapes::{PROUD, add, add_box, add_flat};
+use super::{Hall, STANDS, is_accepted};
 
 /// From the middle of the middle aisle to the first reflector, m; one on a rack is seen from 2 m before it.
 const HALF_BARE: f64 = 6.8;
-/// A flat reflector is seen from within this of the direction that it faces, deg.
-const FLAT: f64 = 45.0;
-
 const RACK_DEPTH: f64 = 2.2;
 const BAY: f64 = 2.75;
 const UPRIGHT: f64 = 0.1;
-/// From a surface to the axis of a reflector on it, m.
-const PROUD: f64 = 0.06;
 const ROWS: usize = 4;
 
 /// The sizes of a hall.
@@ -119,34 +94,10 @@ pub fn draw(seed: u64) -> Hall {
         reflectors: ReflectorOptions { missing_share: 0.1, ..ReflectorOptions::default() },
         ..Scenario::default()
     };
-    let is_accepted = is_accepted(&scenario, &plan);
     let bare =
         [-1.0, 1.0].map(|side| Point::new(plan.middle() + side * HALF_BARE, plan.aisle(1) + side * 0.5 * plan.pitch));
-    Hall { scenario, station, bare, is_accepted }
-}
-
-fn add(shapes: &mut Shapes, x: f64, y: f64) {
-    shapes.reflectors.push(ReflectorShape {
-        x,
-        y,
-        radius: 0.04,
-        farthest: 30.0,
-        facing_deg: None,
-        half_width_deg: 60.0,
-    });
-}
-
-/// One that is seen from in front of it only.
-fn add_flat(shapes: &mut Shapes, x: f64, y: f64, facing_deg: f64) {
-    add(shapes, x, y);
-    if let Some(added) = shapes.reflectors.last_mut() {
-        *added = ReflectorShape { facing_deg: Some(facing_deg), half_width_deg: FLAT, ..*added };
-    }
-}
-
-fn add_box(shapes: &mut Shapes, pose: Pose, length: f64, width: f64) {
-    let heading_deg = pose.theta.to_degrees();
-    shapes.rectangles.push(RectangleOptions { x: pose.x, y: pose.y, heading_deg, length, width });
+    let is_accepted = is_accepted(&scenario, Some(&bare));
+    Hall { scenario, station, bare: Some(bare), is_accepted }
 }
 
 fn add_racks(plan: &Plan, shapes: &mut Shapes, random: &mut Random) {
@@ -256,42 +207,4 @@ fn path(plan: &Plan, station: Point) -> PathOptions {
             backward(3.0),
         ],
     }
-}
-
-/// The commissioning check, by what stands where.
-fn is_accepted(scenario: &Scenario, plan: &Plan) -> bool {
-    let world = scenario.build_world();
-    let caster = RayCaster::new(&world);
-    let mut blind = 0.0;
-    for pose in poses(&scenario.build_path()) {
-        let laser = pose.compose(&scenario.laser.mounting.pose()).position();
-        let in_sight = world.reflectors.iter().enumerate().filter(|(index, reflector)| {
-            let offset = reflector.body.centre - laser;
-            let distance = offset.norm();
-            distance < CHECKED_RANGE
-                && caster
-                    .first_hit(&laser, &(offset / distance), CHECKED_RANGE)
-                    .is_some_and(|hit| hit.surface == Surface::Reflector(*index))
-        });
-        let is_bare = plan.is_middle(laser.y) && (laser.x - plan.middle()).abs() < HALF_BARE;
-        blind = if is_bare || in_sight.count() >= 3 { 0.0 } else { blind + STEP };
-        if blind > LONGEST_BLIND {
-            return false;
-        }
-    }
-    true
-}
-
-/// Step of the commissioning check along the way, m.
-const STEP: f64 = 0.25;
-
-/// The way in steps.
-fn poses(path: &Path) -> Vec<Pose> {
-    let mut start = path.start;
-    let mut poses = Vec::new();
-    for leg in &path.legs {
-        poses.extend((0..(leg.length() / STEP) as usize).map(|step| leg.pose(&start, step as f64 * STEP)));
-        start = leg.pose(&start, leg.length());
-    }
-    poses
 }
