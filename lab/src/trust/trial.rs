@@ -14,6 +14,7 @@ use super::judge::{Judge, Moment};
 use super::kinds::{Drawn, Hidden, Kind};
 use super::nominal::NominalWorld;
 use super::outcome::Outcome;
+use super::scene::scene;
 use super::sight::Sight;
 use crate::campaign::CampaignError;
 use crate::campaign::fault::{Fault, simulate_with};
@@ -93,7 +94,8 @@ impl<'a> Trial<'a> {
     /// The run of a kind, or of two, with that seed.
     #[must_use]
     pub fn new((kind, size): (&'a Kind, f64), with: Option<(&'a Kind, f64)>, seed: u64) -> Self {
-        Self { kind, size, with, seed, scene: seed }
+        let names = [Some(kind), with.map(|(kind, _)| kind)].into_iter().flatten().map(|kind| kind.name.as_str());
+        Self { kind, size, with, seed, scene: scene(names, seed) }
     }
 
     /// The run of a kind, or of two, in that scene.
