@@ -11,9 +11,9 @@ use serde::Serialize;
 pub enum NominalWorld {
     /// Motion with the noise that the default settings state; a laser with systematic errors, survey errors that near reflectors share, and a
     /// floor of waves.
+    #[default]
     Hard,
     /// Half of the stated slip and a quarter of the walk of the heading; a laser and a survey with independent errors alone, on a plane.
-    #[default]
     Easy,
 }
 
