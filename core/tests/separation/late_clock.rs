@@ -42,6 +42,50 @@ fn a_laser_that_is_late_from_the_beginning_is_held_from_the_first_metre_on() {
     }
 }
 
+/// The age of what the laser tells changes at a stop, at each one otherwise.
+#[test]
+fn a_laser_whose_data_become_older_later_is_held() {
+    let way: Vec<(f64, f64)> = {
+        let straight = |count: usize| vec![(0.125, 0.0); count];
+        let leg = [
+            vec![(0.06, 0.0); 4],
+            straight(40),
+            vec![(0.125, 0.04); 20],
+            straight(10),
+            vec![(0.125, -0.04); 20],
+            straight(20),
+            vec![(0.06, 0.0); 4],
+            vec![(0.0, 0.0); 8],
+        ];
+        [vec![(0.0, 0.0); 20], leg.concat(), leg.concat(), leg.concat()].concat()
+    };
+    // Revolutions from which on it is that late; those of stops are 142 and 268.
+    let cases: [&[(usize, f64)]; 4] = [
+        &[(142, 0.03)],
+        &[(142, 0.05), (268, 0.0)],
+        &[(142, -0.05), (268, 0.1)],
+        &[(268, 0.1)],
+    ];
+    for seed in 1..6 {
+        for case in cases {
+            let mut drive = Drive::new(seed);
+            let mount = drive.mount;
+            let (mut wrong, mut late): (f64, f64) = (0.0, 0.0);
+            for (revolution, (along, turn)) in way.iter().enumerate() {
+                late =
+                    case.iter().filter(|(from, _)| *from <= revolution).map(|(_, late)| *late).last().unwrap_or(late);
+                drive.true_mount = before(late, *along, *turn).compose(&mount);
+                drive.revolve(&Pose::exp(&Twist { x: *along, y: 0.0, theta: *turn }));
+                drive.assert_held(format_args!("{case:?}, revolution {revolution}"));
+                wrong = wrong.max((drive.published.x - drive.truth.x).hypot(drive.published.y - drive.truth.y));
+            }
+            // The levels had something to hold.
+            let most = case.iter().map(|(_, late)| late.abs()).fold(0.0, f64::max);
+            assert!(wrong > 0.7 * most, "{case:?}: {wrong}");
+        }
+    }
+}
+
 /// Where the clock is in order, what the first metres have shown costs little.
 #[test]
 fn a_clock_in_order_costs_no_availability() {

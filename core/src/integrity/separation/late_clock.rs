@@ -1,6 +1,6 @@
-//! A laser whose clock was off when the vehicle was switched on: at rest that does nothing, so the pose was found right then, and the first
-//! metre shows how late it is. Who finds itself while it moves has found where it was, until it stands, or moves otherwise. A clock that is
-//! off later is a matter of the free mounting.
+//! A laser whose clock is off since the vehicle last stood, or since it was switched on: at rest that does nothing, so the pose was found right
+//! then, and the first metre shows how late it is. Who finds itself while it moves has found where it was, until it stands, or moves
+//! otherwise. A clock that goes wrong on the way is a matter of the free mounting.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ use super::solution::{Laser, Solution};
 /// A vehicle stands that moves and turns no faster than this, m/s and rad/s: its pose is off by a millimetre at most.
 const AT_REST: (f64, f64) = (5e-3, 5e-3);
 
-/// The solution with a clock that is free since the vehicle stood, or since its first pose; none before.
+/// The solution with a clock that is free since the vehicle last stood, or since its first pose; none before.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LateClock {
     solution: Option<Solution>,
@@ -47,10 +47,9 @@ impl LateClock {
         {
             self.solution = None;
         }
-        if self.solution.is_none() && is_at_rest(laser) {
-            let mut solution = all.clone();
-            solution.free_clock();
-            self.solution = Some(solution);
+        if is_at_rest(laser) {
+            // The clock may be another one from now on. Nothing but this solution is known to hold if it was wrong before.
+            self.solution.get_or_insert_with(|| all.clone()).free_clock();
         } else if self.solution.is_none() && is_first {
             // The pose and the clock are known by one another alone.
             let mut solution = Solution::new(*all.pose(), &UNKNOWN_POSE, assumed);
