@@ -204,7 +204,7 @@ fn there_are_sixty_kinds_and_more_each_at_nine_sizes_or_more() {
     for (wrong, complaint) in [
         ("sizes = [0, 1]\nwhat = { kind = \"wall_moved\", metres = \"size\" }", "fewer than 9 sizes"),
         ("sizes = [0, 1, 2, 3, 4, 5, 6, 7, 8]\nwhat = { kind = \"laser_silent\" }", "nothing that they are of"),
-        ("what = { kind = \"laser_silent\" }\nknock = { x = 1.0 }", "one of `what`, `knock` and `carry`"),
+        ("what = { kind = \"laser_silent\" }\nknock = { x = 1.0 }", "one of `what`, `knock`, `carry` and `age`"),
         ("what = { kind = \"wall_moves\" }", "unknown variant"),
         ("what = 3", "invalid type"),
     ] {

@@ -32,8 +32,9 @@ fn the_worst_size_of_each_kind_is_judged_as_it_was() {
         .lines()
         .skip(1)
         .map(|line| {
-            let mut cells = line.split(',');
-            let (name, size) = (cells.next().unwrap(), cells.next().unwrap());
+            // Names may have commas.
+            let mut cells = line.rsplitn(5, ',').skip(3);
+            let (size, name) = (cells.next().unwrap(), cells.next().unwrap());
             (kinds.iter().find(|kind| kind.name == name).unwrap(), size.parse().unwrap())
         })
         .collect();

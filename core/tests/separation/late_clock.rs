@@ -60,12 +60,8 @@ fn a_laser_whose_data_become_older_later_is_held() {
         [vec![(0.0, 0.0); 20], leg.concat(), leg.concat(), leg.concat()].concat()
     };
     // Revolutions from which on it is that late; those of stops are 142 and 268.
-    let cases: [&[(usize, f64)]; 4] = [
-        &[(142, 0.03)],
-        &[(142, 0.05), (268, 0.0)],
-        &[(142, -0.05), (268, 0.1)],
-        &[(268, 0.1)],
-    ];
+    let cases: [&[(usize, f64)]; 4] =
+        [&[(142, 0.03)], &[(142, 0.05), (268, 0.0)], &[(142, -0.05), (268, 0.1)], &[(268, 0.1)]];
     for seed in 1..6 {
         for case in cases {
             let mut drive = Drive::new(seed);

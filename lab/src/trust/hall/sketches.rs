@@ -11,7 +11,7 @@ use agv_host_sim::simulate::scenario::{
 };
 
 use super::shapes::{PROUD, add, add_box};
-use super::{CHECKED_RANGE, Hall, STANDS, is_accepted, poses};
+use super::{Hall, STANDS, is_accepted, poses};
 
 /// What a hall is, in a few words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -268,7 +268,7 @@ fn columns(grid: &Grid, shapes: &mut Shapes, random: &mut Random, share: f64) {
 }
 
 /// How far reflectors are seen where three are in sight, m.
-const NEAR: f64 = 18.0;
+const NEAR: f64 = 12.0;
 const FEWEST: usize = 3;
 
 /// Just so many reflectors, between the ways and on the walls, that three are in sight along the way.
@@ -281,7 +281,8 @@ fn three_in_sight(grid: &Grid, way: &[Pose], shapes: &mut Shapes, random: &mut R
         [0; 4].map(|_| middle + Point::new(random.between(-length, length), random.between(-width, width)))
     });
     let candidates: Vec<Point> = on_walls.chain(scattered).collect();
-    let reach = NEAR.min(CHECKED_RANGE) - 1.0;
+    // The laser stands before the middle of the rear axle, whose way this is.
+    let reach = NEAR - 1.5;
     let sees = |pose: &Pose, place: &Point| (place - pose.position()).norm() < reach;
     let mut chosen: Vec<Point> = Vec::new();
     for (step, pose) in way.iter().enumerate() {
@@ -293,6 +294,14 @@ fn three_in_sight(grid: &Grid, way: &[Pose], shapes: &mut Shapes, random: &mut R
                 .filter(|place| sees(pose, place) && chosen.iter().all(|other| (*place - other).norm() > 1.0));
             let Some(best) = free.max_by_key(|place| lasts(place)) else { break };
             chosen.push(*best);
+        }
+    }
+    // What was chosen for one part of the way may be seen from another one, too.
+    for place in chosen.clone() {
+        let is_needed =
+            |pose: &Pose| sees(pose, &place) && chosen.iter().filter(|other| sees(pose, other)).count() <= FEWEST;
+        if !way.iter().any(is_needed) {
+            chosen.retain(|other| *other != place);
         }
     }
     for place in chosen {
