@@ -268,7 +268,7 @@ fn columns(grid: &Grid, shapes: &mut Shapes, random: &mut Random, share: f64) {
 }
 
 /// How far reflectors are seen where three are in sight, m.
-const NEAR: f64 = 12.0;
+const NEAR: f64 = 10.0;
 const FEWEST: usize = 3;
 
 /// Just so many reflectors, between the ways and on the walls, that three are in sight along the way.
@@ -285,14 +285,18 @@ fn three_in_sight(grid: &Grid, way: &[Pose], shapes: &mut Shapes, random: &mut R
     let reach = NEAR - 1.5;
     let sees = |pose: &Pose, place: &Point| (place - pose.position()).norm() < reach;
     let mut chosen: Vec<Point> = Vec::new();
-    for (step, pose) in way.iter().enumerate() {
+    for pose in way {
         while chosen.iter().filter(|place| sees(pose, place)).count() < FEWEST {
-            // The one that stays in sight longest.
-            let lasts = |place: &Point| way[step..].iter().take_while(|pose| sees(pose, place)).count();
+            // The one that is seen most from where too few are, and least from where enough are.
+            let count = |pose: &Pose| chosen.iter().filter(|other| sees(pose, other)).count();
+            let worth = |place: &Point| {
+                let seen = way.iter().filter(|pose| sees(pose, place));
+                seen.map(|pose| if count(pose) < FEWEST { 1 } else { -1 }).sum::<i32>()
+            };
             let free = candidates
                 .iter()
                 .filter(|place| sees(pose, place) && chosen.iter().all(|other| (*place - other).norm() > 1.0));
-            let Some(best) = free.max_by_key(|place| lasts(place)) else { break };
+            let Some(best) = free.max_by_key(|place| worth(place)) else { break };
             chosen.push(*best);
         }
     }
