@@ -68,8 +68,7 @@ fn a_laser_whose_data_become_older_later_is_held() {
             let mount = drive.mount;
             let (mut wrong, mut late): (f64, f64) = (0.0, 0.0);
             for (revolution, (along, turn)) in way.iter().enumerate() {
-                late =
-                    case.iter().filter(|(from, _)| *from <= revolution).map(|(_, late)| *late).last().unwrap_or(late);
+                late = case.iter().rfind(|(from, _)| *from <= revolution).map_or(late, |(_, late)| *late);
                 drive.true_mount = before(late, *along, *turn).compose(&mount);
                 drive.revolve(&Pose::exp(&Twist { x: *along, y: 0.0, theta: *turn }));
                 drive.assert_held(format_args!("{case:?}, revolution {revolution}"));
