@@ -42,41 +42,30 @@ fn a_laser_that_is_late_from_the_beginning_is_held_from_the_first_metre_on() {
     }
 }
 
-/// The age of what the laser tells changes at a stop, at each one otherwise.
+/// The age of what the laser tells changes at a stop behind others, once the clock of the first metres is known.
 #[test]
-fn a_laser_whose_data_become_older_later_is_held() {
-    let way: Vec<(f64, f64)> = {
-        let straight = |count: usize| vec![(0.125, 0.0); count];
-        let leg = [
-            vec![(0.06, 0.0); 4],
-            straight(40),
-            vec![(0.125, 0.04); 20],
-            straight(10),
-            vec![(0.125, -0.04); 20],
-            straight(20),
-            vec![(0.06, 0.0); 4],
-            vec![(0.0, 0.0); 8],
-        ];
-        [vec![(0.0, 0.0); 20], leg.concat(), leg.concat(), leg.concat()].concat()
-    };
-    // Revolutions from which on it is that late; those of stops are 142 and 268.
-    let cases: [&[(usize, f64)]; 4] =
-        [&[(142, 0.03)], &[(142, 0.05), (268, 0.0)], &[(142, -0.05), (268, 0.1)], &[(268, 0.1)]];
+fn a_laser_whose_data_become_older_at_a_stop_is_held() {
+    let straight = |count: usize| vec![(0.2, 0.0); count];
+    let speeds = |from: f64, to: f64| (1..=20).map(|part| (from + (to - from) * f64::from(part) / 20.0, 0.0)).collect();
+    let leg: [Vec<(f64, f64)>; 6] =
+        [speeds(0.0, 0.2), straight(40), vec![(0.1, 0.06); 26], straight(40), speeds(0.2, 0.0), vec![(0.0, 0.0); 24]];
+    let leg = leg.concat();
+    let way = [leg.clone(), leg.clone(), leg].concat();
+    let stop = way.len() / 3;
     for seed in 1..6 {
-        for case in cases {
+        for late in [0.03, 0.05, 0.07, 0.1, -0.07] {
             let mut drive = Drive::new(seed);
             let mount = drive.mount;
-            let (mut wrong, mut late): (f64, f64) = (0.0, 0.0);
+            let mut wrong: f64 = 0.0;
             for (revolution, (along, turn)) in way.iter().enumerate() {
-                late = case.iter().rfind(|(from, _)| *from <= revolution).map_or(late, |(_, late)| *late);
+                let late = if revolution < stop { 0.0 } else { late };
                 drive.true_mount = before(late, *along, *turn).compose(&mount);
                 drive.revolve(&Pose::exp(&Twist { x: *along, y: 0.0, theta: *turn }));
-                drive.assert_held(format_args!("{case:?}, revolution {revolution}"));
+                drive.assert_held(format_args!("{late} s, revolution {revolution}"));
                 wrong = wrong.max((drive.published.x - drive.truth.x).hypot(drive.published.y - drive.truth.y));
             }
             // The levels had something to hold.
-            let most = case.iter().map(|(_, late)| late.abs()).fold(0.0, f64::max);
-            assert!(wrong > 0.7 * most, "{case:?}: {wrong}");
+            assert!(wrong > 1.4 * late.abs(), "{late} s: {wrong}");
         }
     }
 }
