@@ -1,6 +1,6 @@
 //! Faults of what is believed before the vehicle drives.
 
-use agv_core::geometry::{Point, Pose};
+use agv_core::geometry::{Point, Pose, fit_rigid};
 use agv_core::maps::Landmark;
 use agv_core::odometry::Vehicle;
 
@@ -129,24 +129,10 @@ fn distort(landmarks: &mut [Landmark], is_laid: bool, change: impl FnOnce(&mut [
         return;
     }
     let after: Vec<Point> = landmarks.iter().map(Landmark::position).collect();
-    let laid = rigid_fit(&after, &before);
-    landmarks.iter_mut().zip(after).for_each(|(landmark, place)| set(landmark, laid.transform(&place)));
-}
-
-/// The pose that lays places onto others with the least sum of squares (B. K. P. Horn, "Closed-form solution of absolute orientation using
-/// unit quaternions", JOSA A 4(4), 1987, in the plane).
-fn rigid_fit(places: &[Point], onto: &[Point]) -> Pose {
-    let middle = |points: &[Point]| points.iter().sum::<Point>() / points.len().max(1) as f64;
-    let (from, to) = (middle(places), middle(onto));
-    let (mut dot, mut cross) = (0.0, 0.0);
-    for (place, target) in places.iter().zip(onto) {
-        let (place, target) = (place - from, target - to);
-        dot += place.dot(&target);
-        cross += place.x * target.y - place.y * target.x;
+    let pairs = after.iter().zip(&before).map(|(place, onto)| (*place, *onto, 1.0));
+    if let Some(laid) = fit_rigid(pairs) {
+        landmarks.iter_mut().zip(&after).for_each(|(landmark, place)| set(landmark, laid.pose.transform(place)));
     }
-    let theta = libm::atan2(cross, dot);
-    let turned = Pose::new(0.0, 0.0, theta).transform(&from);
-    Pose::new(to.x - turned.x, to.y - turned.y, theta)
 }
 
 /// Makes what is believed of the vehicle wrong; of one with several steered wheels the first.

@@ -7,7 +7,7 @@ mod sketches;
 use agv_core::geometry::{Point, Pose};
 use agv_host_sim::simulate::path::Path;
 use agv_host_sim::simulate::raycast::{RayCaster, Surface};
-use agv_host_sim::simulate::scenario::Scenario;
+use agv_host_sim::simulate::scenario::{DriveOptions, ReflectorOptions, Scenario};
 use serde::Serialize;
 
 pub use sketches::{SKETCHES, Sketch, sketch};
@@ -63,6 +63,23 @@ pub fn draw(generator: Generator, seed: u64) -> Hall {
     match generator {
         Generator::Racks => racks::draw(seed),
         Generator::Sketches => sketches::draw(seed),
+    }
+}
+
+/// How every vehicle drives, and what it misses: stops at the start, between legs and at the end, at that speed, m/s. Hall and way are
+/// still to be stated.
+fn empty(seed: u64, speed: f64) -> Scenario {
+    Scenario {
+        seed,
+        drive: DriveOptions {
+            speed,
+            start_standstill: STANDS + 1.0,
+            stop_between_legs: 3.0,
+            end_standstill: 6.0,
+            ..DriveOptions::default()
+        },
+        reflectors: ReflectorOptions { missing_share: 0.1, ..ReflectorOptions::default() },
+        ..Scenario::default()
     }
 }
 

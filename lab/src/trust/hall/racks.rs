@@ -9,12 +9,10 @@ use std::f64::consts::FRAC_PI_2;
 use agv_core::geometry::{Point, Pose};
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::random::{Random, Stream};
-use agv_host_sim::simulate::scenario::{
-    DriveOptions, PathKind, PathOptions, PoseOptions, ReflectorOptions, Scenario, Shapes, WorldOptions,
-};
+use agv_host_sim::simulate::scenario::{PathKind, PathOptions, PoseOptions, Scenario, Shapes, WorldOptions};
 
 use super::shapes::{PROUD, add, add_box, add_flat};
-use super::{Hall, STANDS, is_accepted};
+use super::{Hall, empty, is_accepted};
 
 /// From the middle of the middle aisle to the first reflector, m; one on a rack is seen from 2 m before it.
 const HALF_BARE: f64 = 6.8;
@@ -80,20 +78,7 @@ pub fn draw(seed: u64) -> Hall {
     }
     let path = path(&plan, station);
     let speed = random.between(1.0, 1.6);
-    let scenario = Scenario {
-        seed,
-        world: WorldOptions::Shapes(shapes),
-        path,
-        drive: DriveOptions {
-            speed,
-            start_standstill: STANDS + 1.0,
-            stop_between_legs: 3.0,
-            end_standstill: 6.0,
-            ..DriveOptions::default()
-        },
-        reflectors: ReflectorOptions { missing_share: 0.1, ..ReflectorOptions::default() },
-        ..Scenario::default()
-    };
+    let scenario = Scenario { world: WorldOptions::Shapes(shapes), path, ..empty(seed, speed) };
     let bare =
         [-1.0, 1.0].map(|side| Point::new(plan.middle() + side * HALF_BARE, plan.aisle(1) + side * 0.5 * plan.pitch));
     let is_accepted = is_accepted(&scenario, Some(&bare));

@@ -7,11 +7,11 @@ use agv_core::geometry::{Point, Pose};
 use agv_host_sim::simulate::path::{Direction, Leg, PathSegment};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{
-    DriveOptions, PathKind, PathOptions, PoseOptions, ReflectorOptions, ReflectorShape, Scenario, Shapes, WorldOptions,
+    PathKind, PathOptions, PoseOptions, ReflectorShape, Scenario, Shapes, WorldOptions,
 };
 
 use super::shapes::{PROUD, add, add_box};
-use super::{Hall, STANDS, is_accepted, poses};
+use super::{Hall, empty, is_accepted, poses};
 
 /// What a hall is, in a few words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,19 +165,7 @@ pub(super) fn draw(seed: u64) -> Hall {
     let path = walk(&grid, &mut random);
     let [length, width] = grid.size();
     let mut shapes = Shapes { walls: Shapes::hall([0.0, 0.0], [length, width]), ..Shapes::default() };
-    let mut scenario = Scenario {
-        seed,
-        path,
-        drive: DriveOptions {
-            speed: random.between(1.0, 1.6),
-            start_standstill: STANDS + 1.0,
-            stop_between_legs: 3.0,
-            end_standstill: 6.0,
-            ..DriveOptions::default()
-        },
-        reflectors: ReflectorOptions { missing_share: 0.1, ..ReflectorOptions::default() },
-        ..Scenario::default()
-    };
+    let mut scenario = Scenario { path, ..empty(seed, random.between(1.0, 1.6)) };
     let way = poses(&scenario.build_path());
     match sketch {
         Sketch::Grid => grid_of_racks(&grid, &mut shapes, &mut random, None),
