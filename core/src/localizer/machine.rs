@@ -82,7 +82,6 @@ where
     /// [`MapError`] if the landmarks do not fit; the maps are as before then.
     pub fn replace_landmarks(&mut self, landmarks: &[Landmark]) -> Result<(), MapError> {
         self.maps.replace(landmarks)?;
-        self.separation.trust_map();
         self.slam.forget_given();
         Ok(())
     }
@@ -99,7 +98,6 @@ where
     /// [`LendError`] if the landmarks do not fit or are in another order; the maps are as before then.
     pub fn lend_landmarks(&mut self, landmarks: &'m [Landmark]) -> Result<(), LendError> {
         self.maps.lend(landmarks)?;
-        self.separation.trust_map();
         self.slam.forget_given();
         Ok(())
     }

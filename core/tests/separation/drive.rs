@@ -26,8 +26,6 @@ pub struct Drive {
     /// How far beside the first reflector something else is seen instead, m; the first one is near then, and seen to 2 mm. None if it is
     /// seen as the others are.
     pub beside: Option<f64>,
-    /// How many landmarks of the map are seen 0.3 m elsewhere.
-    pub elsewhere: usize,
     /// Reports of the odometry in a revolution.
     pub samples: usize,
     /// Deviation of what each but the last of them rounds the way to, m, and what the last one has.
@@ -55,7 +53,6 @@ impl Drive {
             published: truth,
             shear: 0.0,
             beside: None,
-            elsewhere: 0,
             samples: 1,
             rounding: 0.0,
             rounded: 0.0,
@@ -144,9 +141,6 @@ impl Drive {
         self.monitor.begin_event();
         for (id, seen) in (0..).zip(&all) {
             self.monitor.see(LandmarkKey::Reflector(id), seen, &laser);
-        }
-        for _ in 0..self.elsewhere {
-            self.monitor.displace([0.3, 0.0], 8.0);
         }
         self.monitor.end_event(&self.published, &laser, 1.0);
     }

@@ -7,6 +7,5 @@ mod drive;
 mod envelope;
 mod late_clock;
 mod level;
-mod map_verdict;
 mod sensor_information;
 mod solution;

@@ -4,7 +4,6 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::map_verdict::Groups;
 use crate::state::ProtectionLevel;
 
 /// More than this share of what is seen contradicts the pose, if it is so many at least; fewer may be false reflectors.
@@ -150,12 +149,6 @@ impl Contradiction {
             level = level.or(&self.event.mean());
         }
         level
-    }
-
-    /// What the last event has seen of the map.
-    #[must_use]
-    pub fn groups(&self) -> Groups {
-        Groups { fitting: self.event.fitting as usize, displaced: self.displaced.len(), apart: self.event.mean() }
     }
 
     /// Whether enough landmarks are elsewhere by the same.

@@ -13,7 +13,6 @@ mod envelope;
 mod gyro;
 mod hypothesis;
 mod late_clock;
-mod map_verdict;
 mod misfit;
 mod sensor_information;
 mod solution;
@@ -32,7 +31,6 @@ use gyro::GyroSeparation;
 pub use hypothesis::LandmarkKey;
 use hypothesis::{FreeSince, Knock, LeftOut, is_refuted};
 use late_clock::LateClock;
-use map_verdict::MapVerdict;
 use misfit::Misfit;
 pub use sensor_information::{Seen, SensorInformation};
 use solution::FREE_POSITION;
@@ -125,7 +123,6 @@ pub struct SolutionSeparation {
     told: SensorInformation,
     contradiction: Contradiction,
     misfit: Misfit,
-    map_verdict: MapVerdict,
     /// Whether the landmarks of the last event contradicted each other.
     was_torn: bool,
     map_variances: (f64, f64),
@@ -218,7 +215,6 @@ impl SolutionSeparation {
             told: SensorInformation::NONE,
             contradiction: Contradiction::new(),
             misfit: Misfit::NONE,
-            map_verdict: MapVerdict::NONE,
             was_torn: false,
             map_variances: (0.0, 0.0),
             pose: Pose::default(),
@@ -304,11 +300,6 @@ impl SolutionSeparation {
         self.next_mounting = None;
         let pose = self.pose;
         self.rest_on(&pose, self.surprise);
-    }
-
-    /// The map is another one: what was found against the one before does not hold.
-    pub fn trust_map(&mut self) {
-        self.map_verdict = MapVerdict::NONE;
     }
 
     /// Whether the corrections say that the laser has moved: as long as they do, the solutions count in which it has.
@@ -403,7 +394,6 @@ impl SolutionSeparation {
         self.creeps.creep(lasted);
         self.late_clock.age(passed);
         self.contradiction.travel(distance);
-        self.map_verdict.travel(distance);
         for one in &mut self.leave_outs {
             one.unseen += distance;
         }
@@ -546,7 +536,6 @@ impl SolutionSeparation {
     /// as the filter expects, or as it expects them (1).
     pub fn end_event(&mut self, pose: &Pose, laser: &Laser, surprise: f64) {
         let is_contradicted = self.contradiction.end_event();
-        self.map_verdict.look(&self.contradiction.groups(), pose.position());
         self.misfit.add(&self.told);
         // What contradicts itself once has seen something else than landmarks; what does so twice has a wrong map.
         let is_torn = Misfit::is_torn(&self.told);
@@ -685,8 +674,7 @@ impl SolutionSeparation {
         by_surfaces.iter().for_each(|bound| envelope.add(bound));
         let free = found_mounting.into_iter().chain(found_yaw);
         free.for_each(|one| one.add_to(&mut envelope, pose, &one_fault, map_variances));
-        let by_map = self.map_verdict.widening(pose.position());
-        let [contradiction, misfit] = [self.contradiction.widening().or(&by_map), self.misfit.widening()];
+        let [contradiction, misfit] = [self.contradiction.widening(), self.misfit.widening()];
         let [carried, turned] = if self.is_motion_doubtful { by_surfaces::TORN } else { [0.0; 2] };
         Bounds {
             envelope,
