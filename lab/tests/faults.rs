@@ -8,7 +8,9 @@ use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Carry, Scenario};
 use agv_host_sim::simulate::{START, Simulation, simulate};
-use agv_lab::campaign::fault::{Fault, FaultKind, simulate_with};
+use agv_lab::campaign::fault::{
+    BearingError, CountError, Encoder, Fault, FaultKind, RangeError, ViewError, simulate_with,
+};
 use agv_lab::trust::hall::{self, Generator};
 
 fn quiet(seed: u64) -> Scenario {
@@ -233,4 +235,83 @@ fn a_layout_of_two_sessions_is_distorted_as_it_is_stated() {
         };
         assert!((far(&laid) - far(&after)).abs() < 1e-9, "{number}");
     }
+}
+
+/// A fault by a rule that changes reflectors or counters, of a size of which it does so.
+fn by_rule() -> Vec<(FaultKind, FaultKind)> {
+    let ranges = [
+        (RangeError::Stretched, 0.1),
+        (RangeError::Warms, 0.1),
+        (RangeError::OneSide, 0.1),
+        (RangeError::NearShort, 0.1),
+        (RangeError::OtherShape, 0.1),
+    ];
+    let bearings = [BearingError::AlongRevolution, BearingError::NowAndThen, BearingError::InTurn];
+    let views = [
+        (ViewError::Echoes, 1.0),
+        (ViewError::LoadShines, 3.0),
+        (ViewError::NearOnly, 0.8),
+        (ViewError::Fog, 0.5),
+        (ViewError::Gap, 90.0),
+        (ViewError::Repeats, 0.5),
+        (ViewError::HalfHidden, 0.1),
+    ];
+    let drive = [
+        (CountError::Wears, 0.1),
+        (CountError::Forward, 0.1),
+        (CountError::Backward, 0.1),
+        (CountError::BackwardsForward, 0.5),
+        (CountError::AtRest, 0.1),
+        (CountError::Holds, 0.5),
+        (CountError::Zero, 0.1),
+    ];
+    let steering = [
+        (CountError::Creeps, 2.0),
+        (CountError::Play, 2.0),
+        (CountError::Eccentric, 2.0),
+        (CountError::Slips, 0.1),
+        (CountError::Holds, 0.5),
+        (CountError::Zero, 0.1),
+    ];
+    let range = |(how, size)| [0.0, size].map(|size| FaultKind::RangesOff { how, size });
+    let bearing = |how| [0.0, 1.0].map(|deg| FaultKind::BearingsOff { how, deg });
+    let view = |(how, size)| [0.0, size].map(|size| FaultKind::ViewOff { how, size });
+    let count = |of, (how, size)| [0.0, size].map(|size| FaultKind::CountsOff { of, how, size });
+    let all = ranges.into_iter().map(range).chain(bearings.into_iter().map(bearing)).chain(views.into_iter().map(view));
+    let counts = drive.into_iter().map(|one| count(Encoder::Drive, one));
+    let counts = counts.chain(steering.into_iter().map(|one| count(Encoder::Steering, one)));
+    all.chain(counts).map(|[nothing, something]| (nothing, something)).collect()
+}
+
+#[test]
+fn a_fault_by_a_rule_changes_nothing_at_no_size_and_something_at_another() {
+    for (nothing, something) in by_rule() {
+        let (before, after) = spoilt(nothing);
+        assert!(before.recording.events == after.events, "{nothing:?}");
+        let (before, after) = spoilt(something);
+        assert!(before.recording.events != after.events, "{something:?}");
+    }
+}
+
+#[test]
+fn ranges_by_a_rule_are_wrong_by_what_they_state() {
+    let of = |how, size| FaultKind::RangesOff { how, size };
+    for (what, expected) in [
+        (of(RangeError::Stretched, 0.02), (|range: f64, _: f64| 0.02 * range) as fn(f64, f64) -> f64),
+        (of(RangeError::OneSide, 0.05), |_, bearing| if bearing > 0.0 { 0.05 } else { 0.0 }),
+        (of(RangeError::NearShort, 0.1), |range, _| -0.1 * libm::exp(-range / 4.0)),
+    ] {
+        let (before, after) = spoilt(what);
+        for (before, after) in pairs(&before, &after) {
+            let (range, bearing) = (f64::from(before.range), f64::from(before.bearing));
+            let error = f64::from(after.range) - range - expected(range, bearing);
+            assert!(error.abs() < 1e-5, "{what:?}: {error} at {range} m");
+        }
+    }
+    let (before, after) = spoilt(of(RangeError::OtherShape, 0.03));
+    let wrong = |(before, after): (&ReflectorObservation, &ReflectorObservation)| f64::from(after.range - before.range);
+    let errors: Vec<f64> = pairs(&before, &after).map(wrong).collect();
+    assert!(errors.iter().all(|error| error.abs() < 1e-5 || (error - 0.03).abs() < 1e-5));
+    let share = errors.iter().filter(|error| **error > 0.02).count() as f64 / errors.len() as f64;
+    assert!((0.2..0.8).contains(&share), "{share}");
 }

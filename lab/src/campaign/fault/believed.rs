@@ -15,6 +15,10 @@ impl Fault {
         if let FaultKind::ReflectorMoved { metres } = self.what {
             move_one(recording, metres, random);
         }
+        if let FaultKind::LayoutCutOff { share } = self.what {
+            let kept = (1.0 - share) * recording.landmarks.len() as f64;
+            recording.landmarks.truncate(libm::ceil(kept) as usize);
+        }
         self.move_landmarks(&mut recording.landmarks, random);
         mistake(self.what, &mut recording.parameters.vehicle);
         match self.what {

@@ -6,19 +6,26 @@ use agv_core::geometry::{Point, Pose};
 use agv_core::maps::Landmark;
 use agv_core::measurement::{ReflectorObservation, Time};
 
-use super::FaultKind;
+use super::{FaultKind, RangeError, ViewError};
 use agv_host_sim::recording::{Recording, Truth, truth_at};
 use agv_host_sim::simulate::random::Random;
 
 /// What is seen this near to a reflector, m, is that reflector.
 const SAME: f64 = 0.5;
 
+/// Shares of the reflectors that have another shape than is set, and that are half hidden.
+const OTHER_SHAPE: f64 = 0.5;
+const HALF_HIDDEN: f64 = 1.0 / 3.0;
+
 /// What a fault of the laser remembers.
 pub(super) struct LaserState {
     truth: Vec<Truth>,
     mount: Pose,
     landmarks: Vec<Landmark>,
-    gone: BTreeSet<u16>,
+    /// Those that the fault is about.
+    chosen: BTreeSet<u16>,
+    /// What the revolution before has shown, bearings and distances.
+    shown: Vec<(f32, f32)>,
     walkers: Walkers,
     wander: f64,
     wandered_at: Option<f64>,
@@ -27,17 +34,23 @@ pub(super) struct LaserState {
 impl LaserState {
     pub(super) fn new(what: FaultKind, recording: &Recording, random: &mut Random) -> Self {
         let walkers = Walkers::new(what, random);
-        let gone = match what {
-            FaultKind::ReflectorsGone { share } => {
-                recording.landmarks.iter().filter(|_| random.happens(share)).map(|landmark| landmark.id).collect()
-            }
-            _ => BTreeSet::new(),
+        let chosen = match what {
+            FaultKind::ReflectorsGone { share } => share,
+            FaultKind::RangesOff { how: RangeError::OtherShape, .. } => OTHER_SHAPE,
+            FaultKind::ViewOff { how: ViewError::HalfHidden, .. } => HALF_HIDDEN,
+            _ => 0.0,
+        };
+        let chosen = if chosen > 0.0 {
+            recording.landmarks.iter().filter(|_| random.happens(chosen)).map(|landmark| landmark.id).collect()
+        } else {
+            BTreeSet::new()
         };
         Self {
             truth: recording.truth.clone(),
             mount: *recording.parameters.lasers.first(),
             landmarks: recording.landmarks.clone(),
-            gone,
+            chosen,
+            shown: Vec::new(),
             walkers,
             wander: 0.0,
             wandered_at: None,
@@ -49,14 +62,26 @@ impl LaserState {
         Some(truth_at(&self.truth, time)?.compose(&self.mount))
     }
 
-    /// Whether what is seen there has gone.
-    pub(super) fn has_gone(&self, seen: &ReflectorObservation) -> bool {
+    /// Whether what is seen there is a reflector that the fault is about.
+    pub(super) fn is_chosen(&self, seen: &ReflectorObservation) -> bool {
         let Some(sensor) = self.sensor(seen.time) else { return false };
         let (sine, cosine) = libm::sincos(f64::from(seen.bearing));
         let place = sensor.transform(&(Point::new(cosine, sine) * f64::from(seen.range)));
         let distance = |landmark: &Landmark| (landmark.position() - place).norm();
         let nearest = self.landmarks.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.is_some_and(|landmark| distance(landmark) < SAME && self.gone.contains(&landmark.id))
+        nearest.is_some_and(|landmark| distance(landmark) < SAME && self.chosen.contains(&landmark.id))
+    }
+
+    /// Shows what the revolution before has shown instead, as far as it goes, if `is_wanted`, and remembers what was seen.
+    pub(super) fn repeat(&mut self, seen: &mut Vec<ReflectorObservation>, is_wanted: bool) {
+        let now = seen.iter().map(|seen| (seen.bearing, seen.range)).collect();
+        let before = std::mem::replace(&mut self.shown, now);
+        if is_wanted && !before.is_empty() {
+            seen.truncate(before.len());
+            for (seen, (bearing, range)) in seen.iter_mut().zip(before) {
+                (seen.bearing, seen.range) = (bearing, range);
+            }
+        }
     }
 
     /// People, seen from the laser, `time` s after the vehicle drove off.

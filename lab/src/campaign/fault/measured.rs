@@ -4,9 +4,11 @@ use agv_core::geometry::{Point, wrap};
 use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
 use agv_core::odometry::{Counted, Counter, CounterRange, Tricycle, Vehicle};
 
+use super::counting::CountState;
 use super::laser_state::LaserState;
+use super::ranging::WARMS;
 use super::tilt::Tilt;
-use super::{Fault, FaultKind};
+use super::{Encoder, Fault, FaultKind, ViewError};
 use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording};
 use agv_host_sim::simulate::START;
 use agv_host_sim::simulate::random::Random;
@@ -31,19 +33,20 @@ impl Fault {
             match event {
                 RecordedEvent::Encoders(EncoderSample { time, drive: turn, steering: angle }) => {
                     let time = time.since(START);
-                    drive.inspect(|counter| self.spoil_drive(turn, time, counter, &mut encoders));
-                    steering.inspect(|counter| self.spoil_steering(angle, time, counter, offset, &mut encoders));
+                    drive.inspect(|counter| self.spoil_drive(turn, time, counter, &mut encoders, random));
+                    steering
+                        .inspect(|counter| self.spoil_steering(angle, time, (counter, offset), &mut encoders, random));
                 }
                 RecordedEvent::Wheels(sample) => {
                     let time = sample.time.since(START);
                     if let Some(counter) = &drive {
                         let mut turn = sample.count(counter);
-                        self.spoil_drive(&mut turn, time, counter, &mut encoders);
+                        self.spoil_drive(&mut turn, time, counter, &mut encoders, random);
                         sample.set_count(counter, turn);
                     }
                     if let Some(counter) = &steering {
                         let mut angle = sample.count(counter);
-                        self.spoil_steering(&mut angle, time, counter, offset, &mut encoders);
+                        self.spoil_steering(&mut angle, time, (counter, offset), &mut encoders, random);
                         sample.set_count(counter, angle);
                     }
                 }
@@ -89,6 +92,30 @@ impl Fault {
                     }
                 });
             }
+            FaultKind::RangesOff { how, size } if how.is_of_surfaces() => {
+                let grown = self.grown(time, WARMS);
+                returns(scan, &mut |bearing, range| {
+                    let at = (f64::from(*range), wrap(bearing.to_radians()));
+                    *range = (at.0 + how.error(size, at, grown, false)).max(0.1) as f32;
+                });
+            }
+            FaultKind::BearingsOff { how, deg } => {
+                let number = number_of(time);
+                let (first, last) =
+                    (how.error(deg, -std::f64::consts::PI, number), how.error(deg, std::f64::consts::PI, number));
+                scan.first_bearing += first.to_radians();
+                scan.bearing_step += (last - first).to_radians() / scan.ranges.len().max(1) as f64;
+            }
+            FaultKind::ViewOff { how, size } => {
+                let number = number_of(time);
+                returns(scan, &mut |bearing, range| {
+                    if how.hides(size, (f64::from(*range), bearing.to_radians()), number) {
+                        *range = 0.0;
+                    } else if how == ViewError::Fog && random.happens(size) {
+                        *range = ViewError::fog(random) as f32;
+                    }
+                });
+            }
             FaultKind::RangesNoisy { metres } => {
                 returns(scan, &mut |_, range| *range = (*range + (metres * random.normal()) as f32).max(0.1));
             }
@@ -101,7 +128,22 @@ impl Fault {
         }
     }
 
-    fn spoil_drive(&self, count: &mut u32, time: f64, counter: &Counter, state: &mut EncoderFaultState) {
+    fn spoil_drive(
+        &self,
+        count: &mut u32,
+        time: f64,
+        counter: &Counter,
+        state: &mut EncoderFaultState,
+        random: &mut Random,
+    ) {
+        if let FaultKind::CountsOff { of: Encoder::Drive, how, size } = self.what {
+            if self.is_active(time) {
+                how.spoil(size, count, (time, time - self.from), (counter, 0.0), &mut state.counts, random);
+            } else {
+                state.counts.go_on(count, counter);
+            }
+            return;
+        }
         let true_drive = *count;
         let moved = state.true_drive.map_or(0, |before| counter.range.step(before, true_drive));
         state.true_drive = Some(true_drive);
@@ -123,14 +165,24 @@ impl Fault {
         &self,
         count: &mut u32,
         time: f64,
-        counter: &Counter,
-        offset: f64,
+        (counter, offset): (&Counter, f64),
         state: &mut EncoderFaultState,
+        random: &mut Random,
     ) {
+        let Counter { range, scale, .. } = *counter;
+        if let FaultKind::CountsOff { of: Encoder::Steering, how, size } = self.what {
+            let (ticks, values) = (i64::from(*count), range.values() as i64);
+            let angle = if ticks > values / 2 { ticks - values } else { ticks } as f64 * scale + offset;
+            if self.is_active(time) {
+                how.spoil(size, count, (time, time - self.from), (counter, angle), &mut state.counts, random);
+            } else {
+                state.counts.go_on(count, counter);
+            }
+            return;
+        }
         if !self.is_active(time) {
             return;
         }
-        let Counter { range, scale, .. } = *counter;
         match self.what {
             FaultKind::SteeringFrozen => *count = *state.frozen_steering.get_or_insert(*count),
             FaultKind::SteeringReversed => *count = count.wrapping_neg() & last_value(range),
@@ -179,7 +231,8 @@ impl Fault {
                     add(seen, libm::atan2(point.y, point.x), point.norm());
                 }
             }
-            FaultKind::ReflectorsGone { .. } => seen.retain(|observation| !laser.has_gone(observation)),
+            FaultKind::ViewOff { how, size } => spoil_view(seen, how, size, number_of(time), laser, random),
+            FaultKind::ReflectorsGone { .. } => seen.retain(|observation| !laser.is_chosen(observation)),
             FaultKind::SunShines { towards_deg, half_width_deg } => {
                 let sensor = seen.first().and_then(|first| laser.sensor(first.time));
                 if let Some(sensor) = sensor.filter(|_| half_width_deg > 0.0) {
@@ -201,6 +254,19 @@ impl Fault {
             FaultKind::LaserShifted { x, y } => {
                 for observation in seen.iter_mut() {
                     set_position(observation, &(position(observation) - Point::new(x, y)));
+                }
+            }
+            FaultKind::RangesOff { how, size } => {
+                let grown = self.grown(time, WARMS);
+                for observation in seen.iter_mut() {
+                    how.spoil(size, observation, grown, laser.is_chosen(observation));
+                }
+            }
+            FaultKind::BearingsOff { how, deg } => {
+                for observation in seen.iter_mut() {
+                    let bearing = f64::from(observation.bearing);
+                    let error = how.error(deg, bearing, number_of(time)).to_radians();
+                    observation.bearing = wrap(bearing + error) as f32;
                 }
             }
             FaultKind::RangesLong { metres } => {
@@ -230,6 +296,43 @@ impl Fault {
             }
             _ => {}
         }
+    }
+}
+
+/// Makes wrong what the revolution of that number has seen.
+fn spoil_view(
+    seen: &mut Vec<ReflectorObservation>,
+    how: ViewError,
+    size: f64,
+    number: u64,
+    laser: &mut LaserState,
+    random: &mut Random,
+) {
+    let added = how.added(size, seen, random);
+    // What hides all leaves the last one, which tells the time of the revolution.
+    let last = seen.last().copied();
+    seen.retain(|one| !how.hides(size, (f64::from(one.range), f64::from(one.bearing)), number));
+    if seen.is_empty() {
+        seen.extend(last);
+    }
+    match how {
+        ViewError::Fog => {
+            for one in seen.iter_mut() {
+                if random.happens(size) {
+                    one.range = ViewError::fog(random) as f32;
+                }
+            }
+        }
+        ViewError::Repeats => laser.repeat(seen, random.happens(size)),
+        ViewError::HalfHidden => {
+            for one in seen.iter_mut().filter(|one| laser.is_chosen(one)) {
+                one.bearing = wrap(f64::from(one.bearing) + size / f64::from(one.range).max(0.1)) as f32;
+            }
+        }
+        _ => {}
+    }
+    for (bearing, range) in added {
+        add(seen, bearing, range);
     }
 }
 
@@ -267,6 +370,7 @@ struct EncoderFaultState {
     was_active: bool,
     /// What the counter of the driving wheel has too much, ticks.
     drive: f64,
+    counts: CountState,
 }
 
 /// Whether a bearing lies in a sector of the window, all in degrees.
@@ -314,6 +418,11 @@ const REVOLUTION: f64 = 0.125;
 /// When the revolution began that was under way then, s.
 fn revolution_of(time: f64) -> f64 {
     REVOLUTION * libm::floor(time / REVOLUTION + 1e-6)
+}
+
+/// The number of the revolution that was under way then, s.
+fn number_of(time: f64) -> u64 {
+    libm::floor(time / REVOLUTION + 1e-6).max(0.0) as u64
 }
 
 /// A counter of which a part is cut out.

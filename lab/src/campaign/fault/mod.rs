@@ -1,13 +1,21 @@
 //! What goes wrong in a run, when, and how.
 
 mod believed;
+mod counting;
+mod direction;
 mod hall;
 mod laser_state;
 mod measured;
+mod ranging;
 mod tilt;
+mod view;
 mod wire;
 
+pub use counting::{CountError, Encoder};
+pub use direction::BearingError;
 pub use hall::simulate_with;
+pub use ranging::RangeError;
+pub use view::ViewError;
 pub use wire::{Line, Message};
 
 use agv_core::odometry::{Counted, Vehicle, WheelVehicle};
@@ -71,6 +79,8 @@ impl FaultKind {
             | Self::WheelSpins { .. }
             | Self::WheelSlides { .. }
             | Self::DriveScaleWrong { .. } => has(Counted::Turn),
+            Self::CountsOff { of: Encoder::Drive, .. } => has(Counted::Turn),
+            Self::CountsOff { of: Encoder::Steering, .. } => has(Counted::Steering),
             _ => true,
         }
     }
@@ -203,8 +213,38 @@ pub enum FaultKind {
         /// The offset.
         deg: f64,
     },
+    /// A counter counts wrongly by a rule.
+    CountsOff {
+        /// Which.
+        of: Encoder,
+        /// How.
+        how: CountError,
+        /// By how much, in the unit of the rule.
+        size: f64,
+    },
 
     // The laser.
+    /// Distances are wrong by a rule.
+    RangesOff {
+        /// Which.
+        how: RangeError,
+        /// By how much, in the unit of the rule.
+        size: f64,
+    },
+    /// Bearings are wrong by a rule.
+    BearingsOff {
+        /// Which.
+        how: BearingError,
+        /// By how much.
+        deg: f64,
+    },
+    /// The laser sees what is not there, or does not see what is.
+    ViewOff {
+        /// How.
+        how: ViewError,
+        /// By how much, in the unit of the rule.
+        size: f64,
+    },
     /// The laser is knocked and stays turned.
     LaserTurned {
         /// By how much.
@@ -336,6 +376,11 @@ pub enum FaultKind {
     ReflectorsStand {
         /// How many.
         count: u32,
+    },
+    /// The layout was loaded in part.
+    LayoutCutOff {
+        /// How much of it is missing at its end.
+        share: f64,
     },
     /// The layout that is loaded is a mirror image.
     LayoutMirrored,
