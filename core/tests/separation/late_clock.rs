@@ -42,28 +42,6 @@ fn a_laser_that_is_late_from_the_beginning_is_held_from_the_first_metre_on() {
     }
 }
 
-/// The data become older by 70 ms in half a minute, as where a buffer fills.
-#[test]
-fn a_laser_whose_data_become_older_while_it_drives_is_held() {
-    let straight = |count: usize| vec![(0.2, 0.0); count];
-    let way = [vec![(0.0, 0.0); 8], straight(60), vec![(0.1, 0.06); 26], straight(200), vec![(0.1, 0.06); 26]].concat();
-    for seed in 1..6 {
-        for most in [0.07, -0.07] {
-            let mut drive = Drive::new(seed);
-            let mount = drive.mount;
-            let mut wrong: f64 = 0.0;
-            for (revolution, (along, turn)) in way.iter().enumerate() {
-                let late = most * (revolution as f64 / 240.0).min(1.0);
-                drive.true_mount = before(late, *along, *turn).compose(&mount);
-                drive.revolve(&Pose::exp(&Twist { x: *along, y: 0.0, theta: *turn }));
-                drive.assert_held(format_args!("{most} s, seed {seed}, revolution {revolution}"));
-                wrong = wrong.max((drive.published.x - drive.truth.x).hypot(drive.published.y - drive.truth.y));
-            }
-            assert!(wrong > 1.4 * most.abs(), "{most} s: {wrong}");
-        }
-    }
-}
-
 /// The age of what the laser tells changes at a stop behind others, once the clock of the first metres is known.
 #[test]
 fn a_laser_whose_data_become_older_at_a_stop_is_held() {

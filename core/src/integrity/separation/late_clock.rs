@@ -13,9 +13,6 @@ use super::solution::{Laser, Solution};
 /// A vehicle stands that moves and turns no faster than this, m/s and rad/s: its pose is off by a millimetre at most.
 const AT_REST: (f64, f64) = (5e-3, 5e-3);
 
-/// How much older or younger the data become in a square root of a second, s: by a revolution (0.125 s) in 100 s is 5 deviations.
-const WANDERS: f64 = 2.5e-3;
-
 /// The solution with a clock that is free since the vehicle last stood, or since its first pose; none before.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LateClock {
@@ -40,13 +37,6 @@ impl LateClock {
     /// The solution.
     pub const fn solution_mut(&mut self) -> Option<&mut Solution> {
         self.solution.as_mut()
-    }
-
-    /// The data may have become older, or younger, in so many seconds.
-    pub fn age(&mut self, seconds: f64) {
-        if let Some(solution) = &mut self.solution {
-            solution.loosen_clock(WANDERS * WANDERS * seconds.max(0.0));
-        }
     }
 
     /// Takes what landmarks say; `all` has taken it.

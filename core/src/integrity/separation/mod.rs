@@ -392,7 +392,6 @@ impl SolutionSeparation {
             }
         }
         self.creeps.creep(lasted);
-        self.late_clock.age(passed);
         self.contradiction.travel(distance);
         for one in &mut self.leave_outs {
             one.unseen += distance;

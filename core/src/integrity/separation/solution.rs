@@ -355,11 +355,6 @@ impl Solution {
         self.loosen(MOUNTING, &[place, place, yaw]);
     }
 
-    /// The clock of the laser may have gone wrong by so much, s^2.
-    pub fn loosen_clock(&mut self, variance: f64) {
-        self.loosen(CLOCK, &[variance]);
-    }
-
     /// Scale, steering and turn may have changed by so much; variances.
     pub fn loosen_odometry(&mut self, variances: &[f64; 3]) {
         self.loosen(ODOMETRY, variances);
