@@ -20,7 +20,7 @@ impl BearingError {
         match self {
             Self::AlongRevolution => size * (bearing / std::f64::consts::TAU + 0.5),
             Self::NowAndThen => size * f64::from(u8::from(number % 10 == 3)),
-            Self::InTurn => size * if number % 2 == 0 { 1.0 } else { -1.0 },
+            Self::InTurn => size * if number.is_multiple_of(2) { 1.0 } else { -1.0 },
         }
     }
 }
