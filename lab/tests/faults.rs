@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use agv_core::geometry::{Point, difference};
 use agv_core::measurement::ReflectorObservation;
-use agv_host_sim::recording::{RecordedEvent, Recording, truth_at};
+use agv_host_sim::recording::{RecordedEvent, RecordedScan, Recording, truth_at};
 use agv_host_sim::simulate::random::{Random, Stream};
 use agv_host_sim::simulate::scenario::{Carry, Scenario};
 use agv_host_sim::simulate::{START, Simulation, simulate};
@@ -290,6 +290,58 @@ fn a_fault_by_a_rule_changes_nothing_at_no_size_and_something_at_another() {
         assert!(before.recording.events == after.events, "{nothing:?}");
         let (before, after) = spoilt(something);
         assert!(before.recording.events != after.events, "{something:?}");
+    }
+}
+
+fn scans(recording: &Recording) -> impl Iterator<Item = &RecordedScan> {
+    recording.events.iter().filter_map(|event| match event {
+        RecordedEvent::Scan(scan) => Some(scan),
+        _ => None,
+    })
+}
+
+#[test]
+fn surfaces_have_the_errors_that_the_laser_has_and_not_those_of_reflectors() {
+    let mut scenario = quiet(3);
+    scenario.laser.scans = true;
+    let simulation = simulate(&scenario).unwrap();
+    let after = |what| {
+        let mut recording = simulation.recording.clone();
+        fault(what).spoil(&mut recording, &simulation.true_tricycle, &mut Random::new(3, Stream::Faults));
+        recording
+    };
+    let stretched = after(FaultKind::RangesOff { how: RangeError::Stretched, size: 0.02 });
+    let turned = after(FaultKind::BearingsOff { how: BearingError::AlongRevolution, deg: 1.0 });
+    let near = after(FaultKind::ViewOff { how: ViewError::NearOnly, size: 0.8 });
+    let short = after(FaultKind::RangesOff { how: RangeError::NearShort, size: 0.1 });
+    assert!(scans(&simulation.recording).eq(scans(&short)));
+    let mut seen = 0;
+    let of_faults = scans(&stretched).zip(scans(&turned)).zip(scans(&near));
+    for (before, ((stretched, turned), near)) in scans(&simulation.recording).zip(of_faults) {
+        let ranges = before.ranges.iter().zip(&stretched.ranges).zip(&near.ranges);
+        for ((before, stretched), near) in ranges.filter(|((before, _), _)| **before > 0.0) {
+            assert!((stretched - 1.02 * before).abs() < 1e-4, "{before}, {stretched}");
+            assert_eq!(*near, if f64::from(*before) > 30.0 * (1.0 - 0.8) { 0.0 } else { *before });
+            seen += 1;
+        }
+        let error = |beam: f64| {
+            turned.first_bearing - before.first_bearing + beam * (turned.bearing_step - before.bearing_step)
+        };
+        let last = before.ranges.len() as f64;
+        assert!(error(0.0).abs() < 1e-9 && (error(last) - 1_f64.to_radians()).abs() < 1e-9);
+    }
+    assert!(seen > 100_000, "{seen}");
+}
+
+#[test]
+fn a_layout_that_is_cut_off_misses_its_end() {
+    let (before, _) = spoilt(FaultKind::Nothing);
+    let landmarks = &before.recording.landmarks;
+    for (share, kept) in [(0.0, landmarks.len()), (0.5, landmarks.len().div_ceil(2)), (1.0, 0)] {
+        let mut recording = before.recording.clone();
+        let cut_off = fault(FaultKind::LayoutCutOff { share });
+        cut_off.mislead(&mut recording, &mut Random::new(4, Stream::Faults));
+        assert_eq!(recording.landmarks, landmarks[..kept]);
     }
 }
 

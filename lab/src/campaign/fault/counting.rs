@@ -4,6 +4,8 @@ use agv_core::odometry::{Counted, Counter};
 use agv_host_sim::simulate::random::Random;
 use serde::{Deserialize, Serialize};
 
+use super::measured::shifted;
+
 /// Which counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -18,9 +20,9 @@ pub enum Encoder {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CountError {
-    /// Steps are too large by that share after two minutes, and in proportion before: a wheel that wears.
+    /// Steps are too large by that share after two minutes, and in proportion before: a driving wheel that wears.
     Wears,
-    /// It is off by so many degrees after two minutes, and in proportion before.
+    /// The steering is off by so many degrees after two minutes, and in proportion before.
     Creeps,
     /// Steps forward lose that share.
     Forward,
@@ -28,22 +30,22 @@ pub enum CountError {
     Backward,
     /// That share of the steps backward counts forward: a single track.
     BackwardsForward,
-    /// It counts so many metres a second while it stands: an edge that trembles.
+    /// The driving wheel counts so many metres a second while it stands: an edge that trembles.
     AtRest,
     /// It shows a new value each so many seconds.
     Holds,
     /// That share of its values is nought.
     Zero,
-    /// It follows only where the shaft has turned by more than so many degrees: play.
+    /// The steering's follows only where the shaft has turned by more than so many degrees: play.
     Play,
-    /// It is off by so many degrees times the sine of the angle: a magnet beside the axis.
+    /// The steering is off by so many degrees times the sine of the angle: a magnet beside the axis.
     Eccentric,
     /// All steps lose that share: a coupling that slips.
     Slips,
 }
 
 /// How long wear and creep take, s.
-const SLOWLY: f64 = 120.0;
+pub(super) const SLOWLY: f64 = 120.0;
 /// Phase of an encoder beside its axis, rad.
 const PHASE: f64 = 0.7;
 
@@ -62,23 +64,18 @@ impl CountState {
     /// The fault is over, or has not begun: what was counted too much stays, but where a steering is, which tells an angle.
     pub(super) fn go_on(&self, count: &mut u32, counter: &Counter) {
         if counter.counted == Counted::Turn {
-            *count = shifted(*count, self.extra, counter);
+            *count = shifted(*count, libm::round(self.extra) as i64, counter.range);
         }
     }
 }
 
-/// A count with so many ticks more.
-fn shifted(count: u32, ticks: f64, counter: &Counter) -> u32 {
-    (i64::from(count) + libm::round(ticks) as i64).rem_euclid(counter.range.values() as i64) as u32
-}
-
 impl CountError {
-    /// Makes a count wrong, `time` s after the vehicle drove off, `lasted` s after the fault began. `angle` is that of the steering, rad.
+    /// Makes a count wrong, `time` s after the vehicle drove off; `grown` is how much of what comes slowly is there. `angle` is that of the steering, rad.
     pub(super) fn spoil(
         self,
         size: f64,
         count: &mut u32,
-        (time, lasted): (f64, f64),
+        (time, grown): (f64, f64),
         (counter, angle): (&Counter, f64),
         state: &mut CountState,
         random: &mut Random,
@@ -86,10 +83,9 @@ impl CountError {
         let (moved, passed) =
             state.before.map_or((0.0, 0.0), |(at, before)| (counter.range.step(before, *count) as f64, time - at));
         state.before = Some((time, *count));
-        let grown = (lasted / SLOWLY).clamp(0.0, 1.0);
         let in_ticks = |degrees: f64| degrees.to_radians() / counter.scale;
         let shaft = *count;
-        let with = |ticks: f64| shifted(shaft, ticks, counter);
+        let with = |ticks: f64| shifted(shaft, libm::round(ticks) as i64, counter.range);
         state.extra += match self {
             Self::Wears => size * grown * moved,
             Self::Forward => -size * moved.max(0.0),

@@ -35,16 +35,14 @@ impl LaserState {
     pub(super) fn new(what: FaultKind, recording: &Recording, random: &mut Random) -> Self {
         let walkers = Walkers::new(what, random);
         let chosen = match what {
-            FaultKind::ReflectorsGone { share } => share,
-            FaultKind::RangesOff { how: RangeError::OtherShape, .. } => OTHER_SHAPE,
-            FaultKind::ViewOff { how: ViewError::HalfHidden, .. } => HALF_HIDDEN,
-            _ => 0.0,
+            FaultKind::ReflectorsGone { share } => Some(share),
+            FaultKind::RangesOff { how: RangeError::OtherShape, .. } => Some(OTHER_SHAPE),
+            FaultKind::ViewOff { how: ViewError::HalfHidden, .. } => Some(HALF_HIDDEN),
+            _ => None,
         };
-        let chosen = if chosen > 0.0 {
-            recording.landmarks.iter().filter(|_| random.happens(chosen)).map(|landmark| landmark.id).collect()
-        } else {
-            BTreeSet::new()
-        };
+        let chosen = chosen.map_or_else(BTreeSet::new, |share| {
+            recording.landmarks.iter().filter(|_| random.happens(share)).map(|landmark| landmark.id).collect()
+        });
         Self {
             truth: recording.truth.clone(),
             mount: *recording.parameters.lasers.first(),
@@ -64,7 +62,7 @@ impl LaserState {
 
     /// Whether what is seen there is a reflector that the fault is about.
     pub(super) fn is_chosen(&self, seen: &ReflectorObservation) -> bool {
-        let Some(sensor) = self.sensor(seen.time) else { return false };
+        let Some(sensor) = self.sensor(seen.time).filter(|_| !self.chosen.is_empty()) else { return false };
         let (sine, cosine) = libm::sincos(f64::from(seen.bearing));
         let place = sensor.transform(&(Point::new(cosine, sine) * f64::from(seen.range)));
         let distance = |landmark: &Landmark| (landmark.position() - place).norm();

@@ -4,7 +4,7 @@ use agv_core::geometry::{Point, wrap};
 use agv_core::measurement::{EncoderSample, ReflectorObservation, Time};
 use agv_core::odometry::{Counted, Counter, CounterRange, Tricycle, Vehicle};
 
-use super::counting::CountState;
+use super::counting::{CountState, SLOWLY};
 use super::laser_state::LaserState;
 use super::ranging::WARMS;
 use super::tilt::Tilt;
@@ -138,7 +138,7 @@ impl Fault {
     ) {
         if let FaultKind::CountsOff { of: Encoder::Drive, how, size } = self.what {
             if self.is_active(time) {
-                how.spoil(size, count, (time, time - self.from), (counter, 0.0), &mut state.counts, random);
+                how.spoil(size, count, (time, self.grown(time, SLOWLY)), (counter, 0.0), &mut state.counts, random);
             } else {
                 state.counts.go_on(count, counter);
             }
@@ -174,7 +174,7 @@ impl Fault {
             let (ticks, values) = (i64::from(*count), range.values() as i64);
             let angle = if ticks > values / 2 { ticks - values } else { ticks } as f64 * scale + offset;
             if self.is_active(time) {
-                how.spoil(size, count, (time, time - self.from), (counter, angle), &mut state.counts, random);
+                how.spoil(size, count, (time, self.grown(time, SLOWLY)), (counter, angle), &mut state.counts, random);
             } else {
                 state.counts.go_on(count, counter);
             }
@@ -379,13 +379,14 @@ fn is_behind(bearing: f64, from: f64, to: f64) -> bool {
 }
 
 /// A laser sees no reflector farther away, m.
-const FARTHEST: f64 = 30.0;
+pub(super) const FARTHEST: f64 = 30.0;
 
 fn last_value(range: CounterRange) -> u32 {
     (range.values() - 1) as u32
 }
 
-fn shifted(counter: u32, ticks: i64, range: CounterRange) -> u32 {
+/// A count with so many ticks more.
+pub(super) fn shifted(counter: u32, ticks: i64, range: CounterRange) -> u32 {
     (i64::from(counter) + ticks).rem_euclid(range.values() as i64) as u32
 }
 
@@ -415,14 +416,19 @@ fn add(seen: &mut Vec<ReflectorObservation>, bearing: f64, range: f64) {
 /// Time of a revolution, s.
 const REVOLUTION: f64 = 0.125;
 
+/// How many revolutions were over then, s.
+fn revolutions_until(time: f64) -> f64 {
+    libm::floor(time / REVOLUTION + 1e-6)
+}
+
 /// When the revolution began that was under way then, s.
 fn revolution_of(time: f64) -> f64 {
-    REVOLUTION * libm::floor(time / REVOLUTION + 1e-6)
+    REVOLUTION * revolutions_until(time)
 }
 
 /// The number of the revolution that was under way then, s.
 fn number_of(time: f64) -> u64 {
-    libm::floor(time / REVOLUTION + 1e-6).max(0.0) as u64
+    revolutions_until(time) as u64
 }
 
 /// A counter of which a part is cut out.

@@ -1,8 +1,11 @@
 //! What a laser sees that is not there, and what it does not see.
 
+use agv_core::geometry::wrap;
 use agv_core::measurement::ReflectorObservation;
 use agv_host_sim::simulate::random::Random;
 use serde::{Deserialize, Serialize};
+
+use super::measured::FARTHEST;
 
 /// What is wrong with what is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,17 +27,20 @@ pub enum ViewError {
     HalfHidden,
 }
 
-/// How far a laser sees, m.
-const FARTHEST: f64 = 30.0;
 /// Where fog is seen, m, with its deviation (PX4-SITL_gazebo-classic, pull request 725).
 const FOG: (f64, f64) = (2.0, 0.1);
-/// Between the gaps of two revolutions, rad: the golden angle, which spreads them over all directions.
+/// Between the gaps of two revolutions, and two reflections of the load, rad: the golden angle, which spreads them over all directions.
 const GOLDEN: f64 = 2.399_963_229_728_653;
 /// Share of the reflectors behind which there is glass.
 const BEHIND_GLASS: f64 = 0.3;
 
+/// Where the first reflection of the load is, rad and m, and how much further the next one, m.
+const LOAD: (f64, f64) = (2.0, 0.8);
+const LOAD_APART: f64 = 0.21;
+
 impl ViewError {
-    /// Whether a distance and a bearing, rad, of the revolution with that number are lost.
+    /// Whether a distance and a bearing, rad, of the revolution with that number are lost. Surfaces are seen further than reflectors, but none
+    /// is lost where the size is nought.
     pub(super) fn hides(self, size: f64, (range, bearing): (f64, f64), number: u64) -> bool {
         match self {
             Self::NearOnly => size > 0.0 && range > FARTHEST * (1.0 - size),
@@ -57,10 +63,8 @@ impl ViewError {
                 .map(|seen| (f64::from(seen.bearing), f64::from(seen.range) + size))
                 .collect(),
             Self::LoadShines => (0..size as u32)
-                .map(|number| {
-                    let bearing = GOLDEN * f64::from(number) + 2.0;
-                    (agv_core::geometry::wrap(bearing), 0.8 + 0.21 * f64::from(number))
-                })
+                .map(f64::from)
+                .map(|number| (wrap(LOAD.0 + GOLDEN * number), LOAD.1 + LOAD_APART * number))
                 .collect(),
             _ => Vec::new(),
         }
